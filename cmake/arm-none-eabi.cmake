@@ -1,0 +1,20 @@
+# Cross build for a Cortex-M4. Soft float on purpose: the control path must not use floating point,
+# and with this ABI any use shows as a call to a helper, which tests/target refuses.
+set(CMAKE_SYSTEM_NAME Generic)
+set(CMAKE_SYSTEM_PROCESSOR cortex-m4)
+
+set(CMAKE_C_COMPILER arm-none-eabi-gcc)
+set(CMAKE_CXX_COMPILER arm-none-eabi-g++)
+
+# There is no startup code to link a test program with.
+set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
+
+set(pm_cpu_flags "-mcpu=cortex-m4 -mthumb -mfloat-abi=soft")
+set(CMAKE_C_FLAGS_INIT "${pm_cpu_flags} -ffunction-sections -fdata-sections -fstack-usage -fno-common")
+set(CMAKE_CXX_FLAGS_INIT "${CMAKE_C_FLAGS_INIT} -fno-exceptions -fno-rtti")
+set(CMAKE_EXE_LINKER_FLAGS_INIT "${pm_cpu_flags}")
+
+set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
+set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
+set(CMAKE_FIND_ROOT_PATH_MODE_INCLUDE ONLY)
+set(CMAKE_FIND_ROOT_PATH_MODE_PACKAGE ONLY)

@@ -1,0 +1,75 @@
+/* Per-unit configuration of the drive, made from the SI parameters in one place: config.c.
+ *
+ * Integer arithmetic with exponents (firmware/math/num.h), so host and target get the same bits. Not for the
+ * control path. A value that does not fit its format refuses the parameter that made it. */
+#ifndef DRIVE_CONFIG_H
+#define DRIVE_CONFIG_H
+
+#include "firmware/control/current_control.h"
+#include "firmware/control/field_weakening.h"
+#include "firmware/control/modulator.h"
+#include "firmware/control/mtpa.h"
+#include "firmware/control/speed_control.h"
+#include "firmware/drive/parameters.h"
+#include "firmware/drive/position.h"
+#include "firmware/math/num.h"
+#include "injection/initial_pulses.h"
+
+/* Bases. A signal in SI is its per-unit value times the base. */
+typedef struct {
+    pm_num_t v;      /* V: full scale of the DC-link channel */
+    pm_num_t i;      /* A: full scale of the current channels */
+    pm_num_t omega;  /* rad/s electrical: over-speed limit */
+    pm_num_t psi;    /* Wb = v / omega */
+    pm_num_t torque; /* Nm = 1.5 P psi i */
+    pm_num_t t_s;    /* s: control period */
+} drive_base_t;
+
+typedef struct {
+    pm_q_t i_trip;
+    pm_q_t v_dc_max, v_dc_min, v_dc_derate;
+    pm_q_t i_sum;              /* largest believable sum of the phase currents */
+    int32_t offset_max;        /* of a 16-bit code */
+    int32_t temp_derate_dC, temp_trip_dC;
+    pm_q_t omega_stall;        /* below: not turning */
+    uint16_t stall_ms, lost_ms;
+} protection_config_t;
+
+/* Align and open-loop start, current mode. */
+typedef struct {
+    pm_q_t i;              /* current amplitude */
+    pm_q_t i_slope;        /* per ms */
+    pm_q_t slope;          /* of the speed, per ms */
+    uint16_t align_ms;
+} open_loop_config_t;
+
+typedef struct {
+    drive_base_t base;
+    modulator_config_t modulator;
+    current_control_config_t current;
+    speed_control_config_t speed;
+    mtpa_config_t mtpa;
+    field_weakening_config_t field_weakening;
+    position_config_t position;
+    initial_pulses_config_t pulses;
+    open_loop_config_t open_loop;
+    protection_config_t protection;
+    pm_num_t pole_pairs;
+    bool injection;        /* the machine starts by pulses and injection */
+    int32_t k_theta;       /* pm_omega_to_angle() */
+    pm_q_t i_max;
+    pm_q_t omega_max;
+    pm_unit_t v_linear;    /* share of v_dc that the voltage vector may reach */
+    pm_q_t psi_m;
+    pm_q_t dL;             /* L_d - L_q */
+} drive_config_t;
+
+typedef struct {
+    bool ok;
+    drive_param_id_t param; /* first parameter refused */
+    const char *reason;     /* static text */
+} drive_result_t;
+
+drive_result_t drive_configure(drive_config_t *config, const drive_params_t *params);
+
+#endif

@@ -1,0 +1,178 @@
+#include "firmware/drive/drive.h"
+
+#include "firmware/drive/drive_parts.h"
+#include "firmware/math/root.h"
+#include "firmware/math/trig.h"
+
+#define OFFSET_PERIODS_LOG2 10
+/* The modulator's smallest link voltage; below, the bridge is off anyway. */
+#define V_DC_LEAST PM_Q(0.0625)
+
+drive_result_t drive_init(drive_t *drive, const drive_params_t *params)
+{
+    *drive = (drive_t){.state = DRIVE_OFF, .stage = STAGE_OFF};
+    const drive_result_t result = drive_configure(&drive->config, params);
+    if (!result.ok) {
+        drive_trip(drive, DRIVE_FAULT_PARAMETERS);
+    }
+    return result;
+}
+
+void drive_command(drive_t *drive, const drive_command_t *command)
+{
+    const drive_mode_t mode = drive->state == DRIVE_OFF ? command->mode : drive->command.mode;
+    drive->command = *command;
+    drive->command.mode = mode;
+}
+
+bool drive_clear_fault(drive_t *drive)
+{
+    if (drive->fault == DRIVE_FAULT_PARAMETERS || drive->command.enable || drive->hw_fault) {
+        return false;
+    }
+    drive->fault = DRIVE_FAULT_NONE;
+    drive->state = DRIVE_OFF;
+    drive->stage = STAGE_OFF;
+    return true;
+}
+
+const drive_status_t *drive_status(const drive_t *drive)
+{
+    return &drive->status;
+}
+
+const drive_fault_record_t *drive_fault_record(const drive_t *drive)
+{
+    return &drive->record;
+}
+
+static void measure(drive_t *drive, const drive_in_t *in)
+{
+    const int32_t *offset = drive->calibration.offset;
+    /* full scale of a code is one: a shift, no product */
+    drive->i_abc = (pm_abc_t){
+        .a = pm_shl((int32_t)in->i_leg[0] - offset[0], PM_Q_BITS - 15),
+        .b = pm_shl((int32_t)in->i_leg[1] - offset[1], PM_Q_BITS - 15),
+        .c = pm_shl((int32_t)in->i_leg[2] - offset[2], PM_Q_BITS - 15),
+    };
+    drive->i_ab = pm_clarke(drive->i_abc);
+    drive->status.v_dc = pm_max(pm_shl((int32_t)in->v_dc, PM_Q_BITS - 16), V_DC_LEAST);
+    drive->hw_fault = in->hw_fault;
+    drive->v_now = drive->v_next;
+    drive->v_next = (pm_ab_t){0, 0};
+}
+
+static void calibrate(calibration_t *self, const drive_in_t *in)
+{
+    if (self->count >= 1U << OFFSET_PERIODS_LOG2) {
+        return;
+    }
+    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
+        self->sum[x] += in->i_leg[x];
+    }
+    self->count++;
+    if (self->count == 1U << OFFSET_PERIODS_LOG2) {
+        for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
+            self->offset[x] = self->sum[x] >> OFFSET_PERIODS_LOG2;
+        }
+    }
+}
+
+static void pulses(drive_t *drive, drive_out_t *out)
+{
+    initial_pulses_out_t p = {.driven = false};
+    if (drive->pulses_state == PM_RUNNING) {
+        drive->pulses_state = initial_pulses_step(&drive->pulses, &drive->config.pulses, drive->i_ab, &p);
+    }
+    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
+        const int32_t on = pm_mulh(p.duty[x], pm_shl(drive->config.modulator.counts, 32 - PM_Q_BITS));
+        out->compare[x][0] = (uint16_t)on;
+        out->compare[x][1] = (uint16_t)on;
+        out->driven[x] = p.driven;
+    }
+}
+
+static void write_out(drive_t *drive, pm_ab_t v, pm_ab_t i, drive_out_t *out)
+{
+    modulator_out_t m;
+    modulator_step(&drive->config.modulator, v, drive->status.v_dc, i, &m);
+    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
+        out->compare[x][0] = (uint16_t)m.on[x];
+        out->compare[x][1] = (uint16_t)m.on[x];
+        out->driven[x] = true;
+    }
+    drive->v_next = m.v;
+    drive->limited = m.limited;
+}
+
+/* Current control in the frame of `theta` and its voltage one and a half periods later, when it acts. */
+static void control(drive_t *drive, pm_angle_t theta, pm_q_t omega, pm_dq_t i, drive_out_t *out)
+{
+    const drive_config_t *c = &drive->config;
+    const bool inject = drive->position.inject && drive->stage == STAGE_VECTOR;
+    const pm_q_t v_max = pm_unit(drive->status.v_dc, c->v_linear) - (inject ? c->position.square.v_h : 0);
+    current_control_out_t u;
+    current_control_step(&drive->current, &c->current, i, drive->i_ref, omega, v_max, &u);
+    drive->u = u.v;
+    drive->status.i = i;
+
+    const int32_t turn = pm_omega_to_angle(omega, c->k_theta);
+    const pm_dir_t ahead = pm_dir(theta + (pm_angle_t)turn + (pm_angle_t)(turn >> 1));
+    if (inject) {
+        u.v.d += pulsating_square_output(&drive->position.square, &c->position.square).d;
+    }
+    write_out(drive, pm_park_inverse(u.v, ahead), pm_park_inverse(i, ahead), out);
+    drive->limited |= u.limited;
+}
+
+static void vector(drive_t *drive, drive_out_t *out)
+{
+    pm_dir_t dir;
+    pm_dq_t i;
+    position_step(&drive->position, &drive->config.position, drive->v_now, drive->i_ab, &dir, &i);
+    control(drive, drive->position.pll.theta, drive->position.pll.omega, i, out);
+}
+
+static void open_loop(drive_t *drive, drive_out_t *out)
+{
+    const position_config_t *c = &drive->config.position;
+    drive->theta_open += (pm_angle_t)pm_omega_to_angle(drive->omega_open, drive->config.k_theta);
+    if (pm_abs(drive->omega_open) < c->omega_low) {
+        position_follow(&drive->position, c, drive->v_now, drive->i_ab, drive->theta_open, drive->omega_open);
+    } else {
+        pm_dir_t dir;
+        pm_dq_t i;
+        position_step(&drive->position, c, drive->v_now, drive->i_ab, &dir, &i);
+    }
+    control(drive, drive->theta_open, drive->omega_open, pm_park(drive->i_ab, pm_dir(drive->theta_open)), out);
+}
+
+void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
+{
+    drive->period++;
+    measure(drive, in);
+    protection_step(drive, in);
+    out->driven[0] = false;
+    out->driven[1] = false;
+    out->driven[2] = false;
+    if (drive->fault == DRIVE_FAULT_NONE) {
+        switch (drive->stage) {
+        case STAGE_CALIBRATE:
+            calibrate(&drive->calibration, in);
+            break;
+        case STAGE_PULSES:
+            pulses(drive, out);
+            break;
+        case STAGE_OPEN_LOOP:
+            open_loop(drive, out);
+            break;
+        case STAGE_VECTOR:
+            vector(drive, out);
+            break;
+        case STAGE_OFF:
+        default:
+            break;
+        }
+    }
+    drive->status.theta = drive->position.pll.theta;
+}

@@ -1,0 +1,101 @@
+/* The drive: from converter codes to timer counts, once per PWM period.
+ *
+ * drive_step() runs in the ADC interrupt, drive_slow() at 1 kHz, everything else in thread context. DESIGN.md
+ * section 3. No function blocks or allocates. The bridge is off (out->driven all false) unless the state says on.
+ *
+ *   drive_init(d, params)        configuration from SI parameters; refuses bad ones and names the first
+ *   drive_step(d, in, out)       one control period
+ *   drive_slow(d, in)            state machine, speed control, derating
+ *   drive_command(d, cmd)        what the user wants; may be called at any time from thread context
+ *   drive_clear_fault(d)         only when off; a fault never clears or restarts by itself
+ *
+ * Timing: in is sampled at t_k, the centre of the all-low zero vector; out takes effect at t_k+1 and holds until
+ * t_k+2. out->sample_delay is reserved for methods that shift the instant.
+ * Tests: tests/unit/drive, tests/scenario. Cost: docs/decisions and tests/target. */
+#ifndef DRIVE_DRIVE_H
+#define DRIVE_DRIVE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "firmware/drive/config.h"
+#include "firmware/drive/fault.h"
+#include "firmware/drive/parameters.h"
+#include "firmware/math/frames.h"
+
+#define DRIVE_LEGS 3
+
+typedef struct {
+    uint16_t i_leg[DRIVE_LEGS]; /* left-aligned code, mid-scale = zero, positive into the motor */
+    uint16_t v_dc;              /* left-aligned code */
+    bool hw_fault;              /* break input has switched the bridge off */
+} drive_in_t;
+
+typedef struct {
+    uint16_t compare[DRIVE_LEGS][2]; /* timer counts of the rising- and falling-edge half: on-time / half period */
+    bool driven[DRIVE_LEGS];         /* false: both switches off */
+} drive_out_t;
+
+typedef struct {
+    int32_t temperature_dC; /* 0.1 degC, hottest of the sensors */
+} drive_slow_in_t;
+
+typedef enum {
+    DRIVE_OFF,
+    DRIVE_CALIBRATING, /* current offsets, bridge off */
+    DRIVE_FINDING,     /* initial position: pulses, or align */
+    DRIVE_RUNNING,
+    DRIVE_STOPPING,    /* speed ramps to zero, then off */
+    DRIVE_FAULT,
+} drive_state_t;
+
+typedef enum {
+    DRIVE_MODE_SPEED,
+    DRIVE_MODE_TORQUE,
+    DRIVE_MODE_CURRENT, /* current vector at a given angle that turns at the speed reference: commissioning */
+} drive_mode_t;
+
+typedef struct {
+    bool enable;            /* false while running: stop, then off */
+    drive_mode_t mode;      /* taken when the drive starts */
+    int32_t speed_mrad_s;   /* mechanical, signed */
+    int32_t torque_uNm;
+    int32_t current_mA;     /* current mode */
+} drive_command_t;
+
+/* Limits at work: information, not faults. */
+enum {
+    DRIVE_LIMIT_CURRENT = 1 << 0,     /* torque reference at the current limit */
+    DRIVE_LIMIT_VOLTAGE = 1 << 1,     /* modulator at its limit */
+    DRIVE_LIMIT_TEMPERATURE = 1 << 2, /* current derated by temperature */
+    DRIVE_LIMIT_DC_VOLTAGE = 1 << 3,  /* regeneration derated by the DC-link voltage */
+    DRIVE_LIMIT_SPEED = 1 << 4,       /* reference clamped to speed_max */
+};
+
+/* A snapshot for traces, CAN and tests; per-unit values as in config.h. */
+typedef struct {
+    drive_state_t state;
+    drive_fault_t fault;
+    uint32_t limits;
+    pm_angle_t theta;   /* estimated, at the sample instant */
+    pm_q_t omega;       /* estimated, electrical */
+    pm_q_t omega_ref;   /* after the ramp */
+    pm_dq_t i, i_ref;   /* estimated frame */
+    pm_ab_t v;          /* voltage realised by the step's output */
+    pm_q_t v_dc;
+    pm_q_t weight;      /* 0: injection, 1: flux observer */
+    pm_q_t quality;     /* 1: good, 0: lost */
+} drive_status_t;
+
+typedef struct drive drive_t; /* caller-owned: the struct stands in drive_state.h */
+
+/* On refusal the drive is in DRIVE_FAULT with DRIVE_FAULT_PARAMETERS and stays off. */
+drive_result_t drive_init(drive_t *drive, const drive_params_t *params);
+void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out);
+void drive_slow(drive_t *drive, const drive_slow_in_t *in);
+void drive_command(drive_t *drive, const drive_command_t *command);
+bool drive_clear_fault(drive_t *drive); /* false: the cause is still there, or enable is still set */
+const drive_status_t *drive_status(const drive_t *drive);
+const drive_fault_record_t *drive_fault_record(const drive_t *drive); /* values at the moment of the fault */
+
+#endif

@@ -1,0 +1,64 @@
+/* The drive's memory. Users of drive.h allocate it and read nothing but drive_status(). */
+#ifndef DRIVE_DRIVE_STATE_H
+#define DRIVE_DRIVE_STATE_H
+
+#include "firmware/drive/drive.h"
+
+/* What drive_step() does; drive_slow() moves it on. */
+typedef enum {
+    STAGE_OFF,
+    STAGE_CALIBRATE,
+    STAGE_PULSES,
+    STAGE_OPEN_LOOP, /* current vector at an imposed angle */
+    STAGE_VECTOR,    /* field-oriented control at the estimated angle */
+} drive_stage_t;
+
+/* Offsets of the current channels. */
+typedef struct {
+    int32_t offset[DRIVE_LEGS]; /* code at zero current */
+    int32_t sum[DRIVE_LEGS];
+    uint16_t count;             /* periods taken */
+} calibration_t;
+
+struct drive {
+    drive_config_t config;
+    drive_command_t command;
+    drive_status_t status;
+    drive_fault_record_t record;
+
+    volatile drive_fault_t fault; /* latched; the step switches the bridge off while it is set */
+    drive_state_t state;
+    drive_stage_t stage;
+    uint32_t period;
+
+    calibration_t calibration;
+    pm_abc_t i_abc;
+    pm_ab_t i_ab;
+    bool hw_fault;
+    bool limited; /* the voltage was, in the last step */
+    pm_dq_t u;    /* voltage of the current control, without carrier */
+    pm_ab_t v_next, v_now; /* commanded at k-1 and k-2: the latter was applied over [k-1, k) */
+
+    position_t position;
+    initial_pulses_t pulses;
+    pm_procedure_t pulses_state;
+    current_control_t current;
+    speed_control_t speed;
+    field_weakening_t field_weakening;
+
+    pm_dq_t i_ref;
+    pm_angle_t theta_open; /* open loop: angle of the current vector */
+    pm_q_t omega_open;
+    pm_q_t i_open;
+
+    /* references in per-unit, made from the command once */
+    pm_q_t omega_target;
+    pm_q_t torque_target;
+    pm_q_t i_target;
+
+    uint16_t state_ms; /* since the state or stage was entered */
+    uint16_t stall_ms, lost_ms, sum_ms, still_ms;
+    int32_t temperature_dC;
+};
+
+#endif

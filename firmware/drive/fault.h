@@ -1,0 +1,27 @@
+/* Fault codes and the record of the first one. A fault is latched; the bridge is off before it is recorded. */
+#ifndef DRIVE_FAULT_H
+#define DRIVE_FAULT_H
+
+#include "firmware/math/frames.h"
+
+typedef enum {
+    DRIVE_FAULT_NONE,
+#define PM_FAULT(name, text) DRIVE_FAULT_##name,
+#include "firmware/drive/fault.def"
+#undef PM_FAULT
+    DRIVE_FAULT_COUNT
+} drive_fault_t;
+
+typedef struct {
+    drive_fault_t fault;
+    pm_abc_t i;       /* per-unit, as measured */
+    pm_q_t v_dc;      /* per-unit */
+    pm_q_t omega;     /* per-unit, estimated, electrical */
+    pm_angle_t theta; /* estimated */
+    int32_t temperature_dC;
+    uint32_t period;  /* control periods since drive_init */
+} drive_fault_record_t;
+
+const char *drive_fault_text(drive_fault_t fault);
+
+#endif

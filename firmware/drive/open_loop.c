@@ -1,0 +1,85 @@
+#include "firmware/drive/drive_parts.h"
+
+#include "firmware/math/root.h"
+#include "firmware/math/trig.h"
+
+/* Agreement of observer and imposed speed before the hand-over, and for how long. */
+#define AGREE_MS 20
+
+void open_loop_start(drive_t *drive)
+{
+    drive->stage = STAGE_OPEN_LOOP;
+    drive->state_ms = 0;
+    drive->still_ms = 0;
+    drive->theta_open = 0;
+    drive->omega_open = 0;
+    drive->i_open = 0;
+    position_reset(&drive->position, &drive->config.position, 0, drive->i_ab);
+    current_control_reset(&drive->current, (pm_dq_t){0, 0});
+}
+
+/* The vector keeps its place: the imposed angle starts at the angle of the present current. */
+void open_loop_resume(drive_t *drive)
+{
+    const pm_dq_t i = drive->status.i;
+    const pm_angle_t turn = pm_atan2(i.q, i.d);
+    const pm_dq_t u = pm_park((pm_ab_t){.alpha = drive->u.d, .beta = drive->u.q}, pm_dir(turn));
+    drive->theta_open = drive->position.pll.theta + turn;
+    drive->omega_open = drive->position.pll.omega;
+    drive->i_open = pm_hypot(i.d, i.q);
+    current_control_reset(&drive->current, u);
+    drive->still_ms = 0;
+    drive->stage = STAGE_OPEN_LOOP;
+}
+
+static void hand_over(drive_t *drive)
+{
+    const pm_angle_t turn = drive->theta_open - drive->position.pll.theta;
+    const pm_dir_t dir = pm_dir(turn);
+    const pm_ab_t i = pm_park_inverse((pm_dq_t){.d = drive->i_open, .q = 0}, dir);
+    const pm_ab_t u = pm_park_inverse(drive->u, dir);
+    current_control_reset(&drive->current, (pm_dq_t){.d = u.alpha, .q = u.beta});
+    reference_reset(drive, i.beta);
+    drive->i_ref.d = i.alpha;
+    drive->stage = STAGE_VECTOR;
+}
+
+static pm_q_t approach(pm_q_t x, pm_q_t target, pm_q_t step)
+{
+    return x + pm_clamp(target - x, -step, step);
+}
+
+static pm_q_t wanted_speed(const drive_t *drive)
+{
+    if (drive->state == DRIVE_STOPPING) {
+        return 0;
+    }
+    if (drive->command.mode == DRIVE_MODE_TORQUE) {
+        const pm_q_t fast = drive->config.position.omega_high + drive->config.position.omega_high / 4;
+        return drive->torque_target < 0 ? -fast : fast;
+    }
+    return pm_clamp(drive->omega_target, -drive->config.omega_max, drive->config.omega_max);
+}
+
+void open_loop_slow(drive_t *drive)
+{
+    const drive_config_t *c = &drive->config;
+    const bool current_mode = drive->command.mode == DRIVE_MODE_CURRENT;
+    const pm_q_t i_wanted = current_mode ? pm_min(pm_abs(drive->i_target), c->i_max) : c->open_loop.i;
+    drive->i_open = approach(drive->i_open, i_wanted, c->open_loop.i_slope);
+    drive->i_ref = (pm_dq_t){.d = drive->i_open, .q = 0};
+    if (drive->state_ms < c->open_loop.align_ms) {
+        return;
+    }
+    const pm_q_t target = wanted_speed(drive);
+    drive->omega_open = approach(drive->omega_open, target, c->open_loop.slope);
+
+    const pm_q_t omega = drive->omega_open;
+    const bool agree = pm_abs(omega) >= c->position.omega_high &&
+                       pm_abs(drive->position.pll.omega - omega) < pm_abs(omega) / 4 &&
+                       drive->position.quality > PM_Q(0.5);
+    drive->still_ms = agree ? (uint16_t)(drive->still_ms + 1U) : 0U;
+    if (!current_mode && drive->still_ms > AGREE_MS) {
+        hand_over(drive);
+    }
+}

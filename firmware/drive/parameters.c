@@ -1,0 +1,31 @@
+#include "firmware/drive/parameters.h"
+
+#include <string.h>
+
+const drive_param_info_t drive_param_table[DRIVE_PARAM_COUNT] = {
+#define PM_PARAM(name, unit, exp10, min, def, max, help) {#name, unit, exp10, min, def, max, help},
+#include "firmware/drive/parameters.def"
+#undef PM_PARAM
+};
+
+void drive_params_default(drive_params_t *params)
+{
+    for (int32_t id = 0; id < (int32_t)DRIVE_PARAM_COUNT; id++) {
+        drive_param_set(params, (drive_param_id_t)id, drive_param_table[id].def);
+    }
+}
+
+/* Every member is an int32_t, so the struct has the layout of an array of them. */
+_Static_assert(sizeof(drive_params_t) == DRIVE_PARAM_COUNT * sizeof(int32_t), "a parameter is not 32 bits");
+
+int32_t drive_param_get(const drive_params_t *params, drive_param_id_t id)
+{
+    int32_t value;
+    memcpy(&value, (const uint8_t *)params + (uint32_t)id * sizeof value, sizeof value);
+    return value;
+}
+
+void drive_param_set(drive_params_t *params, drive_param_id_t id, int32_t value)
+{
+    memcpy((uint8_t *)params + (uint32_t)id * sizeof value, &value, sizeof value);
+}

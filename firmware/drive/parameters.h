@@ -1,0 +1,38 @@
+/* Parameters of the drive in SI decimals: one table, from which the per-unit configuration is made (config.h).
+ *
+ * drive_params_t holds one int32 per parameter; drive_param_table describes them in the same order. A value
+ * outside its range, or a combination that cannot be, is refused by drive_configure(), which names it.
+ * Tests: tests/unit/drive/parameters_test.cpp. */
+#ifndef DRIVE_PARAMETERS_H
+#define DRIVE_PARAMETERS_H
+
+#include <stdint.h>
+
+typedef struct {
+#define PM_PARAM(name, unit, exp10, min, def, max, help) int32_t name;
+#include "firmware/drive/parameters.def"
+#undef PM_PARAM
+} drive_params_t;
+
+typedef enum {
+#define PM_PARAM(name, unit, exp10, min, def, max, help) DRIVE_PARAM_##name,
+#include "firmware/drive/parameters.def"
+#undef PM_PARAM
+    DRIVE_PARAM_COUNT
+} drive_param_id_t;
+
+typedef struct {
+    const char *name;
+    const char *unit;
+    int32_t exp10;
+    int32_t min, def, max;
+    const char *help;
+} drive_param_info_t;
+
+extern const drive_param_info_t drive_param_table[DRIVE_PARAM_COUNT];
+
+void drive_params_default(drive_params_t *params);
+int32_t drive_param_get(const drive_params_t *params, drive_param_id_t id);
+void drive_param_set(drive_params_t *params, drive_param_id_t id, int32_t value); /* range is checked later */
+
+#endif

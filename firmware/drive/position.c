@@ -1,0 +1,94 @@
+#include "firmware/drive/position.h"
+
+#include "firmware/math/filter.h"
+#include "firmware/math/trig.h"
+
+/* Means of eps and misfit at 1 kHz: 10 ms. */
+#define K_MEAN PM_FRAC(0.1)
+/* The position counts as lost when the mean error signal reaches 0.5 rad or the model is off by 0.6. */
+#define EPS_LOST    PM_Q(0.5)
+#define MISFIT_LOST PM_Q(0.6)
+
+void position_reset(position_t *self, const position_config_t *config, pm_angle_t theta, pm_ab_t i)
+{
+    *self = (position_t){.pll.theta = theta,
+                         .weight = config->injection ? 0 : PM_ONE,
+                         .inject = config->injection,
+                         .gains = config->injection ? config->pll_low : config->pll_high,
+                         .quality = PM_ONE};
+    const pm_dir_t dir = pm_dir(theta);
+    const obs_in_t in = {.i = i, .dir = dir, .i_dq = pm_park(i, dir)};
+    active_flux_reset(&self->flux, &config->flux, &in);
+    pulsating_square_reset(&self->square, i);
+}
+
+void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i, pm_dir_t *dir, pm_dq_t *i_dq)
+{
+    pm_pll_predict(&self->pll, &self->gains);
+    *dir = pm_dir(self->pll.theta);
+    const pm_ab_t fundamental = self->inject ? pulsating_square_fundamental(&self->square, i) : i;
+    *i_dq = pm_park(fundamental, *dir);
+
+    const obs_in_t in = {.v = v, .i = i, .dir = *dir, .omega = self->pll.omega, .i_dq = *i_dq};
+    active_flux_step(&self->flux, &config->flux, &in, &self->flux_out);
+    pm_q_t eps = self->flux_out.eps;
+    if (self->inject) {
+        pulsating_square_demodulate(&self->square, &config->square, &in, &self->square_out);
+        eps = self->square_out.eps + pm_mul(self->weight, eps - self->square_out.eps);
+    }
+    pm_pll_correct(&self->pll, &self->gains, eps);
+}
+
+void position_follow(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i, pm_angle_t theta,
+                     pm_q_t omega)
+{
+    self->pll.theta = theta;
+    self->pll.omega = omega;
+    self->flux.k_seed = config->flux.k_seed;
+    const pm_dir_t dir = pm_dir(theta);
+    const obs_in_t in = {.v = v, .i = i, .dir = dir, .omega = omega, .i_dq = pm_park(i, dir)};
+    active_flux_step(&self->flux, &config->flux, &in, &self->flux_out);
+}
+
+static void set_weight(position_t *self, const position_config_t *config)
+{
+    const pm_q_t speed = pm_abs(self->pll.omega);
+    if (!config->injection) {
+        self->weight = PM_ONE;
+        return;
+    }
+    self->weight = pm_max(0, pm_small_gain(pm_small(speed - config->omega_low), config->per_span));
+    if (speed > config->omega_high) {
+        self->weight = PM_ONE;
+    }
+    if (!self->inject && speed < config->omega_high) {
+        self->inject = true;
+        pulsating_square_reset(&self->square, self->flux.i);
+    } else if (self->inject && speed > config->omega_high + config->omega_high / 8) {
+        self->inject = false;
+    }
+}
+
+static pm_frac_t between(pm_frac_t low, pm_frac_t high, pm_q_t weight)
+{
+    return low + pm_mul(high - low, weight);
+}
+
+static void set_quality(position_t *self)
+{
+    const pm_q_t misfit = self->weight == PM_ONE ? self->flux_out.misfit : self->square_out.misfit;
+    const pm_q_t eps = self->weight == PM_ONE ? self->flux_out.eps : self->square_out.eps;
+    (void)pm_lp1(&self->eps_mean, eps, K_MEAN);
+    (void)pm_lp1(&self->misfit_mean, misfit, K_MEAN);
+    const pm_q_t worst = pm_max(pm_mul(pm_abs(self->eps_mean), PM_Q(1.0 / 0.5)), pm_mul(pm_abs(self->misfit_mean), PM_Q(1.0 / 0.6)));
+    self->quality = pm_max(0, PM_ONE - worst);
+}
+
+void position_slow(position_t *self, const position_config_t *config, pm_dq_t i)
+{
+    set_weight(self, config);
+    self->gains.kp = between(config->pll_low.kp, config->pll_high.kp, self->weight);
+    self->gains.ki = between(config->pll_low.ki, config->pll_high.ki, self->weight);
+    active_flux_slow(&self->flux, &config->flux, i, self->weight);
+    set_quality(self);
+}

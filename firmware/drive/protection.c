@@ -1,0 +1,107 @@
+#include "firmware/drive/drive_parts.h"
+
+#include "firmware/math/root.h"
+
+void drive_trip(drive_t *drive, drive_fault_t fault)
+{
+    if (drive->fault != DRIVE_FAULT_NONE) {
+        return;
+    }
+    drive->fault = fault;
+    drive->record = (drive_fault_record_t){
+        .fault = fault,
+        .i = drive->i_abc,
+        .v_dc = drive->status.v_dc,
+        .omega = drive->position.pll.omega,
+        .theta = drive->position.pll.theta,
+        .temperature_dC = drive->temperature_dC,
+        .period = drive->period,
+    };
+}
+
+void protection_step(drive_t *drive, const drive_in_t *in)
+{
+    const protection_config_t *c = &drive->config.protection;
+    const pm_abc_t i = drive->i_abc;
+    if (in->hw_fault) {
+        drive_trip(drive, DRIVE_FAULT_HARDWARE);
+    }
+    if (drive->stage <= STAGE_CALIBRATE) {
+        return; /* the offsets are not known yet and nothing is driven */
+    }
+    if (pm_abs(i.a) > c->i_trip || pm_abs(i.b) > c->i_trip || pm_abs(i.c) > c->i_trip) {
+        drive_trip(drive, DRIVE_FAULT_OVER_CURRENT);
+    }
+    if (drive->status.v_dc > c->v_dc_max) {
+        drive_trip(drive, DRIVE_FAULT_OVER_VOLTAGE);
+    }
+    if (drive->status.v_dc < c->v_dc_min) {
+        drive_trip(drive, DRIVE_FAULT_UNDER_VOLTAGE);
+    }
+}
+
+/* Counts while a condition holds; true when it has held for longer than `limit` ms. */
+static bool lasts(uint16_t *timer, bool condition, uint16_t limit)
+{
+    *timer = condition ? (uint16_t)(*timer + (*timer < UINT16_MAX ? 1U : 0U)) : 0U;
+    return *timer > limit;
+}
+
+void protection_slow(drive_t *drive)
+{
+    const protection_config_t *c = &drive->config.protection;
+    const bool turning = drive->stage == STAGE_VECTOR;
+    if (drive->temperature_dC >= c->temp_trip_dC) {
+        drive_trip(drive, DRIVE_FAULT_OVER_TEMPERATURE);
+    }
+    if (drive->stage <= STAGE_CALIBRATE) {
+        return;
+    }
+    const pm_q_t sum = drive->i_abc.a + drive->i_abc.b + drive->i_abc.c;
+    if (lasts(&drive->sum_ms, pm_abs(sum) > c->i_sum, 2)) {
+        drive_trip(drive, DRIVE_FAULT_SENSOR_SUM);
+    }
+    const pm_q_t omega = drive->position.pll.omega;
+    if (turning && pm_abs(omega) > PM_ONE) {
+        drive_trip(drive, DRIVE_FAULT_OVER_SPEED);
+    }
+    if (lasts(&drive->lost_ms, turning && drive->position.quality == 0, c->lost_ms)) {
+        drive_trip(drive, DRIVE_FAULT_POSITION_LOST);
+    }
+    const bool stalled = turning && drive->state == DRIVE_RUNNING && drive->command.mode == DRIVE_MODE_SPEED &&
+                         (drive->status.limits & DRIVE_LIMIT_CURRENT) != 0U && pm_abs(omega) < c->omega_stall &&
+                         pm_abs(drive->speed.reference) > c->omega_stall;
+    if (lasts(&drive->stall_ms, stalled, c->stall_ms)) {
+        drive_trip(drive, DRIVE_FAULT_STALL);
+    }
+}
+
+/* 1 below `from`, 0 above `to`. */
+static pm_unit_t derate(int32_t x, int32_t from, int32_t to)
+{
+    if (x <= from) {
+        return PM_UNIT_MAX;
+    }
+    return x >= to ? 0 : pm_ratio(to - x, to - from);
+}
+
+void protection_current_limits(drive_t *drive, pm_q_t *i_min, pm_q_t *i_max)
+{
+    const protection_config_t *c = &drive->config.protection;
+    const pm_unit_t by_temperature = derate(drive->temperature_dC, c->temp_derate_dC, c->temp_trip_dC);
+    const pm_unit_t by_voltage = derate(drive->status.v_dc, c->v_dc_derate, c->v_dc_max);
+    const pm_q_t i = pm_unit(drive->config.i_max, by_temperature);
+    if (by_temperature < PM_UNIT_MAX) {
+        drive->status.limits |= DRIVE_LIMIT_TEMPERATURE;
+    }
+    *i_max = i;
+    *i_min = -i;
+    if (by_voltage < PM_UNIT_MAX) {
+        drive->status.limits |= DRIVE_LIMIT_DC_VOLTAGE;
+        if (drive->position.pll.omega > 0) {
+            *i_min = -pm_unit(i, by_voltage);
+        } else {
+            *i_max = pm_unit(i, by_voltage);
+        }
+    }
+}

@@ -1,0 +1,74 @@
+#include "firmware/drive/drive_parts.h"
+
+#include "firmware/math/root.h"
+
+/* A value in 10^exponent SI as a signal; what does not fit saturates, and the limits below clamp it with a flag. */
+static pm_q_t to_signal(int32_t value, int exponent10, pm_num_t base)
+{
+    int32_t x;
+    (void)pm_num_to_fixed(pm_num_div(pm_num_dec(value, exponent10), base), PM_Q_BITS, &x);
+    return pm_clamp(x, -PM_Q(4.0), PM_Q(4.0));
+}
+
+void reference_take(drive_t *drive)
+{
+    const drive_base_t *base = &drive->config.base;
+    const drive_command_t *command = &drive->command;
+    const pm_num_t mechanical = pm_num_div(base->omega, drive->config.pole_pairs);
+    drive->omega_target = to_signal(command->speed_mrad_s, -3, mechanical);
+    drive->torque_target = to_signal(command->torque_uNm, -6, base->torque);
+    drive->i_target = to_signal(command->current_mA, -3, base->i);
+}
+
+void reference_reset(drive_t *drive, pm_q_t i_q)
+{
+    speed_control_reset(&drive->speed, drive->position.pll.omega, i_q);
+    drive->field_weakening.i_d = 0;
+    drive->i_ref = (pm_dq_t){.d = 0, .q = i_q};
+}
+
+/* T = psi_a i_q in per-unit, psi_a = psi_m + (L_d - L_q) i_d with the present reference. */
+static pm_q_t current_for(const drive_t *drive, pm_q_t torque)
+{
+    const pm_q_t psi = pm_max(drive->config.psi_m + pm_mul(drive->config.dL, drive->i_ref.d), drive->config.psi_m / 4);
+    const pm_q_t i = pm_div(pm_abs(torque), psi);
+    return torque < 0 ? -i : i;
+}
+
+static pm_q_t flux_current(drive_t *drive, pm_q_t i_q)
+{
+    const drive_config_t *c = &drive->config;
+    const pm_q_t v_top = pm_unit(drive->status.v_dc, c->v_linear);
+    const pm_q_t weak = field_weakening_step(&drive->field_weakening, &c->field_weakening,
+                                             pm_hypot(drive->u.d, drive->u.q), v_top - v_top / 20);
+    return pm_max(mtpa_i_d(&c->mtpa, i_q) + weak, -c->i_max);
+}
+
+void reference_vector(drive_t *drive)
+{
+    const drive_config_t *c = &drive->config;
+    const bool stopping = drive->state == DRIVE_STOPPING;
+    pm_q_t i_min;
+    pm_q_t i_max;
+    protection_current_limits(drive, &i_min, &i_max);
+    const pm_q_t share = pm_mul(drive->i_ref.d, drive->i_ref.d);
+    const pm_q_t room = pm_sqrt(pm_mul(c->i_max, c->i_max) - share);
+    i_min = pm_max(i_min, -room);
+    i_max = pm_min(i_max, room);
+
+    bool limited = false;
+    pm_q_t i_q;
+    if (drive->command.mode == DRIVE_MODE_TORQUE && !stopping) {
+        const pm_q_t wanted = current_for(drive, drive->torque_target);
+        i_q = pm_clamp(wanted, i_min, i_max);
+        limited = i_q != wanted;
+        speed_control_reset(&drive->speed, drive->position.pll.omega, i_q);
+    } else {
+        const pm_q_t wanted = stopping ? 0 : drive->omega_target;
+        const pm_q_t target = pm_clamp(wanted, -c->omega_max, c->omega_max);
+        drive->status.limits |= target != wanted ? DRIVE_LIMIT_SPEED : 0U;
+        i_q = speed_control_step(&drive->speed, &c->speed, target, drive->position.pll.omega, i_min, i_max, &limited);
+    }
+    drive->status.limits |= limited ? DRIVE_LIMIT_CURRENT : 0U;
+    drive->i_ref = (pm_dq_t){.d = flux_current(drive, i_q), .q = i_q};
+}

@@ -1,0 +1,25 @@
+/* What every position source takes and gives: fundamental-model observers and injection alike.
+ *
+ * A source compares the measurement with the present position and says how far that position lags the rotor;
+ * drive/position.c closes the loop. So a source has no angle of its own that could disagree.
+ * All values belong to the sample instant k. */
+#ifndef PM_MATH_ESTIMATE_H
+#define PM_MATH_ESTIMATE_H
+
+#include "firmware/math/frames.h"
+
+typedef struct {
+    pm_ab_t v;    /* mean voltage over [k-1, k), per-unit: what the bridge applied, dead time compensated */
+    pm_ab_t i;    /* current at k */
+    pm_dir_t dir; /* direction of the present position theta(k) */
+    pm_q_t omega; /* present electrical speed */
+    pm_dq_t i_dq; /* fundamental current at k in the present frame */
+} obs_in_t;
+
+typedef struct {
+    pm_q_t eps;     /* theta_rotor - theta, rad in Q28, exact for small errors, limited to +-1 */
+    pm_q_t misfit;  /* disagreement of model and measurement, relative; 0 = perfect, see each source */
+    pm_dq_t vector; /* the vector that carries the position, in the present frame: flux, EMF or HF current */
+} obs_out_t;
+
+#endif

@@ -1,0 +1,203 @@
+/* Fixed-point numbers of the control path.
+ *
+ * Signals are per-unit in Q28: 32 bits, range -8 ... +8 of the base, resolution 2^-28. Products keep the
+ * upper 32 bits of the 64-bit product, rounded to nearest, which is one instruction on Cortex-M4 and has no
+ * bias (docs/decisions/001-signal-format.md). Angles are unsigned turns of 2^32, so they wrap by themselves.
+ *
+ * Which constant goes with which product (x is a signal in Q28; error is that of one product):
+ *   pm_mul(x, y)    y in Q28, +-8      signal x signal, result Q28; error <= 2^-25
+ *   pm_frac(x, k)   k in Q32, +-0.5    filter and integration constants, result Q28; error <= 2^-29
+ *   pm_unit(x, u)   u in Q31, +-1      sines, directions, ratios, result Q28; error <= 2^-28
+ *   pm_gain(x, g)   g in Q26, +-32     controller gains, result *wide*: Q22, +-512; error <= 2^-23
+ * frac, unit and gain cannot overflow (pm_unit alone at -8 x -1). pm_mul wraps when the product leaves +-8;
+ * where it may, use pm_mul_sat, one instruction more. *_add adds the product to a sum at no cost and wraps
+ * with it. Nothing here is undefined behaviour for any input, except where a comment gives a range.
+ *
+ * All shifts of the firmware stand in firmware/math. Tests: tests/unit/math/fixed_test.cpp. */
+#ifndef PM_MATH_FIXED_H
+#define PM_MATH_FIXED_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "firmware/math/mulh.h"
+
+typedef int32_t pm_q_t;      /* signal, Q28 per-unit */
+typedef int32_t pm_wide_t;   /* controller sum, Q22 per-unit */
+typedef int32_t pm_frac_t;   /* constant, Q32, -0.5 ... 0.5 */
+typedef int32_t pm_unit_t;   /* -1 ... 1, Q31 */
+typedef int32_t pm_gain_t;   /* constant, Q26, -32 ... 32 */
+typedef uint32_t pm_angle_t; /* 2^32 per turn, electrical unless said otherwise */
+
+#define PM_Q_BITS    28
+#define PM_ONE       ((pm_q_t)1 << PM_Q_BITS)
+#define PM_Q_MAX     INT32_MAX
+#define PM_UNIT_MAX  INT32_MAX
+#define PM_WIDE_BITS 22
+
+/* Literals in firmware sources: folded by the compiler, never computed on the target. */
+#define PM_SCALED(x, one) ((int32_t)((x) * (one) + ((x) < 0 ? -0.5 : 0.5)))
+#define PM_Q(x)           PM_SCALED(x, 268435456.0)
+#define PM_WIDE(x)        PM_SCALED(x, 4194304.0)
+#define PM_GAIN(x)        PM_SCALED(x, 67108864.0)
+#define PM_UNIT(x)        PM_SCALED(x, 2147483647.0)       /* so that 1 fits */
+#define PM_FRAC(x)        PM_SCALED(x, 4294967296.0)       /* -0.5 <= x < 0.5 */
+#define PM_TURN(x)        ((pm_angle_t)((x)*4294967296.0)) /* 0 <= x < 1 */
+
+/* Left shift of a signed value; bits that do not fit are lost. Mostly free, in the next instruction's
+ * operand. */
+static inline int32_t pm_shl(int32_t x, unsigned n)
+{
+    return (int32_t)((uint32_t)x << n);
+}
+
+static inline int32_t pm_min(int32_t a, int32_t b)
+{
+    return a < b ? a : b;
+}
+
+static inline int32_t pm_max(int32_t a, int32_t b)
+{
+    return a > b ? a : b;
+}
+
+static inline int32_t pm_clamp(int32_t x, int32_t lo, int32_t hi) /* lo <= hi */
+{
+    return pm_max(pm_min(x, hi), lo);
+}
+
+/* Within -2^n ... 2^n - 1, n <= 31; a single SSAT on Cortex-M4 when n is a literal. */
+static inline int32_t pm_sat(int32_t x, unsigned n)
+{
+    const int32_t top = (int32_t)((1U << n) - 1U);
+    return pm_clamp(x, -top - 1, top);
+}
+
+static inline int32_t pm_abs(int32_t x) /* INT32_MIN -> INT32_MAX */
+{
+    return x >= 0 ? x : (x == INT32_MIN ? INT32_MAX : -x);
+}
+
+#if defined(__ARM_FEATURE_DSP) && __ARM_FEATURE_DSP && defined(__thumb2__)
+
+static inline int32_t pm_add_sat(int32_t a, int32_t b)
+{
+    int32_t r;
+    __asm__("qadd %0, %1, %2" : "=r"(r) : "r"(a), "r"(b));
+    return r;
+}
+
+static inline int32_t pm_sub_sat(int32_t a, int32_t b)
+{
+    int32_t r;
+    __asm__("qsub %0, %1, %2" : "=r"(r) : "r"(a), "r"(b));
+    return r;
+}
+
+#else
+
+static inline int32_t pm_narrow64(int64_t x)
+{
+    return x > INT32_MAX ? INT32_MAX : (x < INT32_MIN ? INT32_MIN : (int32_t)x);
+}
+
+static inline int32_t pm_add_sat(int32_t a, int32_t b)
+{
+    return pm_narrow64((int64_t)a + b);
+}
+
+static inline int32_t pm_sub_sat(int32_t a, int32_t b)
+{
+    return pm_narrow64((int64_t)a - b);
+}
+
+#endif
+
+static inline pm_q_t pm_mul(pm_q_t x, pm_q_t y)
+{
+    return pm_shl(pm_mulh(x, y), 32 - PM_Q_BITS);
+}
+
+/* A product beyond +-8 gives the nearest end. */
+static inline pm_q_t pm_mul_sat(pm_q_t x, pm_q_t y)
+{
+    return pm_shl(pm_sat(pm_mulh(x, y), PM_Q_BITS - 1), 32 - PM_Q_BITS);
+}
+
+static inline pm_q_t pm_frac(pm_q_t x, pm_frac_t k)
+{
+    return pm_mulh(x, k);
+}
+
+static inline pm_q_t pm_frac_add(pm_q_t sum, pm_q_t x, pm_frac_t k)
+{
+    return pm_mulh_add(sum, x, k);
+}
+
+static inline pm_q_t pm_unit(pm_q_t x, pm_unit_t u)
+{
+    return pm_shl(pm_mulh(x, u), 1);
+}
+
+static inline pm_wide_t pm_gain(pm_q_t x, pm_gain_t g)
+{
+    return pm_mulh(x, g);
+}
+
+static inline pm_wide_t pm_gain_add(pm_wide_t sum, pm_q_t x, pm_gain_t g)
+{
+    return pm_mulh_add(sum, x, g);
+}
+
+static inline pm_wide_t pm_widen(pm_q_t x) /* rounds down: free in the operand of the next addition */
+{
+    return x >> (PM_Q_BITS - PM_WIDE_BITS);
+}
+
+/* A wide value that is known to lie within +-8; beyond, it wraps. */
+static inline pm_q_t pm_narrow(pm_wide_t x)
+{
+    return pm_shl(x, PM_Q_BITS - PM_WIDE_BITS);
+}
+
+static inline pm_q_t pm_narrow_sat(pm_wide_t x)
+{
+    return pm_narrow(pm_sat(x, 31 - (PM_Q_BITS - PM_WIDE_BITS)));
+}
+
+/* A small signal: Q32, +-0.5, saturating; for carrier currents, whose gains exceed pm_gain(). */
+static inline int32_t pm_small(pm_q_t x)
+{
+    return pm_shl(pm_sat(x, 27), 4);
+}
+
+/* small x g, g in Q20 (+-2048), limited to +-1, as a signal. */
+static inline pm_q_t pm_small_gain(int32_t small, int32_t g)
+{
+    return pm_shl(pm_sat(pm_mulh(small, g), 20), PM_Q_BITS - 20);
+}
+
+/* x g limited to +-1, as a signal. */
+static inline pm_q_t pm_gain_unit(pm_q_t x, pm_gain_t g)
+{
+    return pm_narrow(pm_sat(pm_mulh(x, g), PM_WIDE_BITS));
+}
+
+/* a - b as the shorter way round, in turns of 2^32. */
+static inline int32_t pm_angle_diff(pm_angle_t a, pm_angle_t b)
+{
+    return (int32_t)(a - b);
+}
+
+/* Angle in radians, Q28 (-pi ... pi), of a signed angle, and back; error <= 2^-28 rad each. */
+static inline pm_q_t pm_angle_to_rad(int32_t turns)
+{
+    return pm_mulh(turns, 1686629713); /* 2 pi / 16 in Q32 */
+}
+
+static inline int32_t pm_rad_to_angle(pm_q_t rad) /* |rad| > pi wraps, as an angle does */
+{
+    return pm_shl(pm_mulh(rad, 1367130551), 3); /* 16 / (2 pi) / 8 in Q32 */
+}
+
+#endif

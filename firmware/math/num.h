@@ -1,0 +1,44 @@
+/* Numbers with a binary exponent, for making per-unit configuration from SI parameters without floating
+ * point.
+ *
+ * value = m 2^e with |m| in [2^30, 2^31), or m = e = 0. Results are rounded to nearest: relative error of
+ * an operation <= 2^-30, with |e| <= 2^20 (far beyond any quantity of a drive; not checked). Not for the
+ * control path: an operation costs some tens of instructions, division and root some hundreds. Conversions
+ * report a result that does not fit instead of only clamping it. Tests: tests/unit/math/num_test.cpp. */
+#ifndef PM_MATH_NUM_H
+#define PM_MATH_NUM_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct {
+    int32_t m;
+    int32_t e;
+} pm_num_t;
+
+pm_num_t pm_num(int32_t value);                     /* an integer */
+pm_num_t pm_num_dec(int32_t value, int exponent10); /* value x 10^exponent10, -12 <= exponent10 <= 12 */
+pm_num_t pm_num_ratio(int32_t num, int32_t den);    /* den == 0 gives 0 */
+pm_num_t pm_num_add(pm_num_t a, pm_num_t b);
+pm_num_t pm_num_sub(pm_num_t a, pm_num_t b);
+pm_num_t pm_num_mul(pm_num_t a, pm_num_t b);
+pm_num_t pm_num_div(pm_num_t a, pm_num_t b); /* b == 0 gives 0: check first */
+pm_num_t pm_num_sqrt(pm_num_t a);            /* a <= 0 gives 0 */
+pm_num_t pm_num_neg(pm_num_t a);
+int pm_num_cmp(pm_num_t a, pm_num_t b); /* -1, 0, 1 */
+
+/* value x 2^frac_bits rounded to nearest into *out; false (and *out saturated) when it does not fit. */
+bool pm_num_to_fixed(pm_num_t a, int frac_bits, int32_t *out);
+pm_num_t pm_num_from_fixed(int32_t x, int frac_bits);
+
+#ifdef __cplusplus
+}
+#endif
+
+#define PM_NUM_TWO_PI ((pm_num_t){.m = 1686629713, .e = -28})
+
+#endif

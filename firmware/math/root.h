@@ -1,0 +1,36 @@
+/* Square root, length and quotient of signals.
+ *
+ * pm_sqrt(x): x in Q28, result Q28, error <= 2^-26; x <= 0 gives 0.
+ * pm_hypot(x, y): length of (x, y) in the format of its arguments, error <= 1e-8 relative + 1 LSB; saturates.
+ * pm_div(num, x): num / x in Q28, error <= 1e-8 relative + 1 LSB; saturates. x <= 0 is taken as the smallest
+ *   positive x, so the result is the end of the range on num's side; 0 / x = 0. One 32-bit division.
+ * pm_ratio(num, den): num / den in Q31 for 0 <= num <= den, den > 0; error <= 2^-15 relative. One 32-bit division.
+ * pm_counts_per_unit(counts, v): 16 counts / v, so that pm_mulh(x, .) gives counts for a voltage x; counts < 2^15,
+ *   v >= 1/16; error <= 2^-15 relative. One 32-bit division.
+ * Function calls without loops or tables; cost in docs/decisions/001-signal-format.md.
+ * Tests: tests/unit/math/root_test.cpp. */
+#ifndef PM_MATH_ROOT_H
+#define PM_MATH_ROOT_H
+
+#include "firmware/math/fixed.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+pm_q_t pm_sqrt(pm_q_t x);
+pm_q_t pm_hypot(pm_q_t x, pm_q_t y);
+pm_q_t pm_div(pm_q_t num, pm_q_t x);
+pm_unit_t pm_ratio(pm_q_t num, pm_q_t den);
+
+#ifdef __cplusplus
+}
+#endif
+
+static inline int32_t pm_counts_per_unit(int32_t counts, pm_q_t v)
+{
+    const uint32_t recip = UINT32_MAX / ((uint32_t)v >> 12); /* 2^16 / v */
+    return (int32_t)(((uint64_t)recip * (uint32_t)counts) >> 12);
+}
+
+#endif

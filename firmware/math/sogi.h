@@ -1,0 +1,34 @@
+/* Second-order generalised integrator: a signal and its quadrature at an adjustable frequency w.
+ *
+ *   y' = w (k (x - y) - q), q' = w y: at w the output y equals x and q lags it by 90 degrees.
+ * Discrete form: (y, q) turned by w T_s, half of the correction K (x - y), K = k w T_s, added before and half
+ * after the turn. So the resonance is exactly at w T_s, with gain 1 and phase 0, and a dc part of x does not
+ * reach y (it reaches q with gain k), at every frequency below half the sampling rate. The transfer function
+ * is y / x = c (z - 1) / (z^2 - (2 cos wT - c) z + 1 - c), c = K (1 + cos wT) / 2; settling time 4 T_s / c.
+ * y and q belong to the instant of the x of the same step; that x acts from the next step on.
+ * Errors at resonance: amplitude <= 2e-6 / K, phase <= 2e-6 / K rad, both from the direction of w T_s.
+ * |x - y| < 8 is the caller's duty; 0 < K < 0.5 keeps it stable. A zeroed state is the reset.
+ * Cost: docs/decisions/001-signal-format.md. Tests: tests/unit/math/sogi_test.cpp. */
+#ifndef PM_MATH_SOGI_H
+#define PM_MATH_SOGI_H
+
+#include "firmware/math/frames.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct {
+    pm_q_t y;    /* in phase, Q28 */
+    pm_q_t q;    /* quadrature, lagging, Q28 */
+    pm_q_t half; /* half of the correction to come, Q28 */
+} pm_sogi_t;
+
+/* step: direction of the angle w T_s, pm_dir(); k: K above in Q32. */
+void pm_sogi_step(pm_sogi_t *self, pm_dir_t step, pm_frac_t k, pm_q_t x);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,46 @@
+/* Pulsating square-wave injection in the estimated frame (METHODS.md 4.3.2, row 38) with indirect cross-coupling
+ * compensation (5.2.2.2, row 51).
+ *
+ * The d-axis voltage alternates by +-V_h each PWM period (f_h = f_pwm/2). The change of current over a period, with
+ * the slope of the fundamental removed by a second difference, is h = s (delta_k - delta_k-1)/2 in the present frame:
+ *   h_d = F [L_sa + K cos(2e + th_m)] / D,   h_q = F K sin(2e + th_m) / D,   F = V_h T_s, e = position error
+ *   eps = gain(i_q) (h_q + lambda(i_q) h_d),  lambda = L_dqh / L_qh: zero at e = 0 whatever the load
+ * lambda = i_q (a + b |i_q|), gain = g_0 + g_2 i_q^2 from the commissioned inductances (config.c).
+ *
+ * Order in period k: pulsating_square_demodulate() with the current at k, then pulsating_square_output() for the
+ * voltage over [k+1, k+2). eps is exact for small e and 1/2 sin 2e beyond: stable at 0 and 180 degrees, so the
+ * polarity must be known. misfit: distance of h_d from its expected value, relative.
+ * The fundamental current is the mean of two samples: pulsating_square_fundamental().
+ * Tests: tests/unit/injection/pulsating_square_test.cpp, tests/scenario. */
+#ifndef INJECTION_PULSATING_SQUARE_H
+#define INJECTION_PULSATING_SQUARE_H
+
+#include "firmware/math/estimate.h"
+
+typedef struct {
+    pm_q_t v_h;
+    pm_q_t lambda_1, lambda_2; /* a, b */
+    int32_t gain_0, gain_2;    /* rad per unit of current, and its change with i_q^2, Q20 */
+    pm_q_t h_d;                /* expected h_d without load */
+    int32_t h_d_inverse;       /* Q20 */
+} pulsating_square_config_t;
+
+typedef struct {
+    pm_ab_t i;      /* current at k-1 */
+    pm_dq_t delta;  /* change over the last period */
+    bool positive;  /* sign commanded in the last period */
+    uint8_t warm;   /* periods until two valid differences exist */
+} pulsating_square_t;
+
+void pulsating_square_reset(pulsating_square_t *self, pm_ab_t i);
+void pulsating_square_demodulate(pulsating_square_t *self, const pulsating_square_config_t *config, const obs_in_t *in,
+                                 obs_out_t *out);
+pm_dq_t pulsating_square_output(pulsating_square_t *self, const pulsating_square_config_t *config);
+
+/* Current at k without the carrier; call before pulsating_square_demodulate(). */
+static inline pm_ab_t pulsating_square_fundamental(const pulsating_square_t *self, pm_ab_t i)
+{
+    return (pm_ab_t){.alpha = (i.alpha + self->i.alpha) >> 1, .beta = (i.beta + self->i.beta) >> 1};
+}
+
+#endif

@@ -1,0 +1,72 @@
+#include "observers/active_flux.h"
+
+#include "firmware/math/root.h"
+
+/* psi_ref stays within this share of the amplitude that the parameters give. */
+#define BAND PM_Q(0.25)
+
+static void set_reference(active_flux_t *self, pm_q_t psi)
+{
+    self->psi_ref = psi;
+    self->inverse = pm_div(PM_ONE >> 2, psi); /* Q28 of a quarter is Q26 */
+}
+
+static inline pm_q_t inductance_q(const active_flux_config_t *config, pm_q_t i_q)
+{
+    return config->L_q + pm_mul(config->L_q2, pm_mul(i_q, i_q));
+}
+
+static pm_q_t nominal(const active_flux_config_t *config, pm_q_t i_d)
+{
+    return config->psi_m + pm_mul(config->L_d - config->L_q, i_d);
+}
+
+void active_flux_reset(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in)
+{
+    set_reference(self, nominal(config, in->i_dq.d));
+    const pm_q_t L_q = inductance_q(config, in->i_dq.q);
+    const pm_dq_t psi = {.d = self->psi_ref + pm_mul(L_q, in->i_dq.d), .q = pm_mul(L_q, in->i_dq.q)};
+    self->psi = pm_park_inverse(psi, in->dir);
+    self->psi_d = self->psi_ref;
+    self->i = in->i;
+    self->k_seed = config->k_seed;
+}
+
+void active_flux_step(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in, obs_out_t *out)
+{
+    const pm_ab_t i_mean = {.alpha = (in->i.alpha + self->i.alpha) >> 1, .beta = (in->i.beta + self->i.beta) >> 1};
+    self->psi.alpha += pm_frac(in->v.alpha - pm_mul(config->R, i_mean.alpha), config->t_s);
+    self->psi.beta += pm_frac(in->v.beta - pm_mul(config->R, i_mean.beta), config->t_s);
+    self->i = in->i;
+
+    const pm_dq_t psi = pm_park(self->psi, in->dir);
+    const pm_q_t L_q = inductance_q(config, in->i_dq.q);
+    const pm_dq_t active = {.d = psi.d - pm_mul(L_q, in->i_dq.d),
+                            .q = psi.q - pm_mul(L_q, in->i_dq.q)};
+    const pm_q_t error_d = self->psi_ref - active.d;
+
+    const pm_frac_t k_d = pm_shl(pm_mulh(pm_abs(in->omega), config->g), 32 - PM_Q_BITS) + self->k_seed;
+    const pm_ab_t correction =
+        pm_park_inverse((pm_dq_t){.d = pm_frac(error_d, k_d), .q = -pm_frac(active.q, self->k_seed)}, in->dir);
+    self->psi.alpha += correction.alpha;
+    self->psi.beta += correction.beta;
+    self->psi_d = active.d;
+
+    out->vector = active;
+    out->eps = pm_gain_unit(active.q, self->inverse);
+    out->misfit = pm_gain_unit(error_d, self->inverse);
+}
+
+void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, pm_dq_t i, pm_q_t weight)
+{
+    const pm_q_t centre = nominal(config, i.d);
+    const pm_q_t band = pm_mul(centre, BAND);
+    const pm_q_t share = PM_ONE - weight;
+    pm_q_t target = self->psi_d;
+    if (weight < PM_ONE) {
+        target = centre; /* the amplitude says little while the flux is tied to the position */
+    }
+    set_reference(self, pm_clamp(self->psi_ref + pm_frac(target - self->psi_ref, config->k_adapt), centre - band,
+                                 centre + band));
+    self->k_seed = pm_mul(config->k_seed, pm_mul(share, share));
+}

@@ -1,0 +1,189 @@
+/* Start-up and semihosting system calls for measurement programs on QEMU's mps2-an386 (Cortex-M4).
+ * main(argc, argv) is called with the arguments given to count.py; its result is QEMU's exit status.
+ * printf, fopen and fread work on the host's files through newlib. No interrupts are used. */
+#include <errno.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+#include <sys/stat.h>
+
+enum {
+    SYS_OPEN = 0x01,
+    SYS_CLOSE = 0x02,
+    SYS_WRITE = 0x05,
+    SYS_READ = 0x06,
+    SYS_SEEK = 0x0A,
+    SYS_FLEN = 0x0C,
+    SYS_GET_CMDLINE = 0x15,
+    SYS_EXIT_EXTENDED = 0x20,
+    EXIT_APPLICATION = 0x20026,
+};
+
+extern uint32_t pm_data_load[], pm_data_start[], pm_data_end[], pm_bss_start[], pm_bss_end[], pm_heap_start[],
+    pm_heap_end[], pm_stack_top[];
+
+int main(int argc, char **argv);
+void pm_reset_handler(void);
+void pm_fault_handler(void);
+int _open(const char *path, int flags, int mode);
+int _close(int file);
+int _read(int file, char *data, int size);
+int _write(int file, const char *data, int size);
+int _lseek(int file, int offset, int whence);
+int _fstat(int file, struct stat *status);
+int _isatty(int file);
+int _kill(int process, int signal);
+int _getpid(void);
+void *_sbrk(ptrdiff_t step);
+void _exit(int status) __attribute__((noreturn));
+
+static int semihost(uint32_t operation, const void *arguments)
+{
+    register uint32_t r0 __asm("r0") = operation;
+    register const void *r1 __asm("r1") = arguments;
+    __asm volatile("bkpt 0xab" : "+r"(r0) : "r"(r1) : "memory");
+    return (int)r0;
+}
+
+void _exit(int status)
+{
+    const uint32_t arguments[2] = { EXIT_APPLICATION, (uint32_t)status };
+    (void)semihost(SYS_EXIT_EXTENDED, arguments);
+    for (;;) {
+    }
+}
+
+/* newlib's 0, 1, 2 are the console, which semihosting opens by name: "r" for input, "w" for output. */
+static int host_file(int file)
+{
+    static int console[3] = { -1, -1, -1 };
+    if (file > 2) {
+        return file;
+    }
+    if (console[file] < 0) {
+        const uintptr_t arguments[3] = { (uintptr_t) ":tt", file == 0 ? 0u : file == 1 ? 4u : 8u, 3u };
+        console[file] = semihost(SYS_OPEN, arguments);
+    }
+    return console[file];
+}
+
+int _open(const char *path, int flags, int mode)
+{
+    (void)mode;
+    const uintptr_t arguments[3] = { (uintptr_t)path, (flags & 3) == 0 ? 1u : 5u, strlen(path) };
+    int file = semihost(SYS_OPEN, arguments);
+    if (file < 0) {
+        errno = ENOENT;
+    }
+    return file;
+}
+
+int _close(int file)
+{
+    const uintptr_t arguments[1] = { (uintptr_t)host_file(file) };
+    return semihost(SYS_CLOSE, arguments);
+}
+
+int _read(int file, char *data, int size)
+{
+    const uintptr_t arguments[3] = { (uintptr_t)host_file(file), (uintptr_t)data, (uintptr_t)size };
+    return size - semihost(SYS_READ, arguments);
+}
+
+int _write(int file, const char *data, int size)
+{
+    const uintptr_t arguments[3] = { (uintptr_t)host_file(file), (uintptr_t)data, (uintptr_t)size };
+    return size - semihost(SYS_WRITE, arguments);
+}
+
+int _lseek(int file, int offset, int whence)
+{
+    /* Only absolute positions exist in semihosting; relative ones are not needed by sequential readers. */
+    const uintptr_t arguments[2] = { (uintptr_t)host_file(file), (uintptr_t)offset };
+    if (whence != 0 || semihost(SYS_SEEK, arguments) < 0) {
+        errno = ESPIPE;
+        return -1;
+    }
+    return offset;
+}
+
+int _fstat(int file, struct stat *status)
+{
+    memset(status, 0, sizeof *status);
+    status->st_mode = file <= 2 ? S_IFCHR : S_IFREG;
+    return 0;
+}
+
+int _isatty(int file)
+{
+    return file <= 2;
+}
+
+int _kill(int process, int signal)
+{
+    (void)process;
+    (void)signal;
+    errno = EINVAL;
+    return -1;
+}
+
+int _getpid(void)
+{
+    return 1;
+}
+
+void *_sbrk(ptrdiff_t step)
+{
+    static char *heap = (char *)pm_heap_start;
+    char *old = heap;
+    if (heap + step > (char *)pm_heap_end) {
+        errno = ENOMEM;
+        return (void *)-1;
+    }
+    heap += step;
+    return old;
+}
+
+/* The command line, split at blanks; the first word is the program's path. */
+static int split_command_line(char *line, uint32_t size, char **argv, int most)
+{
+    uintptr_t arguments[2] = { (uintptr_t)line, size };
+    int argc = 0;
+    if (semihost(SYS_GET_CMDLINE, arguments) != 0) {
+        return 0;
+    }
+    for (char *word = strtok(line, " "); word != NULL && argc < most; word = strtok(NULL, " ")) {
+        argv[argc] = word;
+        argc++;
+    }
+    return argc;
+}
+
+void pm_reset_handler(void)
+{
+    static char line[1024];
+    static char *argv[17];
+    memcpy(pm_data_start, pm_data_load, (size_t)((char *)pm_data_end - (char *)pm_data_start));
+    memset(pm_bss_start, 0, (size_t)((char *)pm_bss_end - (char *)pm_bss_start));
+    int argc = split_command_line(line, sizeof line, argv, 16);
+    extern void exit(int) __attribute__((noreturn));
+    exit(main(argc, argv));
+}
+
+/* A fault must end the run with an error, not hang it. */
+void pm_fault_handler(void)
+{
+    static const char text[] = "target: processor fault\n";
+    (void)_write(2, text, sizeof text - 1);
+    _exit(99);
+}
+
+__attribute__((section(".vectors"), used)) static const uintptr_t vectors[16] = {
+    (uintptr_t)pm_stack_top,
+    (uintptr_t)pm_reset_handler,
+    (uintptr_t)pm_fault_handler,
+    (uintptr_t)pm_fault_handler,
+    (uintptr_t)pm_fault_handler,
+    (uintptr_t)pm_fault_handler,
+    (uintptr_t)pm_fault_handler,
+};

@@ -1,0 +1,320 @@
+#include "tools/pmsim/metrics_special.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tools/pmsim/names.h"
+
+namespace pmsim
+{
+namespace
+{
+
+const double nan = std::numeric_limits<double>::quiet_NaN();
+const double to_deg = 57.29577951308232;
+
+// From the start of the window to a fraction of rated speed in the commanded direction.
+class TimeToSpeed : public Metric
+{
+  public:
+    TimeToSpeed(const Expectation &e, const Setup &setup)
+        : t0_s_(e.t0_s), speed_(e.fraction * setup.rated.speed_rated_rad_s)
+    {
+    }
+
+    void add(const Sample &s) override
+    {
+        const bool reached = s.direction * s.rig.truth.omega_mech_rad_s >= speed_;
+        if (std::isnan(time_s_) && s.direction != 0 && reached) {
+            time_s_ = s.rig.truth.t_s - t0_s_;
+        }
+    }
+
+    MetricValue value() const override
+    {
+        return {time_s_, ""};
+    }
+
+  private:
+    double t0_s_, speed_, time_s_ = nan;
+};
+
+// Farthest fall behind the most advanced rotor position, while one direction is commanded.
+class BackwardMovement : public Metric
+{
+  public:
+    BackwardMovement(const Expectation &, const Setup &setup) : pole_pairs_(setup.plant.machine.pole_pairs)
+    {
+    }
+
+    void add(const Sample &s) override
+    {
+        if (s.direction == 0) {
+            return;
+        }
+        const double position = s.direction * s.rig.truth.theta_e_rad * to_deg / pole_pairs_;
+        if (s.direction != direction_) {
+            direction_ = s.direction;
+            farthest_ = position;
+        }
+        farthest_ = std::max(farthest_, position);
+        const double back = farthest_ - position;
+        back_ = std::isnan(back_) ? back : std::max(back_, back);
+    }
+
+    MetricValue value() const override
+    {
+        return {back_, ""};
+    }
+
+  private:
+    int direction_ = 0;
+    double pole_pairs_, farthest_ = 0.0, back_ = nan;
+};
+
+// Position error at the instant the drive begins to run: what the initial position search found.
+class FoundAngleError : public Metric
+{
+  public:
+    FoundAngleError(const Expectation &, const Setup &)
+    {
+    }
+
+    void add(const Sample &s) override
+    {
+        if (s.rig.state == RIG_RUNNING && last_state_ != RIG_RUNNING) {
+            const double error = s.rig.angle_error_rad * to_deg;
+            worst_ = std::isnan(worst_) || std::fabs(error) > std::fabs(worst_) ? error : worst_;
+        }
+        last_state_ = s.rig.state;
+    }
+
+    MetricValue value() const override
+    {
+        return {worst_, ""};
+    }
+
+  private:
+    int last_state_ = RIG_RUNNING; // a window that begins while running has found nothing
+    double worst_ = nan;
+};
+
+class FinalState : public Metric
+{
+  public:
+    FinalState(const Expectation &, const Setup &)
+    {
+    }
+
+    void add(const Sample &s) override
+    {
+        state_ = s.rig.state;
+    }
+
+    MetricValue value() const override
+    {
+        return {double(state_), name_of(state_names(), state_)};
+    }
+
+  private:
+    int state_ = RIG_OFF;
+};
+
+// Everything about the first fault of the window, and what the bridge does after it.
+class Faults : public Metric
+{
+  public:
+    Faults(const Expectation &e, const Setup &) : kind_(e.metric), t0_s_(e.t0_s)
+    {
+    }
+
+    void add(const Sample &s) override
+    {
+        const bool starts = s.rig.fault != 0 && s.rig.fault != last_fault_;
+        count_ += starts ? 1.0 : 0.0;
+        lost_ += starts && is_lost(s.rig.fault) ? 1.0 : 0.0;
+        if (starts && first_ == 0) {
+            first_ = s.rig.fault;
+            delay_s_ = s.rig.truth.t_s - t0_s_;
+        }
+        if (first_ != 0) {
+            latency_ += s.rig.driven && !off_seen_ ? 1.0 : 0.0;
+            off_seen_ = off_seen_ || !s.rig.driven;
+            driven_ += s.rig.driven ? 1.0 : 0.0;
+            restarts_ += at_work(s.rig.state) && !at_work(last_state_) && off_seen_ ? 1.0 : 0.0;
+        }
+        last_fault_ = s.rig.fault;
+        last_state_ = s.rig.state;
+    }
+
+    MetricValue value() const override
+    {
+        const double after_fault = first_ == 0 ? nan : 0.0; // NaN unless there was one
+        if (kind_ == "fault") {
+            return {double(first_), name_of(fault_names(), first_)};
+        }
+        if (kind_ == "fault_delay_s") {
+            return {delay_s_, ""};
+        }
+        if (kind_ == "fault_latency_periods") {
+            return {after_fault + latency_, ""};
+        }
+        if (kind_ == "driven_after_fault_periods") {
+            return {after_fault + driven_, ""};
+        }
+        if (kind_ == "restarts") {
+            return {after_fault + restarts_, ""};
+        }
+        return {kind_ == "position_lost_count" ? lost_ : count_, ""};
+    }
+
+  private:
+    static bool is_lost(int fault)
+    {
+        return name_of(fault_names(), fault) == "POSITION_LOST";
+    }
+
+    static bool at_work(int state)
+    {
+        return state != RIG_OFF && state != RIG_FAULT;
+    }
+
+    std::string kind_;
+    double t0_s_, delay_s_ = nan;
+    int first_ = 0, last_fault_ = 0, last_state_ = RIG_OFF;
+    bool off_seen_ = false;
+    double count_ = 0.0, lost_ = 0.0, latency_ = 0.0, driven_ = 0.0, restarts_ = 0.0;
+};
+
+// Seconds for which a limit flag is up.
+class LimitTime : public Metric
+{
+  public:
+    LimitTime(const Expectation &e, const Setup &setup) : period_s_(1.0 / setup.plant.inverter.f_pwm_Hz)
+    {
+        const std::vector<std::string> &names = limit_names();
+        for (size_t bit = 0; bit < names.size(); ++bit) {
+            mask_ |= e.metric == "limit_" + names[bit] + "_s" ? 1U << bit : 0U;
+        }
+    }
+
+    void add(const Sample &s) override
+    {
+        time_s_ += (s.rig.limits & mask_) != 0U ? period_s_ : 0.0;
+    }
+
+    MetricValue value() const override
+    {
+        return {time_s_, ""};
+    }
+
+  private:
+    double period_s_, time_s_ = 0.0;
+    uint32_t mask_ = 0;
+};
+
+// The plant's own honesty: what goes in, minus losses, mechanical work and stored field energy.
+class EnergyResidual : public Metric
+{
+  public:
+    EnergyResidual(const Expectation &, const Setup &)
+    {
+    }
+
+    void add(const Sample &s) override
+    {
+        if (!started_) {
+            first_ = s.rig.truth;
+            started_ = true;
+        }
+        last_ = s.rig.truth;
+    }
+
+    MetricValue value() const override
+    {
+        const double in = last_.e_in_J - first_.e_in_J;
+        const double copper = last_.e_copper_J - first_.e_copper_J;
+        const double mech = last_.e_mech_J - first_.e_mech_J;
+        const double field = last_.e_field_J - first_.e_field_J;
+        const double scale = std::fabs(in) + std::fabs(copper) + std::fabs(mech) + std::fabs(field);
+        return {scale > 0.0 ? std::fabs(in - copper - mech - field) / scale : nan, ""};
+    }
+
+  private:
+    bool started_ = false;
+    plant_truth_t first_{}, last_{};
+};
+
+template <class T> std::unique_ptr<Metric> make(const Expectation &expectation, const Setup &setup)
+{
+    return std::make_unique<T>(expectation, setup);
+}
+
+struct SpecialMetric {
+    MetricInfo info;
+    std::unique_ptr<Metric> (*make)(const Expectation &, const Setup &);
+};
+
+const std::vector<SpecialMetric> &special_metrics()
+{
+    static const std::vector<SpecialMetric> table = [] {
+        std::vector<SpecialMetric> list = {
+            {{"time_to_speed_s", "s", "window start to `fraction` of rated speed, commanded direction", false,
+              true, {}},
+             make<TimeToSpeed>},
+            {{"backward_movement_deg_mech", "deg", "largest travel against the commanded direction, mechanical",
+              false, false, {}},
+             make<BackwardMovement>},
+            {{"found_angle_error_deg", "deg", "position error when the drive begins to run, worst of the window",
+              false, false, {}},
+             make<FoundAngleError>},
+            {{"state_final", "", "state at the end of the window", true, false, state_names()},
+             make<FinalState>},
+            {{"fault", "", "first fault of the window, or NONE", true, false, fault_names()}, make<Faults>},
+            {{"fault_count", "1", "faults that occurred", false, false, {}}, make<Faults>},
+            {{"position_lost_count", "1", "faults POSITION_LOST that occurred", false, false, {}},
+             make<Faults>},
+            {{"fault_delay_s", "s", "window start to the first fault", false, false, {}}, make<Faults>},
+            {{"fault_latency_periods", "1", "control periods with the bridge still on after detection", false,
+              false, {}},
+             make<Faults>},
+            {{"driven_after_fault_periods", "1", "control periods with the bridge on, any time after the fault",
+              false, false, {}},
+             make<Faults>},
+            {{"restarts", "1", "starts after the first fault of the window", false, false, {}}, make<Faults>},
+            {{"energy_residual_rel", "1", "energy the plant loses or invents / energy exchanged", false, false,
+              {}},
+             make<EnergyResidual>},
+        };
+        for (const std::string &name : limit_names()) {
+            const std::string help = "time for which the limit flag is up";
+            list.push_back({{"limit_" + name + "_s", "s", help, false, false, {}}, make<LimitTime>});
+        }
+        return list;
+    }();
+    return table;
+}
+
+} // namespace
+
+std::vector<MetricInfo> special_metric_infos()
+{
+    std::vector<MetricInfo> infos;
+    for (const SpecialMetric &metric : special_metrics()) {
+        infos.push_back(metric.info);
+    }
+    return infos;
+}
+
+std::unique_ptr<Metric> make_special_metric(const Expectation &expectation, const Setup &setup)
+{
+    for (const SpecialMetric &metric : special_metrics()) {
+        if (metric.info.name == expectation.metric) {
+            return metric.make(expectation, setup);
+        }
+    }
+    return nullptr;
+}
+
+} // namespace pmsim

@@ -1,0 +1,156 @@
+#include "tools/pmsim/rig.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "hal/sim/sim_loop.h"
+
+_Static_assert((int)RIG_OFF == (int)DRIVE_OFF && (int)RIG_CALIBRATING == (int)DRIVE_CALIBRATING &&
+                   (int)RIG_FINDING == (int)DRIVE_FINDING && (int)RIG_RUNNING == (int)DRIVE_RUNNING &&
+                   (int)RIG_STOPPING == (int)DRIVE_STOPPING && (int)RIG_FAULT == (int)DRIVE_FAULT,
+               "states");
+_Static_assert((int)RIG_SPEED == (int)DRIVE_MODE_SPEED && (int)RIG_TORQUE == (int)DRIVE_MODE_TORQUE &&
+                   (int)RIG_CURRENT == (int)DRIVE_MODE_CURRENT,
+               "modes");
+
+static const double two_pi = 6.283185307179586;
+
+struct rig {
+    sim_loop_t loop;
+    double v_V, i_A, omega_mech; /* SI value of one step of a signal */
+};
+
+static double step_of(pm_num_t base)
+{
+    return ldexp((double)base.m, base.e - PM_Q_BITS);
+}
+
+rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_params_t *params, char *error,
+                  size_t error_size)
+{
+    rig_t *rig = calloc(1, sizeof *rig);
+    if (rig == NULL) {
+        snprintf(error, error_size, "out of memory");
+        return NULL;
+    }
+    const char *reason = NULL;
+    plant_t *machine = plant_create(plant, theta_e_rad, &reason);
+    if (machine == NULL) {
+        snprintf(error, error_size, "plant: %s", reason);
+        free(rig);
+        return NULL;
+    }
+    const drive_result_t result = sim_loop_init(&rig->loop, machine, params);
+    if (!result.ok) {
+        snprintf(error, error_size, "drive refuses parameter %s: %s", drive_param_table[result.param].name,
+                 result.reason);
+        rig_destroy(rig);
+        return NULL;
+    }
+    const drive_base_t *base = &rig->loop.drive.config.base;
+    rig->v_V = step_of(base->v);
+    rig->i_A = step_of(base->i);
+    rig->omega_mech = step_of(base->omega) / params->pole_pairs;
+    return rig;
+}
+
+void rig_destroy(rig_t *rig)
+{
+    if (rig != NULL) {
+        plant_destroy(rig->loop.plant);
+        free(rig);
+    }
+}
+
+plant_t *rig_plant(rig_t *rig)
+{
+    return rig->loop.plant;
+}
+
+/* Round half away from zero, saturate: a command never wraps. */
+static int32_t whole(double value)
+{
+    const double rounded = round(value);
+    return rounded >= 2147483647.0 ? INT32_MAX : (rounded <= -2147483648.0 ? INT32_MIN : (int32_t)rounded);
+}
+
+void rig_command(rig_t *rig, const rig_command_t *command)
+{
+    const drive_command_t drive_words = {
+        .enable = command->enable,
+        .mode = (drive_mode_t)command->mode,
+        .speed_mrad_s = whole(1e3 * command->speed_rad_s),
+        .torque_uNm = whole(1e6 * command->torque_Nm),
+        .current_mA = whole(1e3 * command->current_A),
+    };
+    drive_command(&rig->loop.drive, &drive_words);
+}
+
+bool rig_clear_fault(rig_t *rig)
+{
+    return drive_clear_fault(&rig->loop.drive);
+}
+
+void rig_set_temperature(rig_t *rig, double temperature_degC)
+{
+    rig->loop.temperature_dC = whole(10.0 * temperature_degC);
+}
+
+void rig_set_hw_fault(rig_t *rig, bool held)
+{
+    rig->loop.hw_fault = held;
+}
+
+void rig_set_break(rig_t *rig, double i_break_A)
+{
+    rig->loop.i_break_A = i_break_A;
+}
+
+static void convert(const rig_t *rig, rig_sample_t *sample)
+{
+    const drive_status_t *status = drive_status(&rig->loop.drive);
+    sample->state = (int)status->state;
+    sample->fault = (int)status->fault;
+    sample->limits = status->limits;
+    sample->theta_hat_e_rad = ldexp((double)status->theta, -32) * two_pi;
+    const double error = sample->truth.theta_e_rad - sample->theta_hat_e_rad;
+    sample->angle_error_rad = error - two_pi * floor(error / two_pi + 0.5);
+    sample->omega_hat_mech_rad_s = rig->omega_mech * status->omega;
+    sample->omega_ref_mech_rad_s = rig->omega_mech * status->omega_ref;
+    sample->i_d_hat_A = rig->i_A * status->i.d;
+    sample->i_q_hat_A = rig->i_A * status->i.q;
+    sample->i_d_ref_A = rig->i_A * status->i_ref.d;
+    sample->i_q_ref_A = rig->i_A * status->i_ref.q;
+    sample->v_alpha_V = rig->v_V * status->v.alpha;
+    sample->v_beta_V = rig->v_V * status->v.beta;
+    sample->v_dc_hat_V = rig->v_V * status->v_dc;
+    sample->weight = (double)status->weight / PM_ONE;
+    sample->quality = (double)status->quality / PM_ONE;
+    const drive_out_t *out = &rig->loop.out;
+    sample->driven = out->driven[0] || out->driven[1] || out->driven[2];
+}
+
+void rig_step(rig_t *rig, rig_sample_t *sample)
+{
+    plant_truth(rig->loop.plant, &sample->truth);
+    sim_loop_step(&rig->loop);
+    convert(rig, sample);
+}
+
+void rig_io(const rig_t *rig, rig_io_t *io)
+{
+    for (int leg = 0; leg < PLANT_LEGS; ++leg) {
+        io->i_leg[leg] = rig->loop.in.i_leg[leg];
+        io->compare[leg][0] = rig->loop.out.compare[leg][0];
+        io->compare[leg][1] = rig->loop.out.compare[leg][1];
+        io->driven[leg] = rig->loop.out.driven[leg];
+    }
+    io->v_dc = rig->loop.in.v_dc;
+    io->hw_fault = rig->loop.in.hw_fault;
+}
+
+uint32_t rig_slow_divider(const rig_t *rig)
+{
+    return rig->loop.slow_divider;
+}

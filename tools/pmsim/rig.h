@@ -1,0 +1,70 @@
+/* The test rig: drive and plant as one thing in SI units, for the runner.
+ *
+ * A thin C layer over hal/sim: it converts the drive's per-unit status to SI with the drive's own bases and
+ * pairs it with the plant's truth of the same sample instant. Called once per control period. */
+#ifndef PMSIM_RIG_H
+#define PMSIM_RIG_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "firmware/drive/parameters.h"
+#include "sim_plant/plant.h"
+
+/* In the order of drive_state_t and drive_mode_t; rig.c checks it. */
+enum { RIG_OFF, RIG_CALIBRATING, RIG_FINDING, RIG_RUNNING, RIG_STOPPING, RIG_FAULT, RIG_STATES };
+enum { RIG_SPEED, RIG_TORQUE, RIG_CURRENT, RIG_MODES };
+
+typedef struct {
+    bool enable;
+    int mode;
+    double speed_rad_s; /* mechanical */
+    double torque_Nm;
+    double current_A;
+} rig_command_t;
+
+typedef struct {
+    plant_truth_t truth; /* at the sample instant */
+    int state;           /* RIG_... */
+    int fault;           /* code, 0: none */
+    uint32_t limits;     /* DRIVE_LIMIT_... */
+    double theta_hat_e_rad;    /* 0 ... 2 pi */
+    double angle_error_rad;    /* theta - theta_hat, -pi ... pi */
+    double omega_hat_mech_rad_s;
+    double omega_ref_mech_rad_s;
+    double i_d_hat_A, i_q_hat_A;
+    double i_d_ref_A, i_q_ref_A;
+    double v_alpha_V, v_beta_V; /* the drive's idea of the voltage it applies */
+    double v_dc_hat_V;
+    double weight, quality;
+    bool driven; /* any leg, in the output of this period */
+} rig_sample_t;
+
+/* What went in and out of the drive in one period: the instruction count on the target replays it. */
+typedef struct {
+    uint16_t i_leg[PLANT_LEGS], v_dc;
+    bool hw_fault;
+    uint16_t compare[PLANT_LEGS][2];
+    bool driven[PLANT_LEGS];
+} rig_io_t;
+
+typedef struct rig rig_t;
+
+/* NULL and a text in `error` when the plant or the drive refuses its data. */
+rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_params_t *params, char *error,
+                  size_t error_size);
+void rig_destroy(rig_t *rig);
+
+plant_t *rig_plant(rig_t *rig);
+void rig_command(rig_t *rig, const rig_command_t *command);
+bool rig_clear_fault(rig_t *rig);
+void rig_set_temperature(rig_t *rig, double temperature_degC);
+void rig_set_hw_fault(rig_t *rig, bool held);
+void rig_set_break(rig_t *rig, double i_break_A);
+
+void rig_step(rig_t *rig, rig_sample_t *sample);
+void rig_io(const rig_t *rig, rig_io_t *io);
+uint32_t rig_slow_divider(const rig_t *rig);
+
+#endif

@@ -1,0 +1,69 @@
+// A scenario as data: what is on the bench, what happens when, what is expected. Format: docs/pmsim.md.
+#ifndef PMSIM_SCENARIO_H
+#define PMSIM_SCENARIO_H
+
+#include <array>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/pmsim/setup.h"
+
+namespace pmsim
+{
+
+// Values that follow the profile, in SI; an event steps or ramps them.
+enum class Channel {
+    speed_rad_s, // references
+    torque_Nm,
+    current_A,
+    load_Nm,     // constant torque, opposes positive rotation
+    load_fan_Nm, // at rated speed; grows with the square of the speed and always opposes it
+    v_source_V,
+    temperature_degC,
+    imposed_speed_rad_s,
+    R_s_ohm, // of the machine itself: heating, demagnetisation
+    psi_m_Wb,
+    count
+};
+
+constexpr size_t channel_count = static_cast<size_t>(Channel::count);
+
+struct Event {
+    double t_s = 0.0;        // of the scenario, or after `state` was first entered
+    std::optional<int> state;
+    double ramp_s = 0.0;     // for all channels of the event
+    std::array<std::optional<double>, channel_count> targets;
+    std::optional<bool> enable, locked, hw_fault;
+    std::optional<int> mode;
+    std::optional<std::array<double, PLANT_LEGS>> sensor_offset_A, sensor_gain_error;
+    std::optional<double> rotor_slip_rad; // electrical
+    bool free = false;                    // ends an imposed speed
+    bool clear_fault = false;
+};
+
+struct Expectation {
+    std::string metric;
+    std::string label; // metric with its arguments, for reports
+    double t0_s = 0.0, t1_s = std::numeric_limits<double>::infinity();
+    double fraction = 0.0; // argument of some metrics: of rated speed
+    std::optional<double> min, max, max_abs;
+    std::optional<std::string> equals;
+    std::string unit;
+    std::string book; // section it stands for
+};
+
+struct Scenario {
+    std::string title;
+    Setup setup;
+    uint64_t seed = 1;
+    double theta_e_rad = 0.0; // rotor at the start
+    double duration_s = 0.0;
+    std::vector<Event> profile;
+    std::vector<Expectation> expect;
+};
+
+} // namespace pmsim
+
+#endif

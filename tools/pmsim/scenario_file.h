@@ -1,0 +1,49 @@
+// Scenario files: one file, one or many runs. Format: docs/pmsim.md.
+// Tests: tests/unit/pmsim/scenario_file_test.cpp.
+#ifndef PMSIM_SCENARIO_FILE_H
+#define PMSIM_SCENARIO_FILE_H
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tools/pmsim/scenario.h"
+
+namespace pmsim
+{
+
+using Settings = std::vector<std::pair<std::string, std::string>>; // --set name=value
+
+struct Run {
+    std::string name; // "angle=30 direction=-1"; empty when the file has a single run
+    Variables variables;
+};
+
+class ScenarioFile
+{
+  public:
+    explicit ScenarioFile(const std::string &path, Settings settings = {});
+    ScenarioFile(const Value &document, Settings settings);
+
+    std::string title() const;
+    const std::vector<Run> &runs() const;
+    Scenario scenario(const Run &run) const; // reads the whole document with the run's variables
+
+  private:
+    void check_settings() const;
+
+    Value document_;
+    Settings settings_;
+    std::vector<Run> runs_;
+};
+
+// All combinations of `cases` and `sweep`; a variable in `fixed` keeps that one value.
+std::vector<Run> expand_runs(const Map &document, const Variables &fixed);
+std::vector<std::string> variable_names(const Map &document);
+
+Event read_event(const Value &value, const Setup &setup);
+Expectation read_expectation(const Value &value);
+
+} // namespace pmsim
+
+#endif

@@ -1,0 +1,149 @@
+// `sweep:` and `cases:` of a scenario: which runs one file stands for.
+#include <cmath>
+
+#include "tools/pmsim/scenario_file.h"
+#include "tools/pmsim/text.h"
+
+namespace pmsim
+{
+namespace
+{
+
+const size_t max_runs = 100000;
+
+// "0, 5, ... 355" from {from: 0, to: 355, step: 5}; both ends belong to it.
+std::vector<std::string> read_grid(const Value &value)
+{
+    const Map map(value, {"from", "to", "step"});
+    const double from = map.at("from").number(-1e9, 1e9);
+    const double to = map.at("to").number(from, 1e9);
+    const double step = map.at("step").number(1e-9, 1e9);
+    std::vector<std::string> values;
+    const double count = std::floor((to - from) / step + 1e-9);
+    if (count >= double(max_runs)) {
+        value.fail("more than " + std::to_string(max_runs) + " values");
+    }
+    for (int i = 0; i <= int(count); ++i) {
+        values.push_back(format(from + i * step, 12));
+    }
+    return values;
+}
+
+std::vector<std::string> read_axis(const Value &value)
+{
+    if (value.is_map()) {
+        return read_grid(value);
+    }
+    std::vector<std::string> values;
+    for (const Value &item : value.list()) {
+        values.push_back(item.text());
+    }
+    if (values.empty()) {
+        value.fail("the list is empty");
+    }
+    return values;
+}
+
+struct Case {
+    std::string name;
+    Variables variables;
+};
+
+std::vector<Case> read_cases(const Value &value)
+{
+    std::vector<Case> cases;
+    std::vector<std::string> first_keys;
+    for (const Value &item : value.list()) {
+        const Map map(item);
+        Case one;
+        for (const std::string &key : map.keys()) {
+            (key == "name" ? one.name : one.variables[key]) = map.at(key).text();
+        }
+        if (!cases.empty()) {
+            for (const auto &entry : cases.front().variables) {
+                map.at(entry.first); // every case gives the same variables
+            }
+            if (one.variables.size() != cases.front().variables.size()) {
+                item.fail("gives a variable that the first case does not give");
+            }
+        }
+        if (one.name.empty()) {
+            for (const auto &entry : one.variables) {
+                one.name += (one.name.empty() ? "" : " ") + entry.first + "=" + entry.second;
+            }
+        }
+        cases.push_back(one);
+    }
+    if (cases.empty()) {
+        value.fail("the list is empty");
+    }
+    return cases;
+}
+
+} // namespace
+
+std::vector<std::string> variable_names(const Map &document)
+{
+    std::vector<std::string> names;
+    if (const auto cases = document.find("cases")) {
+        for (const auto &entry : read_cases(*cases).front().variables) {
+            names.push_back(entry.first);
+        }
+        names.emplace_back("case");
+    }
+    if (const auto sweep = document.find("sweep")) {
+        for (const std::string &key : Map(*sweep).keys()) {
+            names.push_back(key);
+        }
+    }
+    return names;
+}
+
+std::vector<Run> expand_runs(const Map &document, const Variables &fixed)
+{
+    std::vector<Run> runs = {{}};
+    if (const auto cases = document.find("cases")) {
+        runs.clear();
+        for (const Case &one : read_cases(*cases)) {
+            const auto only = fixed.find("case");
+            if (only == fixed.end() || only->second == one.name) {
+                runs.push_back({one.name, one.variables});
+                for (const auto &entry : fixed) {
+                    if (one.variables.count(entry.first) != 0) {
+                        runs.back().variables[entry.first] = entry.second;
+                    }
+                }
+            }
+        }
+        if (runs.empty()) {
+            cases->fail("there is no case \"" + fixed.at("case") + "\"");
+        }
+    }
+    const auto sweep = document.find("sweep");
+    if (!sweep) {
+        return runs;
+    }
+    const Map axes(*sweep);
+    for (const std::string &key : axes.keys()) {
+        const auto one = fixed.find(key);
+        const std::vector<std::string> values =
+            one != fixed.end() ? std::vector<std::string>{one->second} : read_axis(axes.at(key));
+        std::vector<Run> product;
+        if (runs.size() * values.size() > max_runs) {
+            sweep->fail("more than " + std::to_string(max_runs) + " runs");
+        }
+        for (const Run &run : runs) {
+            for (const std::string &value : values) {
+                product.push_back(run);
+                product.back().name += (run.name.empty() ? "" : " ") + key + "=" + value;
+                if (!product.back().variables.emplace(key, value).second) {
+                    throw InputError(axes.key_place(key), "variable \"" + key + "\" is given by cases too");
+                }
+            }
+        }
+        runs = std::move(product);
+    }
+    return runs;
+}
+
+} // namespace pmsim
