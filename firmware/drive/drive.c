@@ -58,6 +58,7 @@ static void measure(drive_t *drive, const drive_in_t *in)
     drive->i_ab = pm_clarke(drive->i_abc);
     drive->status.v_dc = pm_max(pm_shl((int32_t)in->v_dc, PM_Q_BITS - 16), V_DC_LEAST);
     drive->hw_fault = in->hw_fault;
+    drive->v_past = drive->v_now;
     drive->v_now = drive->v_next;
     drive->v_next = (pm_ab_t){0, 0};
 }
@@ -129,7 +130,7 @@ static void vector(drive_t *drive, drive_out_t *out)
 {
     pm_dir_t dir;
     pm_dq_t i;
-    position_step(&drive->position, &drive->config.position, drive->v_now, drive->i_ab, &dir, &i);
+    position_step(&drive->position, &drive->config.position, drive->v_past, drive->i_ab, &dir, &i);
     control(drive, drive->position.pll.theta, drive->position.pll.omega, i, out);
 }
 
@@ -138,11 +139,11 @@ static void open_loop(drive_t *drive, drive_out_t *out)
     const position_config_t *c = &drive->config.position;
     drive->theta_open += (pm_angle_t)pm_omega_to_angle(drive->omega_open, drive->config.k_theta);
     if (pm_abs(drive->omega_open) < c->omega_low) {
-        position_follow(&drive->position, c, drive->v_now, drive->i_ab, drive->theta_open, drive->omega_open);
+        position_follow(&drive->position, c, drive->v_past, drive->i_ab, drive->theta_open, drive->omega_open);
     } else {
         pm_dir_t dir;
         pm_dq_t i;
-        position_step(&drive->position, c, drive->v_now, drive->i_ab, &dir, &i);
+        position_step(&drive->position, c, drive->v_past, drive->i_ab, &dir, &i);
     }
     control(drive, drive->theta_open, drive->omega_open, pm_park(drive->i_ab, pm_dir(drive->theta_open)), out);
 }

@@ -37,7 +37,8 @@ struct drive {
     bool hw_fault;
     bool limited; /* the voltage was, in the last step */
     pm_dq_t u;    /* voltage of the current control, without carrier */
-    pm_ab_t v_next, v_now; /* commanded at k-1 and k-2: the latter was applied over [k-1, k) */
+    /* commanded at k, k-1 and k-2, acting over [k+1, k+2), [k, k+1) and [k-1, k) */
+    pm_ab_t v_next, v_now, v_past;
 
     position_t position;
     initial_pulses_t pulses;

@@ -9,7 +9,7 @@
  *   pm_frac(x, k)   k in Q32, +-0.5    filter and integration constants, result Q28; error <= 2^-29
  *   pm_unit(x, u)   u in Q31, +-1      sines, directions, ratios, result Q28; error <= 2^-28
  *   pm_gain(x, g)   g in Q26, +-32     controller gains, result *wide*: Q22, +-512; error <= 2^-23
- * frac, unit and gain cannot overflow (pm_unit alone at -8 x -1). pm_mul wraps when the product leaves +-8;
+ * frac, unit and gain cannot overflow (pm_unit only where the product rounds to +8). pm_mul wraps when the product leaves +-8;
  * where it may, use pm_mul_sat, one instruction more. *_add adds the product to a sum at no cost and wraps
  * with it. Nothing here is undefined behaviour for any input, except where a comment gives a range.
  *
@@ -189,7 +189,7 @@ static inline int32_t pm_angle_diff(pm_angle_t a, pm_angle_t b)
     return (int32_t)(a - b);
 }
 
-/* Angle in radians, Q28 (-pi ... pi), of a signed angle, and back; error <= 2^-28 rad each. */
+/* Angle in radians, Q28 (-pi ... pi), of a signed angle, and back; error <= 2^-28 and 2^-27 rad. */
 static inline pm_q_t pm_angle_to_rad(int32_t turns)
 {
     return pm_mulh(turns, 1686629713); /* 2 pi / 16 in Q32 */

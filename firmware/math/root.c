@@ -1,6 +1,6 @@
 #include "firmware/math/root.h"
 
-/* sqrt(m 2^30) for m >= 2^30, that is the root of m / 2^32 in Q31, to 2^-28 relative.
+/* sqrt(m 2^30) for m >= 2^30, that is the root of m / 2^32 in Q31, within 1e-8 of it.
  * A cubic gives 1 / sqrt within 0.7 %, one Newton step makes that 8e-5. The root made from it is cut to 16
  * bits, so that its remainder is exact in 32 bits, and corrected by remainder / (2 root). */
 static inline uint32_t root_q31(uint32_t m)

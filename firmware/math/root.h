@@ -1,6 +1,6 @@
 /* Square root, length and quotient of signals.
  *
- * pm_sqrt(x): x in Q28, result Q28, error <= 2^-26; x <= 0 gives 0.
+ * pm_sqrt(x): x in Q28, result Q28, error <= 2^-25; x <= 0 gives 0.
  * pm_hypot(x, y): length of (x, y) in the format of its arguments, error <= 1e-8 relative + 1 LSB; saturates.
  * pm_div(num, x): num / x in Q28, error <= 1e-8 relative + 1 LSB; saturates. x <= 0 is taken as the smallest
  *   positive x, so the result is the end of the range on num's side; 0 / x = 0. One 32-bit division.

@@ -69,7 +69,8 @@ std::string label_of(const Expectation &expectation, const Map &map, const Metri
 
 Expectation read_expectation(const Value &value)
 {
-    const Map map(value, {"metric", "name", "window_s", "fraction", "min", "max", "max_abs", "equals", "book"});
+    const Map map(value,
+                  {"metric", "name", "window_s", "fraction", "min", "max", "max_abs", "equals", "book"});
     Expectation expectation;
     const Value metric = map.at("metric");
     expectation.metric = metric.text();

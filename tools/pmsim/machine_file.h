@@ -9,7 +9,7 @@
 namespace pmsim
 {
 
-Setup read_machine(const Value &value);             // the content of a machine file
+Setup read_machine(const Value &value); // the content of a machine file
 Setup load_machine_file(const std::string &path);
 
 } // namespace pmsim

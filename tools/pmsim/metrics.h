@@ -22,9 +22,9 @@ namespace pmsim
 // One control period as the metrics and the trace see it.
 struct Sample {
     rig_sample_t rig;
-    double load_Nm;       // at the shaft, from the profile
+    double load_Nm;         // at the shaft, from the profile
     double speed_ref_rad_s; // commanded, before the drive's ramp
-    int direction;        // of the command: -1, 0, 1
+    int direction;          // of the command: -1, 0, 1
 };
 
 struct MetricValue {
@@ -43,8 +43,8 @@ class Metric
 struct MetricInfo {
     std::string name, unit, help;
     bool is_word = false;
-    bool has_fraction = false;        // needs `fraction`
-    std::vector<std::string> words;   // what `equals` may say
+    bool has_fraction = false;      // needs `fraction`
+    std::vector<std::string> words; // what `equals` may say
 };
 
 const std::vector<MetricInfo> &metric_infos();

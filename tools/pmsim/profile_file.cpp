@@ -41,9 +41,18 @@ const ChannelKey channel_keys[] = {
 
 std::vector<std::string> event_keys()
 {
-    std::vector<std::string> keys = {"t_s",          "when",     "ramp_s",      "enable",
-                                     "mode",         "locked",   "hw_fault",    "sensor_offset_A",
-                                     "rotor_slip_deg", "free_speed", "clear_fault", "sensor_gain_error"};
+    std::vector<std::string> keys = {"t_s",
+                                     "when",
+                                     "ramp_s",
+                                     "enable",
+                                     "mode",
+                                     "locked",
+                                     "hw_fault",
+                                     "sensor_offset_A",
+                                     "rotor_slip_deg",
+                                     "free_speed",
+                                     "clear_fault",
+                                     "sensor_gain_error"};
     for (const ChannelKey &entry : channel_keys) {
         keys.emplace_back(entry.key);
     }

@@ -19,6 +19,8 @@ static const double two_pi = 6.283185307179586;
 struct rig {
     sim_loop_t loop;
     double v_V, i_A, omega_mech; /* SI value of one step of a signal */
+    drive_command_t command;     /* the last one */
+    uint8_t given, given_last;   /* RECORD_...: before the coming period, before the last one */
 };
 
 static double step_of(pm_num_t base)
@@ -77,18 +79,20 @@ static int32_t whole(double value)
 
 void rig_command(rig_t *rig, const rig_command_t *command)
 {
-    const drive_command_t drive_words = {
+    rig->command = (drive_command_t){
         .enable = command->enable,
         .mode = (drive_mode_t)command->mode,
         .speed_mrad_s = whole(1e3 * command->speed_rad_s),
         .torque_uNm = whole(1e6 * command->torque_Nm),
         .current_mA = whole(1e3 * command->current_A),
     };
-    drive_command(&rig->loop.drive, &drive_words);
+    rig->given |= RECORD_COMMAND;
+    drive_command(&rig->loop.drive, &rig->command);
 }
 
 bool rig_clear_fault(rig_t *rig)
 {
+    rig->given |= RECORD_CLEAR;
     return drive_clear_fault(&rig->loop.drive);
 }
 
@@ -134,23 +138,70 @@ static void convert(const rig_t *rig, rig_sample_t *sample)
 void rig_step(rig_t *rig, rig_sample_t *sample)
 {
     plant_truth(rig->loop.plant, &sample->truth);
+    rig->given_last = rig->given;
+    rig->given = 0;
     sim_loop_step(&rig->loop);
     convert(rig, sample);
-}
-
-void rig_io(const rig_t *rig, rig_io_t *io)
-{
-    for (int leg = 0; leg < PLANT_LEGS; ++leg) {
-        io->i_leg[leg] = rig->loop.in.i_leg[leg];
-        io->compare[leg][0] = rig->loop.out.compare[leg][0];
-        io->compare[leg][1] = rig->loop.out.compare[leg][1];
-        io->driven[leg] = rig->loop.out.driven[leg];
-    }
-    io->v_dc = rig->loop.in.v_dc;
-    io->hw_fault = rig->loop.in.hw_fault;
 }
 
 uint32_t rig_slow_divider(const rig_t *rig)
 {
     return rig->loop.slow_divider;
+}
+
+void rig_record(const rig_t *rig, record_period_t *record)
+{
+    *record = (record_period_t){
+        .v_dc = rig->loop.in.v_dc,
+        .hw_fault = rig->loop.in.hw_fault,
+        .given = rig->given_last,
+        .enable = rig->command.enable,
+        .mode = (uint8_t)rig->command.mode,
+        .speed_mrad_s = rig->command.speed_mrad_s,
+        .torque_uNm = rig->command.torque_uNm,
+        .current_mA = rig->command.current_mA,
+        .temperature_dC = rig->loop.temperature_dC,
+    };
+    for (int leg = 0; leg < PLANT_LEGS; ++leg) {
+        record->i_leg[leg] = rig->loop.in.i_leg[leg];
+        record->compare[leg][0] = rig->loop.out.compare[leg][0];
+        record->compare[leg][1] = rig->loop.out.compare[leg][1];
+        record->driven[leg] = rig->loop.out.driven[leg];
+    }
+}
+
+void rig_step_plant(rig_t *rig, const record_period_t *record)
+{
+    plant_adc_t adc;
+    plant_pwm_t pwm;
+    plant_sample(rig->loop.plant, &adc);
+    for (int leg = 0; leg < PLANT_LEGS; ++leg) {
+        pwm.compare[leg][0] = record->compare[leg][0];
+        pwm.compare[leg][1] = record->compare[leg][1];
+        pwm.driven[leg] = record->driven[leg] != 0U;
+    }
+    plant_set_pwm(rig->loop.plant, &pwm);
+    plant_run_period(rig->loop.plant);
+}
+
+bool rig_step_drive(rig_t *rig, const record_period_t *record)
+{
+    sim_loop_t *loop = &rig->loop;
+    drive_in_t in = {.v_dc = record->v_dc, .hw_fault = record->hw_fault != 0U};
+    for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
+        in.i_leg[leg] = record->i_leg[leg];
+    }
+    drive_step(&loop->drive, &in, &loop->out);
+    if (loop->periods % loop->slow_divider == 0U) {
+        const drive_slow_in_t slow = {.temperature_dC = record->temperature_dC};
+        drive_slow(&loop->drive, &slow);
+    }
+    loop->periods++;
+    bool same = true;
+    for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
+        same = same && loop->out.compare[leg][0] == record->compare[leg][0] &&
+               loop->out.compare[leg][1] == record->compare[leg][1] &&
+               loop->out.driven[leg] == (record->driven[leg] != 0U);
+    }
+    return same;
 }

@@ -11,6 +11,7 @@
 
 #include "firmware/drive/parameters.h"
 #include "sim_plant/plant.h"
+#include "tools/pmsim/record.h"
 
 /* In the order of drive_state_t and drive_mode_t; rig.c checks it. */
 enum { RIG_OFF, RIG_CALIBRATING, RIG_FINDING, RIG_RUNNING, RIG_STOPPING, RIG_FAULT, RIG_STATES };
@@ -25,12 +26,12 @@ typedef struct {
 } rig_command_t;
 
 typedef struct {
-    plant_truth_t truth; /* at the sample instant */
-    int state;           /* RIG_... */
-    int fault;           /* code, 0: none */
-    uint32_t limits;     /* DRIVE_LIMIT_... */
-    double theta_hat_e_rad;    /* 0 ... 2 pi */
-    double angle_error_rad;    /* theta - theta_hat, -pi ... pi */
+    plant_truth_t truth;    /* at the sample instant */
+    int state;              /* RIG_... */
+    int fault;              /* code, 0: none */
+    uint32_t limits;        /* DRIVE_LIMIT_... */
+    double theta_hat_e_rad; /* 0 ... 2 pi */
+    double angle_error_rad; /* theta - theta_hat, -pi ... pi */
     double omega_hat_mech_rad_s;
     double omega_ref_mech_rad_s;
     double i_d_hat_A, i_q_hat_A;
@@ -40,14 +41,6 @@ typedef struct {
     double weight, quality;
     bool driven; /* any leg, in the output of this period */
 } rig_sample_t;
-
-/* What went in and out of the drive in one period: the instruction count on the target replays it. */
-typedef struct {
-    uint16_t i_leg[PLANT_LEGS], v_dc;
-    bool hw_fault;
-    uint16_t compare[PLANT_LEGS][2];
-    bool driven[PLANT_LEGS];
-} rig_io_t;
 
 typedef struct rig rig_t;
 
@@ -64,7 +57,14 @@ void rig_set_hw_fault(rig_t *rig, bool held);
 void rig_set_break(rig_t *rig, double i_break_A);
 
 void rig_step(rig_t *rig, rig_sample_t *sample);
-void rig_io(const rig_t *rig, rig_io_t *io);
 uint32_t rig_slow_divider(const rig_t *rig);
+
+/* What went into and came out of the drive in the last period. */
+void rig_record(const rig_t *rig, record_period_t *record);
+
+/* Half of a period each, driven by a record: the plant alone, and the drive alone. The latter says whether
+ * the drive's output is the recorded one. */
+void rig_step_plant(rig_t *rig, const record_period_t *record);
+bool rig_step_drive(rig_t *rig, const record_period_t *record);
 
 #endif

@@ -31,9 +31,9 @@ enum class Channel {
 constexpr size_t channel_count = static_cast<size_t>(Channel::count);
 
 struct Event {
-    double t_s = 0.0;        // of the scenario, or after `state` was first entered
+    double t_s = 0.0; // of the scenario, or after `state` was first entered
     std::optional<int> state;
-    double ramp_s = 0.0;     // for all channels of the event
+    double ramp_s = 0.0; // for all channels of the event
     std::array<std::optional<double>, channel_count> targets;
     std::optional<bool> enable, locked, hw_fault;
     std::optional<int> mode;

@@ -68,7 +68,8 @@ void read_window(Scenario &scenario, Expectation &expectation, const Value &item
 {
     expectation.t1_s = std::min(expectation.t1_s, scenario.duration_s);
     if (expectation.t0_s >= expectation.t1_s) {
-        item.fail("the window lies after the end of the run (duration_s " + format(scenario.duration_s) + ")");
+        item.fail("the window lies after the end of the run (duration_s " + format(scenario.duration_s) +
+                  ")");
     }
 }
 

@@ -58,7 +58,7 @@ const Field fields[] = {
     PM_FIELD("sensor", "noise_lsb", 0, 100, false, plant.sensor.noise_lsb),
     PM_FIELD("sensor", "gain_error", -1, 1, false, plant.sensor.gain_error),
     PM_FIELD("sensor", "offset_A", -1e5, 1e5, false, plant.sensor.offset_A),
-    PM_FIELD("sensor", "delay_s", 0, 1e-3, false, plant.sensor.delay_s),
+    PM_FIELD("sensor", "delay_s", -1e-3, 1e-3, false, plant.sensor.delay_s),
 
     PM_FIELD("dclink", "v_source_V", 0, 2000, false, plant.dclink.v_source_V),
     PM_FIELD("dclink", "r_source_ohm", 0, 1e3, false, plant.dclink.r_source_ohm),

@@ -37,7 +37,6 @@ class InputError : public std::runtime_error
 
 using Variables = std::map<std::string, std::string>;
 
-
 class Value
 {
   public:
@@ -82,7 +81,7 @@ class Map
 
     bool has(const std::string &key) const;
     std::optional<Value> find(const std::string &key) const;
-    Value at(const std::string &key) const; // refuses the file when missing
+    Value at(const std::string &key) const;       // refuses the file when missing
     const std::vector<std::string> &keys() const; // in the order of the file
     Place key_place(const std::string &key) const;
     const Value &value() const;

@@ -53,12 +53,15 @@ void _exit(int status)
     }
 }
 
-/* newlib's 0, 1, 2 are the console, which semihosting opens by name: "r" for input, "w" for output. */
+/* newlib's 0, 1, 2 are the console, which semihosting opens by name: "r" for input, "w" for output. The host counts
+ * its own handles from 1, so a file's number is its handle beyond these three. */
+#define FIRST_FILE 3
+
 static int host_file(int file)
 {
     static int console[3] = { -1, -1, -1 };
-    if (file > 2) {
-        return file;
+    if (file >= FIRST_FILE) {
+        return file - FIRST_FILE;
     }
     if (console[file] < 0) {
         const uintptr_t arguments[3] = { (uintptr_t) ":tt", file == 0 ? 0u : file == 1 ? 4u : 8u, 3u };
@@ -74,8 +77,9 @@ int _open(const char *path, int flags, int mode)
     int file = semihost(SYS_OPEN, arguments);
     if (file < 0) {
         errno = ENOENT;
+        return -1;
     }
-    return file;
+    return file + FIRST_FILE;
 }
 
 int _close(int file)

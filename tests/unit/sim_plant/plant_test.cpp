@@ -1,0 +1,156 @@
+// plant.h: the order of a control period, the energy balance, slips and drift.
+#include "rig.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace
+{
+
+// METHODS.md 1.1 asks for 0.5 % of rated power; the integrals of one trajectory agree far better.
+constexpr double balance = 1e-6;
+
+double residual_J(const plant_truth_t &t)
+{
+    return t.e_in_J - t.e_copper_J - t.e_device_J - t.e_mech_J - t.e_field_J;
+}
+
+TEST(Plant, PwmActsInThePeriodAfterTheComing)
+{
+    plant_config_t config = rig::ipm_1000();
+    config.mech.locked = true;
+    rig::Plant plant(config);
+    EXPECT_EQ(plant.truth().i_A[0], 0.0);
+    plant.run(rig::pwm(1, 0, 0)); // period 0: all off
+    EXPECT_EQ(plant.truth().i_A[0], 0.0);
+    EXPECT_EQ(plant.truth().v_mean_alpha_V, 0.0);
+    plant.run(rig::pwm(0, 1, 1)); // period 1: what was set in period 0
+    EXPECT_NEAR(plant.truth().v_mean_alpha_V, 200.0, 1e-9);
+    plant_run_period(plant); // period 2: what was set in period 1
+    EXPECT_NEAR(plant.truth().v_mean_alpha_V, -200.0, 1e-9);
+    plant_run_period(plant); // nothing set: it stays
+    EXPECT_NEAR(plant.truth().v_mean_alpha_V, -200.0, 1e-9);
+}
+
+TEST(Plant, HalvesOfThePeriodHaveTheirOwnDuty)
+{
+    plant_config_t config = rig::ipm_1000();
+    config.mech.locked = true;
+    rig::Plant plant(config);
+    plant_pwm_t pwm = rig::pwm(0.5, 0.5, 0.5);
+    pwm.compare[0][0] = rig::counts * 3 / 4; // +1/4 in the first half, -1/4 in the second
+    pwm.compare[0][1] = rig::counts / 4;
+    plant.run(pwm);
+    double first_V = 200.0 * 0.25 * 50e-6; // V s
+    plant_truth_t middle = plant.at(50e-6);
+    EXPECT_NEAR(middle.psi_d_Wb - 0.236, first_V, 1e-3 * first_V);
+    plant.run(pwm);
+    EXPECT_NEAR(plant.truth().v_mean_alpha_V, 0.0, 1e-6);
+}
+
+TEST(Plant, MeanVoltageIsDutyTimesLink)
+{
+    plant_config_t config = rig::ipm_1000();
+    rig::Plant plant(config);
+    plant_set_speed(plant, 50.0);
+    plant_pwm_t pwm = rig::pwm(0.7, 0.45, 0.5);
+    plant.run(pwm, 20);
+    EXPECT_NEAR(plant.truth().v_mean_alpha_V, 300.0 * 2 / 3 * (0.7 - 0.475), 1e-8);
+    EXPECT_NEAR(plant.truth().v_mean_beta_V, 300.0 / std::sqrt(3.0) * (0.45 - 0.5), 1e-8);
+}
+
+TEST(Plant, EnergyBalanceOfALoadedSecond)
+{
+    plant_config_t config = rig::ipm_1000_real();
+    config.mech.T_coulomb_Nm = 0.05;
+    rig::Plant plant(config);
+    rig::CurrentControl control(config);
+    double throughput_J = 0.0, worst_J = 0.0, before_J = 0.0;
+    for (int k = 0; k < 10000; k++) {
+        plant_set_load(plant, k > 3000 ? 3.0 : 0.0);
+        plant.run(control.step(plant.truth(), -0.5, k < 8000 ? 4.0 : -2.0));
+        plant_truth_t t = plant.truth();
+        throughput_J += std::fabs(t.e_in_J - before_J);
+        before_J = t.e_in_J;
+        worst_J = std::fmax(worst_J, std::fabs(residual_J(t)));
+    }
+    plant_truth_t t = plant.truth();
+    RecordProperty("worst_over_throughput", std::to_string(1e9 * worst_J / throughput_J) + "e-9");
+    EXPECT_GT(throughput_J, 100.0);
+    EXPECT_GT(t.e_copper_J, 10.0);
+    EXPECT_GT(t.e_device_J, 1.0);
+    EXPECT_LT(worst_J, balance * throughput_J);
+}
+
+TEST(Plant, SlipKeepsTheFluxAndCountsAsWork)
+{
+    plant_config_t config = rig::ipm_1000_real();
+    rig::Plant plant(config);
+    plant_set_speed(plant, 50.0);
+    rig::CurrentControl control(config);
+    for (int k = 0; k < 300; k++) {
+        plant.run(control.step(plant.truth(), 0.0, 3.0));
+    }
+    plant_truth_t a = plant.truth();
+    plant_turn_rotor(plant, 0.5);
+    plant_truth_t b = plant.truth();
+    EXPECT_NEAR(b.theta_e_rad, a.theta_e_rad + 0.5, 1e-12);
+    EXPECT_NEAR(b.psi_d_Wb, a.psi_d_Wb * std::cos(0.5) + a.psi_q_Wb * std::sin(0.5), 1e-12);
+    EXPECT_NEAR(b.psi_q_Wb, a.psi_q_Wb * std::cos(0.5) - a.psi_d_Wb * std::sin(0.5), 1e-12);
+    EXPECT_GT(std::fabs(b.i_q_A - a.i_q_A), 0.5);
+    EXPECT_NEAR(residual_J(b), residual_J(a), 1e-12);
+    plant.run(rig::all_off(), 100);
+    plant_turn_rotor(plant, -1.0); // floating legs take no current however the rotor jumps
+    plant.run(rig::all_off(), 2);
+    for (double i : plant.truth().i_A) {
+        EXPECT_EQ(i, 0.0);
+    }
+}
+
+TEST(Plant, ParametersDriftFromTheNextPeriodOn)
+{
+    plant_config_t config = rig::ipm_1000();
+    config.machine.c_A_Wb5 = 0.0;
+    config.mech.locked = true;
+    rig::Plant plant(config);
+    plant_pwm_t pwm = rig::pwm(0.55, 0.5, 0.5);
+    plant.run(pwm, 2000);
+    double v = 300.0 * 2 / 3 * 0.05, ripple = 0.01;
+    EXPECT_NEAR(plant.truth().i_A[0], v / 6.0, ripple);
+    plant_machine(plant)->R_s_ohm = 9.0;
+    plant.run(pwm, 2000);
+    EXPECT_NEAR(plant.truth().i_A[0], v / 9.0, ripple);
+    EXPECT_NEAR(residual_J(plant.truth()), 0.0, 1e-6 * plant.truth().e_in_J);
+
+    plant.run(rig::all_off(), 100);
+    plant_set_locked(plant, false);
+    plant_set_speed(plant, 50.0);
+    plant_machine(plant)->psi_m_Wb = 0.2;
+    plant.run(rig::all_off(), 10);
+    plant_truth_t t = plant.truth();
+    EXPECT_EQ(t.i_A[0], 0.0);
+    EXPECT_NEAR(std::hypot(t.v_mean_alpha_V, t.v_mean_beta_V), 150.0 * 0.2, 1e-3);
+}
+
+TEST(Plant, EqualRunsAreIdentical)
+{
+    plant_config_t config = rig::ipm_1000_real();
+    config.sensor.bits = 12;
+    config.sensor.noise_lsb = 0.5;
+    rig::Plant first(config), second(config);
+    rig::CurrentControl control(config);
+    for (int k = 0; k < 500; k++) {
+        plant_adc_t a, b;
+        plant_sample(first, &a);
+        plant_sample(second, &b);
+        ASSERT_EQ(a.i_leg[0], b.i_leg[0]);
+        plant_pwm_t pwm = control.step(first.truth(), 0.0, 2.0);
+        first.run(pwm);
+        second.run(pwm);
+    }
+    EXPECT_EQ(first.truth().theta_e_rad, second.truth().theta_e_rad);
+    EXPECT_EQ(first.truth().e_in_J, second.truth().e_in_J);
+}
+
+} // namespace

@@ -1,0 +1,23 @@
+// The commands of pmsim. Each declares its options on its subcommand and sets the exit code when it runs:
+// 0 done, 1 an expectation failed, 2 bad input.
+#ifndef PMSIM_COMMANDS_H
+#define PMSIM_COMMANDS_H
+
+namespace CLI
+{
+class App;
+}
+
+namespace pmsim
+{
+
+void add_run_command(CLI::App &app, int &exit_code);
+void add_params_command(CLI::App &app);
+void add_metrics_command(CLI::App &app);
+void add_methods_command(CLI::App &app);
+void add_bench_command(CLI::App &app);
+void add_record_command(CLI::App &app);
+
+} // namespace pmsim
+
+#endif

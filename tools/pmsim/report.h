@@ -1,0 +1,32 @@
+// What a run tells: one line per expectation, summary.txt, runs.csv and JSON.
+#ifndef PMSIM_REPORT_H
+#define PMSIM_REPORT_H
+
+#include <string>
+#include <vector>
+
+#include "tools/pmsim/runner.h"
+
+namespace pmsim
+{
+
+// One expectation over all runs.
+struct Verdict {
+    Expectation expectation; // with the bound of the worst run
+    Outcome worst;
+    size_t worst_run = 0, passed = 0, runs = 0;
+};
+
+std::vector<Verdict> verdicts(const ScenarioFile &file, const SweepResult &result);
+bool all_pass(const std::vector<Verdict> &list);
+size_t
+worst_run(const std::vector<Verdict> &list); // the run to look at: worst of the first failed, or of all
+
+std::string verdict_lines(const ScenarioFile &file, const std::vector<Verdict> &list);
+std::string verdict_json(const ScenarioFile &file, const std::vector<Verdict> &list, double simulated_s,
+                         double wall_s);
+std::string runs_csv(const ScenarioFile &file, const SweepResult &result);
+
+} // namespace pmsim
+
+#endif
