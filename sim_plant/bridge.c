@@ -127,6 +127,18 @@ static double single_floating_V(const bridge_t *bridge, const machine_t *machine
     return -1.5 * (transformer + port->omega_e_rad_s * motion) / (axis.d * w.d + axis.q * w.q);
 }
 
+/* The two legs of three floating ones with the largest line voltage */
+static double widest_line_V(const motor_port_t *port, int *high, int *low)
+{
+    *high = 0;
+    *low = 0;
+    for (int k = 1; k < PLANT_LEGS; k++) {
+        *high = emf_V(port, k) > emf_V(port, *high) ? k : *high;
+        *low = emf_V(port, k) < emf_V(port, *low) ? k : *low;
+    }
+    return emf_V(port, *high) - emf_V(port, *low);
+}
+
 double bridge_floating_V(const bridge_t *bridge, const machine_t *machine, const motor_port_t *port, int k)
 {
     if (bridge->floating == 1) {
@@ -138,7 +150,9 @@ double bridge_floating_V(const bridge_t *bridge, const machine_t *machine, const
             return v_tied_V + emf_V(port, k) - emf_V(port, tied);
         }
     }
-    return 0.5 * port->v_dc_V + emf_V(port, k);
+    int high, low;
+    widest_line_V(port, &high, &low);
+    return 0.5 * (port->v_dc_V - emf_V(port, high) - emf_V(port, low)) + emf_V(port, k);
 }
 
 double bridge_leg_V(const bridge_t *bridge, const machine_t *machine, const motor_port_t *port, int k)
@@ -159,18 +173,6 @@ double bridge_leg_V(const bridge_t *bridge, const machine_t *machine, const moto
 static double beyond_V(const bridge_t *bridge, double v_dc_V, double v_leg_V)
 {
     return fabs(v_leg_V - 0.5 * v_dc_V) - 0.5 * v_dc_V - bridge->v_diode_V - START_MARGIN_V;
-}
-
-/* The two legs of three floating ones with the largest line voltage */
-static double widest_line_V(const motor_port_t *port, int *high, int *low)
-{
-    *high = 0;
-    *low = 0;
-    for (int k = 1; k < PLANT_LEGS; k++) {
-        *high = emf_V(port, k) > emf_V(port, *high) ? k : *high;
-        *low = emf_V(port, k) < emf_V(port, *low) ? k : *low;
-    }
-    return emf_V(port, *high) - emf_V(port, *low);
 }
 
 /* Starts what conducts first; true when something started. */

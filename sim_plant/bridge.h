@@ -59,8 +59,8 @@ void bridge_start_diodes(bridge_t *bridge, const machine_t *machine, const motor
 /* Above zero once one of the two would change something. */
 double bridge_excess(const bridge_t *bridge, const machine_t *machine, const motor_port_t *port);
 
-/* Voltage of floating leg k against the negative rail; with three floating legs their mean is taken as
- * half the link. */
+/* Voltage of floating leg k against the negative rail. Nothing fixes the potential of three floating legs;
+ * their highest and lowest are then taken to lie evenly between the rails. */
 double bridge_floating_V(const bridge_t *bridge, const machine_t *machine, const motor_port_t *port, int k);
 
 /* Voltage of any leg against the negative rail. */

@@ -19,6 +19,12 @@ void circuit_float_rate(const circuit_t *c, const point_t *p, double rate[])
     if (c->bridge.floating > 1) {
         rate[PSI_ALPHA] = -port.omega_e_rad_s * port.psi_Wb.beta;
         rate[PSI_BETA] = port.omega_e_rad_s * port.psi_Wb.alpha;
+        /* the stages of a step lie beside the circle of the magnet's flux: their currents are not real */
+        rate[OMEGA_MECH] = mechanics_rate(&c->mech, p->x[OMEGA_MECH], 0.0);
+        rate[V_DC] = dclink_rate(&c->link, p->x[V_DC], 0.0);
+        for (int e = STATES; e < ELEMENTS; e++) {
+            rate[e] = 0.0;
+        }
         return;
     }
     for (int k = 0; k < PLANT_LEGS; k++) {

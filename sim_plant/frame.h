@@ -50,7 +50,7 @@ static inline rotor_t frame_turn(rotor_t r, double rad)
 {
     double x2 = rad * rad;
     double c = 1.0 - x2 * (0.5 - x2 * (1.0 / 24.0 - x2 * (1.0 / 720.0)));
-    double s = rad * (1.0 - x2 * (1.0 / 6.0 - x2 * (1.0 / 120.0)));
+    double s = rad * (1.0 - x2 * (1.0 / 6.0 - x2 * (1.0 / 120.0 - x2 * (1.0 / 5040.0))));
     rotor_t to = {r.c * c - r.s * s, r.s * c + r.c * s};
     return to;
 }

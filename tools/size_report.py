@@ -23,7 +23,7 @@ MODULES = {
     "pm_drive": "firmware/drive",
 }
 KINDS = {".text": "code", ".rodata": "rodata", ".data": "data", ".bss": "bss"}
-TYPEDEF = re.compile(r"^\}\s*(\w+_t);", re.MULTILINE)
+TYPEDEF = re.compile(r"^(?:\}|typedef struct \w+)\s*(\w+_t);", re.MULTILINE)
 
 
 def run(*command):
@@ -126,9 +126,11 @@ def collect(build):
     for name, path in archives.items():
         objects = section_sizes(path)
         for member, row in objects.items():
-            inside = [function for function in graph if function[0] == member]
-            row["frame"] = max((own.get(function, 0) for function in inside), default=0)
-            row["stack"] = max((deepest(function, graph, own, by_name) for function in inside), default=0)
+            row["functions"] = {
+                function[1]: {"frame": own.get(function, 0), "stack": deepest(function, graph, own, by_name)}
+                for function in sorted(graph) if function[0] == member}
+            row["frame"] = max((f["frame"] for f in row["functions"].values()), default=0)
+            row["stack"] = max((f["stack"] for f in row["functions"].values()), default=0)
         report[name] = {"objects": objects, "total": total(objects)}
     for name, folder in MODULES.items():
         names = {n for h in sorted((ROOT / folder).glob("*.h")) for n in TYPEDEF.findall(h.read_text())}
@@ -147,14 +149,17 @@ def total(objects):
 def markdown(report):
     columns = [*KINDS.values(), "frame", "stack"]
     lines = ["# Size on Cortex-M4", "", "Bytes, -O2. Frame is the largest of one function, stack the deepest chain of calls.",
-             "", "| module | object | " + " | ".join(columns) + " |", "|---|---|" + "---:|" * len(columns)]
+             "", "| module | object | " + " | ".join(columns) + " | deepest |",
+             "|---|---|" + "---:|" * len(columns) + "---|"]
     everything = {}
     for name, module in report.items():
         for member, row in module["objects"].items():
             everything[(name, member)] = row
-            lines.append(f"| {name} | {member.removesuffix('.obj')} | " + " | ".join(str(row[c]) for c in columns) + " |")
-        lines.append(f"| **{name}** | | " + " | ".join(f"**{module['total'][c]}**" for c in columns) + " |")
-    lines.append("| **all** | | " + " | ".join(f"**{total(everything)[c]}**" for c in columns) + " |")
+            deep = max(row["functions"].items(), key=lambda f: f[1]["stack"], default=("", None))[0]
+            lines.append(f"| {name} | {member.removesuffix('.obj')} | "
+                         + " | ".join(str(row[c]) for c in columns) + f" | {deep} |")
+        lines.append(f"| **{name}** | | " + " | ".join(f"**{module['total'][c]}**" for c in columns) + " | |")
+    lines.append("| **all** | | " + " | ".join(f"**{total(everything)[c]}**" for c in columns) + " | |")
     lines += ["", "| module | struct | bytes |", "|---|---|---:|"]
     for name, module in report.items():
         lines += [f"| {name} | {struct} | {size} |" for struct, size in module.get("structs", {}).items()]

@@ -58,6 +58,7 @@ typedef struct {
     bool injection;        /* the machine starts by pulses and injection */
     int32_t k_theta;       /* pm_omega_to_angle() */
     pm_q_t i_max;
+    pm_q_t i_d_light;
     pm_q_t omega_max;
     pm_unit_t v_linear;    /* share of v_dc that the voltage vector may reach */
     pm_q_t psi_m;

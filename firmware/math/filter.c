@@ -9,17 +9,14 @@ pm_q_t pm_biquad_step(pm_biquad_t *self, const pm_biquad_config_t *config, pm_q_
     const int32_t in = pm_sat(x, LIMIT_BITS);
     const int64_t sum = self->s1 + (int64_t)config->b0 * in;
     const int32_t upper = (int32_t)(sum >> 32);
-    int32_t out;
-    int32_t cut = 0;
-    if (pm_sat(upper, LIMIT_BITS - (32 - COEFFICIENT_BITS)) == upper) {
-        out = (int32_t)(sum >> COEFFICIENT_BITS);
-        cut = (int32_t)(sum & ((INT64_C(1) << COEFFICIENT_BITS) - 1));
-    } else {
-        out = upper < 0 ? -(1 << LIMIT_BITS) : (1 << LIMIT_BITS) - 1;
-    }
-    /* What was cut off the output is added to the next one: no dead zone and no bias at low frequencies,
+    const int32_t kept = pm_sat(upper, LIMIT_BITS - (32 - COEFFICIENT_BITS));
+    const uint32_t lower = kept == upper ? (uint32_t)sum : 0U;
+    const int32_t out = pm_shl(kept, 32 - COEFFICIENT_BITS) + (int32_t)(lower >> COEFFICIENT_BITS);
+    /* What is cut off the output is added to the next one: no dead zone and no bias at low frequencies,
      * where the poles would otherwise amplify the rounding by 1 / (1 + a1 + a2). */
-    self->s1 = self->s2 + (int64_t)config->b1 * in - (int64_t)config->a1 * out + cut;
-    self->s2 = (int64_t)config->b2 * in - (int64_t)config->a2 * out;
+    const int32_t cut = (int32_t)(lower & ((1U << COEFFICIENT_BITS) - 1U));
+    const int32_t back = -out; /* there is no multiply-subtract into 64 bits */
+    self->s1 = self->s2 + cut + (int64_t)config->b1 * in + (int64_t)config->a1 * back;
+    self->s2 = (int64_t)config->b2 * in + (int64_t)config->a2 * back;
     return out;
 }

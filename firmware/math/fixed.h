@@ -9,9 +9,10 @@
  *   pm_frac(x, k)   k in Q32, +-0.5    filter and integration constants, result Q28; error <= 2^-29
  *   pm_unit(x, u)   u in Q31, +-1      sines, directions, ratios, result Q28; error <= 2^-28
  *   pm_gain(x, g)   g in Q26, +-32     controller gains, result *wide*: Q22, +-512; error <= 2^-23
- * frac, unit and gain cannot overflow (pm_unit only where the product rounds to +8). pm_mul wraps when the product leaves +-8;
- * where it may, use pm_mul_sat, one instruction more. *_add adds the product to a sum at no cost and wraps
- * with it. Nothing here is undefined behaviour for any input, except where a comment gives a range.
+ * frac, unit and gain cannot overflow (pm_unit only where the product rounds to +8). pm_mul wraps when the
+ * product leaves +-8; where it may, use pm_mul_sat, one instruction more. *_add adds the product to a sum at
+ * no cost and wraps with it. Nothing here is undefined behaviour for any input, except where a comment gives
+ * a range.
  *
  * All shifts of the firmware stand in firmware/math. Tests: tests/unit/math/fixed_test.cpp. */
 #ifndef PM_MATH_FIXED_H
@@ -73,11 +74,6 @@ static inline int32_t pm_sat(int32_t x, unsigned n)
     return pm_clamp(x, -top - 1, top);
 }
 
-static inline int32_t pm_abs(int32_t x) /* INT32_MIN -> INT32_MAX */
-{
-    return x >= 0 ? x : (x == INT32_MIN ? INT32_MAX : -x);
-}
-
 #if defined(__ARM_FEATURE_DSP) && __ARM_FEATURE_DSP && defined(__thumb2__)
 
 static inline int32_t pm_add_sat(int32_t a, int32_t b)
@@ -112,6 +108,11 @@ static inline int32_t pm_sub_sat(int32_t a, int32_t b)
 }
 
 #endif
+
+static inline int32_t pm_abs(int32_t x) /* INT32_MIN -> INT32_MAX */
+{
+    return x < 0 ? pm_sub_sat(0, x) : x;
+}
 
 static inline pm_q_t pm_mul(pm_q_t x, pm_q_t y)
 {

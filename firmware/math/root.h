@@ -4,11 +4,11 @@
  * pm_hypot(x, y): length of (x, y) in the format of its arguments, error <= 1e-8 relative + 1 LSB; saturates.
  * pm_div(num, x): num / x in Q28, error <= 1e-8 relative + 1 LSB; saturates. x <= 0 is taken as the smallest
  *   positive x, so the result is the end of the range on num's side; 0 / x = 0. One 32-bit division.
- * pm_ratio(num, den): num / den in Q31 for 0 <= num <= den, den > 0; error <= 2^-15 relative. One 32-bit division.
- * pm_counts_per_unit(counts, v): 16 counts / v, so that pm_mulh(x, .) gives counts for a voltage x; counts < 2^15,
- *   v >= 1/16; error <= 2^-15 relative. One 32-bit division.
- * Function calls without loops or tables; cost in docs/decisions/001-signal-format.md.
- * Tests: tests/unit/math/root_test.cpp. */
+ * pm_ratio(num, den): num / den in Q31 for 0 <= num <= den, den > 0; error -2^-16 ... 2^-15. One 32-bit
+ * division. pm_counts_per_unit(counts, v): 16 counts / v, cut to an integer, so that pm_mulh(x, .) gives
+ * counts for a voltage x; 0 <= counts < 2^15, v >= 1/16; relative error <= (v + 1 / v) 2^-16 before the cut.
+ * One 32-bit division. No loops, no tables; cost in docs/decisions/001-signal-format.md. Tests:
+ * tests/unit/math/root_test.cpp. */
 #ifndef PM_MATH_ROOT_H
 #define PM_MATH_ROOT_H
 

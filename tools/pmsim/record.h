@@ -15,7 +15,7 @@
 #include <stdint.h>
 
 #define RECORD_MAGIC "PMREC001"
-#define RECORD_LEGS 3
+#define RECORD_LEGS  3
 
 enum { RECORD_COMMAND = 1, RECORD_CLEAR = 2 };
 
@@ -30,10 +30,10 @@ typedef struct {
 typedef struct {
     uint16_t i_leg[RECORD_LEGS], v_dc; /* drive_in_t */
     uint8_t hw_fault;
-    uint8_t given; /* RECORD_...: done before the step */
+    uint8_t given;        /* RECORD_...: done before the step */
     uint8_t enable, mode; /* drive_command_t */
     int32_t speed_mrad_s, torque_uNm, current_mA;
-    int32_t temperature_dC;            /* drive_slow_in_t */
+    int32_t temperature_dC;           /* drive_slow_in_t */
     uint16_t compare[RECORD_LEGS][2]; /* drive_out_t */
     uint8_t driven[RECORD_LEGS];
     uint8_t unused; /* 0 */

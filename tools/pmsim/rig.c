@@ -28,8 +28,8 @@ static double step_of(pm_num_t base)
     return ldexp((double)base.m, base.e - PM_Q_BITS);
 }
 
-rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_params_t *params, char *error,
-                  size_t error_size)
+rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_params_t *params,
+                  bool refusal_expected, char *error, size_t error_size)
 {
     rig_t *rig = calloc(1, sizeof *rig);
     if (rig == NULL) {
@@ -44,7 +44,7 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         return NULL;
     }
     const drive_result_t result = sim_loop_init(&rig->loop, machine, params);
-    if (!result.ok) {
+    if (!result.ok && !refusal_expected) {
         snprintf(error, error_size, "drive refuses parameter %s: %s", drive_param_table[result.param].name,
                  result.reason);
         rig_destroy(rig);

@@ -44,9 +44,10 @@ typedef struct {
 
 typedef struct rig rig_t;
 
-/* NULL and a text in `error` when the plant or the drive refuses its data. */
-rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_params_t *params, char *error,
-                  size_t error_size);
+/* NULL and a text in `error` when the plant refuses its data, or the drive does and that is not the point of
+ * the run (`refusal_expected`). */
+rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_params_t *params,
+                  bool refusal_expected, char *error, size_t error_size);
 void rig_destroy(rig_t *rig);
 
 plant_t *rig_plant(rig_t *rig);

@@ -8,19 +8,12 @@
 #include <mutex>
 #include <thread>
 
-#include "tools/pmsim/profile.h"
+#include "tools/pmsim/loop.h"
 
 namespace pmsim
 {
 namespace
 {
-
-struct RigDeleter {
-    void operator()(rig_t *rig) const
-    {
-        rig_destroy(rig);
-    }
-};
 
 // A metric with the periods it is meant for.
 struct WindowedMetric {
@@ -43,32 +36,15 @@ std::vector<WindowedMetric> make_metrics(const Scenario &scenario)
 
 } // namespace
 
-uint64_t period_count(const Scenario &scenario)
-{
-    return static_cast<uint64_t>(std::llround(scenario.duration_s * scenario.setup.plant.inverter.f_pwm_Hz));
-}
-
 RunResult run_scenario(const Scenario &scenario, const Observer &observer, std::atomic<uint64_t> *progress)
 {
-    char error[200];
-    const Setup &setup = scenario.setup;
-    const std::unique_ptr<rig_t, RigDeleter> rig(
-        rig_create(&setup.plant, scenario.theta_e_rad, &setup.params, error, sizeof error));
-    if (!rig) {
-        throw InputError(error);
-    }
-    Profile profile(scenario, rig.get());
+    Loop loop(scenario);
     std::vector<WindowedMetric> metrics = make_metrics(scenario);
     const uint64_t count = period_count(scenario);
-    const double period_s = 1.0 / setup.plant.inverter.f_pwm_Hz;
+    const double period_s = 1.0 / scenario.setup.plant.inverter.f_pwm_Hz;
     const uint64_t report = 1000;
-    Sample sample{};
     for (uint64_t k = 0; k < count; ++k) {
-        profile.play(double(k) * period_s, sample.rig.state, sample.rig.truth.omega_mech_rad_s);
-        rig_step(rig.get(), &sample.rig);
-        sample.load_Nm = profile.load_Nm();
-        sample.speed_ref_rad_s = profile.speed_ref_rad_s();
-        sample.direction = profile.direction();
+        const Sample &sample = loop.step();
         for (WindowedMetric &windowed : metrics) {
             if (k >= windowed.first && k <= windowed.last) {
                 windowed.metric->add(sample);

@@ -22,8 +22,6 @@ struct RunResult {
     double simulated_s = 0.0;
 };
 
-uint64_t period_count(const Scenario &scenario);
-
 // `progress`, if given, counts simulated microseconds.
 RunResult run_scenario(const Scenario &scenario, const Observer &observer = nullptr,
                        std::atomic<uint64_t> *progress = nullptr);

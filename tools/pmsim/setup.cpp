@@ -72,12 +72,13 @@ const Field fields[] = {
 
 // The defaults of parameters.def are one machine's: another must say its own.
 const drive_param_id_t required_parameters[] = {
-    DRIVE_PARAM_pole_pairs,   DRIVE_PARAM_R_s,         DRIVE_PARAM_L_d,         DRIVE_PARAM_L_q,
-    DRIVE_PARAM_psi_m,        DRIVE_PARAM_i_rated,     DRIVE_PARAM_L_q_rated,   DRIVE_PARAM_L_dh_rated,
-    DRIVE_PARAM_L_qh_rated,   DRIVE_PARAM_L_dqh_rated, DRIVE_PARAM_J,           DRIVE_PARAM_i_max,
-    DRIVE_PARAM_speed_max,    DRIVE_PARAM_v_injection, DRIVE_PARAM_i_pulse,     DRIVE_PARAM_i_trip,
-    DRIVE_PARAM_v_dc_max,     DRIVE_PARAM_v_dc_min,    DRIVE_PARAM_v_dc_derate, DRIVE_PARAM_speed_trip,
-    DRIVE_PARAM_acceleration, DRIVE_PARAM_speed_low,   DRIVE_PARAM_speed_high,  DRIVE_PARAM_i_open_loop,
+    DRIVE_PARAM_pole_pairs,  DRIVE_PARAM_R_s,          DRIVE_PARAM_L_d,         DRIVE_PARAM_L_q,
+    DRIVE_PARAM_psi_m,       DRIVE_PARAM_i_rated,      DRIVE_PARAM_L_q_rated,   DRIVE_PARAM_L_dh_rated,
+    DRIVE_PARAM_cross_half,  DRIVE_PARAM_L_qh_rated,   DRIVE_PARAM_L_dqh_rated, DRIVE_PARAM_J,
+    DRIVE_PARAM_i_max,       DRIVE_PARAM_speed_max,    DRIVE_PARAM_v_injection, DRIVE_PARAM_i_pulse,
+    DRIVE_PARAM_i_trip,      DRIVE_PARAM_v_dc_max,     DRIVE_PARAM_v_dc_min,    DRIVE_PARAM_v_dc_derate,
+    DRIVE_PARAM_speed_trip,  DRIVE_PARAM_acceleration, DRIVE_PARAM_speed_low,   DRIVE_PARAM_speed_high,
+    DRIVE_PARAM_i_open_loop,
 };
 
 void assign(const Target &target, const Field &field, const Value &value)
@@ -138,6 +139,7 @@ void derive_board_parameters(Setup &setup)
     derive(DRIVE_PARAM_timer_counts, inverter.timer_counts);
     derive(DRIVE_PARAM_dead_time, inverter.dead_time_s);
     derive(DRIVE_PARAM_device_drop, 0.5 * (inverter.v_switch_V + inverter.v_diode_V));
+    derive(DRIVE_PARAM_v_dc_nominal, setup.rated.v_dc_V);
     derive(DRIVE_PARAM_i_full_scale, sensor.i_full_scale_A);
     derive(DRIVE_PARAM_v_full_scale, sensor.v_full_scale_V);
     const double lsb_A = sensor.bits > 0 ? 2.0 * sensor.i_full_scale_A / double(1 << sensor.bits) : 0.0;
@@ -205,12 +207,10 @@ void read_setting(Setup &setup, const std::string &section, const std::string &k
         value.fail(unknown("key", key, section_keys(section)));
     }
     assign(field->target(setup), *field, value);
-    if (section == "inverter" || section == "sensor") {
-        derive_board_parameters(setup);
-    }
     if (section == "rated" && key == "v_dc_V") {
         setup.plant.dclink.v_source_V = setup.rated.v_dc_V;
     }
+    derive_board_parameters(setup);
 }
 
 void read_sections(Setup &setup, const Map &map, bool is_machine_file)

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
+#include "tools/pmsim/loop.h"
 #include "tools/pmsim/names.h"
-#include "tools/pmsim/runner.h"
 
 namespace pmsim
 {
@@ -30,7 +30,7 @@ const Column columns[] = {
     PM_COLUMN("theta_e_rad", 6,
               s.rig.truth.theta_e_rad - two_pi * std::floor(s.rig.truth.theta_e_rad / two_pi)),
     PM_COLUMN("theta_hat_rad", 6, s.rig.theta_hat_e_rad),
-    PM_COLUMN("angle_error_deg", 5, s.rig.angle_error_rad * to_deg),
+    PM_COLUMN("angle_error_deg", 5, s.rig.angle_error_rad *to_deg),
     PM_COLUMN("omega_mech_rad_s", 6, s.rig.truth.omega_mech_rad_s),
     PM_COLUMN("omega_hat_mech_rad_s", 6, s.rig.omega_hat_mech_rad_s),
     PM_COLUMN("omega_ref_mech_rad_s", 6, s.rig.omega_ref_mech_rad_s),

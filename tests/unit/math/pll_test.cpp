@@ -15,8 +15,8 @@ using samples::real;
 
 // METHODS.md row 19: a / w_n^2; the sampled loop differs by w_n T_s / 2.
 constexpr double kRampError = 0.10;
-// Rounding of speed, error and angle step, gathered over the loop's memory; beside it the error that no longer
-// moves the speed, 2^-29 / ki.
+// Rounding of speed, error and angle step, gathered over the loop's memory; beside it the error that no
+// longer moves the speed, 2^-29 / ki.
 constexpr double kAngleError_rad = 1e-6;
 constexpr double kSpeedError = 1e-5;
 // Half of the angle step's resolution, 2^-30 turn.

@@ -19,6 +19,9 @@ constexpr double kSqrtError = 0x1p-25;
 constexpr double kHypotRelative = 1e-8;
 constexpr double kDivRelative = 1e-8;
 constexpr double kLsb = 0x1p-28;
+constexpr double kRatioLow = -0x1p-16;
+constexpr double kRatioHigh = 0x1p-15;
+constexpr double kCountsRelative = 0x1p-16; // times v + 1 / v
 
 constexpr int kCount = 1000000;
 const double kLargest = real(INT32_MAX);
@@ -128,6 +131,49 @@ TEST(MathRoot, QuotientOutsideItsRange)
     }
     EXPECT_EQ(pm_div(INT32_MIN, 1), -INT32_MAX);
     EXPECT_EQ(pm_div(PM_ONE, PM_ONE / 9), INT32_MAX);
+}
+
+TEST(MathRoot, RatioOfParts)
+{
+    double low = 0, high = 0;
+    const auto check = [&](int32_t num, int32_t den) {
+        const double error = pm_ratio(num, den) * 0x1p-31 - static_cast<double>(num) / den;
+        low = std::min(low, error);
+        high = std::max(high, error);
+    };
+    for (const int32_t num : corners()) {
+        for (const int32_t den : corners()) {
+            if (num >= 0 && den > 0 && num <= den) {
+                check(num, den);
+            }
+        }
+    }
+    Random random;
+    for (int i = 0; i < kCount; ++i) {
+        const int32_t a = random.any_size() & INT32_MAX, b = random.any_size() & INT32_MAX;
+        if (std::max(a, b) > 0) {
+            check(std::min(a, b), std::max(a, b));
+        }
+    }
+    EXPECT_GE(low, kRatioLow);
+    EXPECT_LE(high, kRatioHigh);
+    EXPECT_EQ(pm_ratio(PM_ONE, PM_ONE), PM_UNIT_MAX);
+    EXPECT_EQ(pm_ratio(0, 1), 0);
+}
+
+TEST(MathRoot, CountsPerUnit)
+{
+    for (double v = 1 / 16.0; v < 7.999; v *= 1.0007) {
+        for (const int32_t counts : {0, 1, 100, 4250, 32767}) {
+            const double exact = 16 * counts / real(static_cast<pm_q_t>(v * 0x1p28));
+            const double limit = exact * kCountsRelative * (v + 1 / v);
+            const double actual = pm_counts_per_unit(counts, static_cast<pm_q_t>(v * 0x1p28));
+            ASSERT_LE(actual, exact + limit) << v << " " << counts;
+            ASSERT_GE(actual, exact - limit - 1) << v << " " << counts;
+        }
+    }
+    // Half the link voltage is half the counts, to the count.
+    EXPECT_EQ(pm_mulh(PM_Q(0.75), pm_counts_per_unit(4000, PM_Q(1.5))), 2000);
 }
 
 } // namespace

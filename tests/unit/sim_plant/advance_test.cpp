@@ -104,7 +104,10 @@ plant_pwm_t random_pwm(Random &random, uint32_t timer_counts)
         pwm.driven[k] = kind < 0.3 ? false : kind < 0.6 ? random.chance(0.6) : true;
         for (uint32_t &compare : pwm.compare[k]) {
             double extreme = random();
-            double duty = extreme < 0.1 ? 0.0 : extreme < 0.2 ? 1.01 : extreme < 0.3 ? 0.03 * random() : 0.4 + 0.2 * random();
+            double duty = extreme < 0.1   ? 0.0
+                          : extreme < 0.2 ? 1.01
+                          : extreme < 0.3 ? 0.03 * random()
+                                          : 0.4 + 0.2 * random();
             compare = static_cast<uint32_t>(duty * timer_counts);
         }
     }
@@ -142,7 +145,8 @@ TEST(Advance, SurvivesRandomOperation)
     for (uint64_t seed = 1; seed <= runs; seed++) {
         Random random(seed * 7919);
         plant_config_t config = random_plant(random);
-        double omega_max = 2.0 * config.dclink.v_source_V / (config.machine.psi_m_Wb * config.machine.pole_pairs);
+        double omega_max =
+            2.0 * config.dclink.v_source_V / (config.machine.psi_m_Wb * config.machine.pole_pairs);
         rig::Plant plant(config, 6.28 * random());
         plant_pwm_t pwm{};
         double throughput_J = 1e-3;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -224,7 +225,8 @@ TEST(Circuit, FreeRunAgainstASecondImplementation)
         reference.run(acting);
         acting = next;
         plant_truth_t t = plant.truth();
-        worst_A = std::max({worst_A, std::fabs(t.i_d_A - reference.i_d()), std::fabs(t.i_q_A - reference.i_q())});
+        worst_A =
+            std::max({worst_A, std::fabs(t.i_d_A - reference.i_d()), std::fabs(t.i_q_A - reference.i_q())});
         worst_rad_s = std::max(worst_rad_s, std::fabs(t.omega_mech_rad_s - reference.omega_mech()));
         worst_Nm = std::max(worst_Nm, std::fabs(t.torque_Nm - reference.torque()));
         worst_V = std::max(worst_V, std::fabs(t.v_dc_V - reference.v_dc()));

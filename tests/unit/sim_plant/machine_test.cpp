@@ -1,5 +1,7 @@
 // machine.h: the flux map is the gradient of one energy, and has the figures of METHODS.md 14.
+extern "C" {
 #include "sim_plant/machine.h"
+}
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,98 @@
+#include <chrono>
+#include <cstdio>
+
+#include <CLI/CLI.hpp>
+
+#include "tools/pmsim/commands.h"
+#include "tools/pmsim/loop.h"
+#include "tools/pmsim/record_file.h"
+#include "tools/pmsim/settings_option.h"
+
+namespace pmsim
+{
+namespace
+{
+
+struct Options {
+    std::string scenario = "tests/scenario/bench.yaml";
+    std::vector<std::string> settings;
+    int repeat = 3;
+};
+
+// Seconds of the fastest of several goes: what the work costs when nothing disturbs.
+template <class Work> double fastest_s(int repeat, Work work)
+{
+    double best_s = 1e300;
+    for (int i = 0; i < repeat; ++i) {
+        const auto start = std::chrono::steady_clock::now();
+        work();
+        best_s =
+            std::min(best_s, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    }
+    return best_s;
+}
+
+void print_ratio(const char *what, double simulated_s, double wall_s, size_t periods)
+{
+    std::printf("%-22s %8.1f simulated s per wall s %8.3f us per period\n", what, simulated_s / wall_s,
+                1e6 * wall_s / double(periods));
+}
+
+void bench(const Options &options)
+{
+    const ScenarioFile file(options.scenario, parse_settings(options.settings));
+    const Scenario scenario = file.scenario(file.runs().front());
+    const Recording recording = record_scenario(scenario, UINT64_MAX);
+    const std::vector<record_period_t> &periods = recording.periods;
+    const double f_Hz = scenario.setup.plant.inverter.f_pwm_Hz;
+    const double simulated_s = double(periods.size()) / f_Hz;
+
+    const double whole_s = fastest_s(options.repeat, [&] {
+        Loop loop(scenario);
+        for (size_t k = 0; k < periods.size(); ++k) {
+            loop.step();
+        }
+    });
+    const double plant_s = fastest_s(options.repeat, [&] {
+        Loop loop(scenario);
+        for (const record_period_t &period : periods) {
+            loop.step_plant(period);
+        }
+    });
+    size_t different = 0;
+    const double drive_s = fastest_s(options.repeat, [&] {
+        Loop loop(scenario);
+        different = 0;
+        for (const record_period_t &period : periods) {
+            different += loop.step_drive(period) ? 0 : 1;
+        }
+    });
+    std::printf("%s: %.3g s at %.0f Hz, one core, best of %d\n", file.title().c_str(), simulated_s, f_Hz,
+                options.repeat);
+    print_ratio("drive and plant", simulated_s, whole_s, periods.size());
+    print_ratio("plant alone", simulated_s, plant_s, periods.size());
+    print_ratio("drive alone", simulated_s, drive_s, periods.size());
+    std::printf("replay: %zu of %zu periods differ\n", different, periods.size());
+}
+
+} // namespace
+
+void add_bench_command(CLI::App &app)
+{
+    CLI::App *command = app.add_subcommand("bench", "Measure simulated seconds per wall second");
+    auto options = std::make_shared<Options>();
+    command->add_option("scenario", options->scenario, "scenario file; of a sweep, its first run")
+        ->capture_default_str();
+    command->add_option("--set", options->settings, settings_help())->allow_extra_args(false);
+    command->add_option("--repeat", options->repeat, "goes, of which the fastest counts")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    command->footer(
+        "Plant and drive alone replay the recorded run, so that each does the same work as in it.\n\n"
+        "Examples:\n"
+        "  pmsim bench\n"
+        "  pmsim bench tests/scenario/demo.yaml --set inverter.f_pwm_Hz=20000");
+    command->callback([options] { bench(*options); });
+}
+
+} // namespace pmsim

@@ -1,0 +1,52 @@
+#include <iostream>
+
+#include <CLI/CLI.hpp>
+
+#include "tools/pmsim/commands.h"
+#include "tools/pmsim/loop.h"
+#include "tools/pmsim/record_file.h"
+#include "tools/pmsim/settings_option.h"
+
+namespace pmsim
+{
+namespace
+{
+
+struct Options {
+    std::string scenario, out;
+    std::vector<std::string> settings;
+    uint64_t periods = UINT64_MAX;
+};
+
+void record(const Options &options)
+{
+    const ScenarioFile file(options.scenario, parse_settings(options.settings));
+    if (file.runs().size() != 1) {
+        throw InputError(options.scenario + ": stands for " + std::to_string(file.runs().size()) +
+                         " runs; choose one with --set");
+    }
+    const Recording recording = record_scenario(file.scenario(file.runs().front()), options.periods);
+    write_recording(recording, options.out);
+    std::cout << options.out << ": " << recording.periods.size() << " control periods\n";
+}
+
+} // namespace
+
+void add_record_command(CLI::App &app)
+{
+    CLI::App *command =
+        app.add_subcommand("record", "Record what goes into the drive and comes out, to replay it elsewhere");
+    auto options = std::make_shared<Options>();
+    command->add_option("scenario", options->scenario, "scenario file (YAML)")->required();
+    command->add_option("--out", options->out, "file to write; format: tools/pmsim/record.h")->required();
+    command->add_option("--periods", options->periods, "stop after this many control periods");
+    command->add_option("--set", options->settings, settings_help())->allow_extra_args(false);
+    command->footer(
+        "The record holds converter codes, commands and timer counts of every control period, so a\n"
+        "target that replays it must give the same bits.\n\n"
+        "Example:\n"
+        "  pmsim record tests/scenario/demo.yaml --periods 10000 --out out/demo.rec");
+    command->callback([options] { record(*options); });
+}
+
+} // namespace pmsim
