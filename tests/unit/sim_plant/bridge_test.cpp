@@ -17,8 +17,9 @@ using rig::pi;
 constexpr double formula_tolerance = 0.001;
 // Closed forms: events found to 1e-9 of a step, integration to 1e-6.
 constexpr double closed_form = 2e-6;
-// Implicit Euler in steps of h: half a step of V/L, 36 V / 3.24 mH * 25 ns.
-constexpr double euler_A = 3e-4;
+// The reference takes implicit Euler steps of 50 ns: an event is up to a step late, 36 V / 3.24 mH * 50 ns =
+// 0.6 mA of some amperes.
+constexpr double euler = 2e-4;
 
 plant_config_t locked_spm()
 {
@@ -279,7 +280,7 @@ TEST_P(Rectifier, FollowsAnEnumeratedDiodeBridge)
     RecordProperty("peak_A", std::to_string(comparison.peak));
     EXPECT_GT(comparison.conducting, 100);
     EXPECT_GT(comparison.peak, 0.01);
-    EXPECT_LT(comparison.worst, euler_A + 1e-3 * comparison.peak);
+    EXPECT_LT(comparison.worst, euler * comparison.peak);
     EXPECT_LT(t.e_in_J, 0.0); // into the link
     EXPECT_NEAR(t.e_in_J, reference.e_in_J, 5e-3 * std::fabs(t.e_in_J));
 }
@@ -325,8 +326,9 @@ TEST_P(Legs, FollowAnEnumeratedBridge)
             for (size_t leg = 0; leg < 3; leg++) {
                 // high, low, or within the dead time after either edge; a driven leg starts with one too
                 double rise = 50e-6 * (1.0 - pattern.duty[leg]), fall = 50e-6 * (1.0 + pattern.duty[leg]);
-                bool dead = (t > rise && t < rise + pattern.dead_time_s) ||
-                            (t > fall && t < fall + pattern.dead_time_s) ||
+                bool edges = pattern.duty[leg] > 0.0;
+                bool dead = (edges && t > rise && t < rise + pattern.dead_time_s) ||
+                            (edges && t > fall && t < fall + pattern.dead_time_s) ||
                             (k == 0 && t < pattern.dead_time_s);
                 gate[leg] = pattern.duty[leg] < 0.0 || dead ? DiodeBridge::open
                             : t > rise && t < fall          ? DiodeBridge::driven_high
@@ -344,19 +346,20 @@ TEST_P(Legs, FollowAnEnumeratedBridge)
     RecordProperty("peak_A", std::to_string(comparison.peak));
     EXPECT_GT(comparison.conducting, 100);
     EXPECT_GT(comparison.idle, 100) << "no leg ever floated";
-    EXPECT_LT(comparison.worst, euler_A + 1e-3 * comparison.peak);
+    EXPECT_LT(comparison.worst, euler * comparison.peak);
     plant_truth_t t = plant.truth();
-    EXPECT_NEAR(t.e_in_J, reference.e_in_J, 5e-3 * (std::fabs(t.e_in_J) + std::fabs(t.e_copper_J)));
+    EXPECT_NEAR(t.e_in_J, reference.e_in_J,
+                5e-3 * std::fabs(t.e_in_J) + euler * comparison.peak * 36.0 * 0.01);
 }
 
 INSTANTIATE_TEST_SUITE_P(Operation, Legs,
                          testing::Values(Pattern{"six_step", 40.0, {0.75, 0.0, -0.5}, 2e-6},
                                          Pattern{"six_step_backwards", -40.0, {-0.5, 0.8, 0.25}, 0.0},
                                          Pattern{"one_leg", 60.0, {0.5, -0.5, -0.5}, 2e-6},
-                                         Pattern{"one_leg_fast", 110.0, {-0.5, -0.5, 0.5}, 0.0},
-                                         Pattern{"dying_in_the_dead_time", 0.5, {0.504, 0.5, 0.496}, 4e-6},
-                                         Pattern{"small_currents_turning", 2.0, {0.52, 0.5, 0.48}, 3e-6}),
-                         [](const testing::TestParamInfo<Pattern> &info) { return info.param.name; });
+                                         Pattern{"one_leg_fast", 53.0, {-0.5, -0.5, 0.5}, 0.0},
+                                         Pattern{"dying_in_the_dead_time", 0.5, {0.6, 0.5, 0.4}, 4e-6},
+                                         Pattern{"turning_through_zero", 30.0, {0.52, 0.5, 0.48}, 3e-6}),
+                         [](const testing::TestParamInfo<Pattern> &test) { return test.param.name; });
 
 // One leg open, two on switches: the open terminal shows the star point and its EMF (METHODS.md 10.3.2.1).
 TEST(FloatingLeg, ShowsItsEmf)
@@ -393,7 +396,7 @@ TEST(FloatingLeg, CarriesNoCurrentInASaturatedSalientMachine)
     plant_config_t config = rig::ipm_1000();
     config.dclink.v_source_V = 80.0;
     rig::Plant plant(config, 0.5);
-    plant_set_speed(plant, 20.0);
+    plant_set_speed(plant, 5.0);
     plant_pwm_t pwm = rig::pwm(1.0, 0.0, 0.0);
     pwm.driven[2] = false;
     plant.run(pwm, 400);

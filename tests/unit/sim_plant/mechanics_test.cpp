@@ -114,12 +114,12 @@ TEST(Mechanics, LockedRotorRestsAndImposedSpeedHolds)
     config.mech.locked = true;
     rig::Plant plant(config, 1.0);
     plant_set_load(plant, 5.0);
-    plant.run(rig::pwm(0.5, 0.55, 0.5), 100);
+    plant.run(rig::pwm(0.5, 0.6, 0.5), 100);
     EXPECT_EQ(plant.truth().theta_e_rad, 1.0);
     EXPECT_GT(std::fabs(plant.truth().torque_Nm), 0.1);
     plant_set_locked(plant, false);
     plant_set_speed(plant, -20.0);
-    plant.run(rig::pwm(0.5, 0.55, 0.5), 100);
+    plant.run(rig::pwm(0.5, 0.6, 0.5), 100);
     EXPECT_EQ(plant.truth().omega_mech_rad_s, -20.0);
     EXPECT_NEAR(plant.truth().theta_e_rad, 1.0 - 20.0 * 3 * 0.01, 1e-12);
 }
