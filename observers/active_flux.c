@@ -3,7 +3,7 @@
 #include "firmware/math/root.h"
 
 /* psi_ref stays within this share of the amplitude that the parameters give. */
-#define BAND PM_Q(0.25)
+#define BAND PM_Q(0.5)
 
 static void set_reference(active_flux_t *self, pm_q_t psi)
 {
@@ -28,6 +28,8 @@ void active_flux_reset(active_flux_t *self, const active_flux_config_t *config, 
     const pm_dq_t psi = {.d = self->psi_ref + pm_mul(L_q, in->i_dq.d), .q = pm_mul(L_q, in->i_dq.q)};
     self->psi = pm_park_inverse(psi, in->dir);
     self->psi_d = self->psi_ref;
+    self->psi_q = 0;
+    self->R = config->R;
     self->i = in->i;
     self->k_seed = config->k_seed;
 }
@@ -35,8 +37,8 @@ void active_flux_reset(active_flux_t *self, const active_flux_config_t *config, 
 void active_flux_step(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in, obs_out_t *out)
 {
     const pm_ab_t i_mean = {.alpha = (in->i.alpha + self->i.alpha) >> 1, .beta = (in->i.beta + self->i.beta) >> 1};
-    self->psi.alpha += pm_frac(in->v.alpha - pm_mul(config->R, i_mean.alpha), config->t_s);
-    self->psi.beta += pm_frac(in->v.beta - pm_mul(config->R, i_mean.beta), config->t_s);
+    self->psi.alpha += pm_frac(in->v.alpha - pm_mul(self->R, i_mean.alpha), config->t_s);
+    self->psi.beta += pm_frac(in->v.beta - pm_mul(self->R, i_mean.beta), config->t_s);
     self->i = in->i;
 
     const pm_dq_t psi = pm_park(self->psi, in->dir);
@@ -51,6 +53,7 @@ void active_flux_step(active_flux_t *self, const active_flux_config_t *config, c
     self->psi.alpha += correction.alpha;
     self->psi.beta += correction.beta;
     self->psi_d = active.d;
+    self->psi_q = active.q;
 
     out->vector = active;
     out->eps = pm_gain_unit(active.q, self->inverse);
@@ -61,12 +64,13 @@ void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, p
 {
     const pm_q_t centre = nominal(config, i.d);
     const pm_q_t band = pm_mul(centre, BAND);
-    const pm_q_t share = PM_ONE - weight;
     pm_q_t target = self->psi_d;
-    if (weight < PM_ONE) {
+    if (weight == 0) {
         target = centre; /* the amplitude says little while the flux is tied to the position */
+        const pm_q_t change = pm_narrow(pm_gain(pm_mul(self->psi_q, i.q), config->k_R));
+        self->R = pm_clamp(self->R + change, config->R_min, config->R_max);
     }
     set_reference(self, pm_clamp(self->psi_ref + pm_frac(target - self->psi_ref, config->k_adapt), centre - band,
                                  centre + band));
-    self->k_seed = pm_mul(config->k_seed, pm_mul(share, share));
+    self->k_seed = weight == 0 ? config->k_seed : 0;
 }

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#define MAX_EVENTS 200
+#define MAX_EVENTS 200 /* of a segment; more would be chatter */
 
 /* While diodes may start or stop, a step is at most this turn: what begins and ends within it is missed, a
  * peak of EMF above the link of at most 5e-5. */
@@ -16,14 +16,9 @@ static inline double larger(double x, double y)
     return x > y ? x : y;
 }
 
-/* Point p moved by h times a mix of rates. */
-#define MOVE(to, count, mix)                                                                                 \
-    for (int e = 0; e < (count); e++) {                                                                      \
-        (to)->x[e] = from->x[e] + h * (mix);                                                                 \
-    }
-
-static inline void turn_and_evaluate(const circuit_t *c, const point_t *from, point_t *p, double turn_rad,
-                                     double rate[])
+/* What follows from the states of p, which lies a small turn from another point. */
+static inline void evaluate(const circuit_t *c, const point_t *from, double turn_rad, point_t *p,
+                            double rate[])
 {
     p->rotor = frame_turn(from->rotor, turn_rad);
     circuit_currents(&c->machine, p);
@@ -37,13 +32,20 @@ static double step(const circuit_t *c, const point_t *from, double h, const doub
 {
     double k2[ELEMENTS], k3[ELEMENTS];
     point_t p;
-    MOVE(&p, STATES, 0.5 * k1[e])
-    turn_and_evaluate(c, from, &p, h * 0.5 * k1[THETA_E], k2);
-    MOVE(&p, STATES, 0.75 * k2[e])
-    turn_and_evaluate(c, from, &p, h * 0.75 * k2[THETA_E], k3);
-    MOVE(to, ELEMENTS, 2.0 / 9.0 * k1[e] + 1.0 / 3.0 * k2[e] + 4.0 / 9.0 * k3[e])
-    double turn = h * (2.0 / 9.0 * k1[THETA_E] + 1.0 / 3.0 * k2[THETA_E] + 4.0 / 9.0 * k3[THETA_E]);
-    turn_and_evaluate(c, from, to, turn, k4);
+    for (int e = 0; e < STATES; e++) {
+        p.x[e] = from->x[e] + h * 0.5 * k1[e];
+    }
+    evaluate(c, from, h * 0.5 * k1[THETA_E], &p, k2);
+    for (int e = 0; e < STATES; e++) {
+        p.x[e] = from->x[e] + h * 0.75 * k2[e];
+    }
+    evaluate(c, from, h * 0.75 * k2[THETA_E], &p, k3);
+    double move[ELEMENTS];
+    for (int e = 0; e < ELEMENTS; e++) {
+        move[e] = h * (2.0 / 9.0 * k1[e] + 1.0 / 3.0 * k2[e] + 4.0 / 9.0 * k3[e]);
+        to->x[e] = from->x[e] + move[e];
+    }
+    evaluate(c, from, move[THETA_E], to, k4);
 
     double miss[STATES];
     for (int e = 0; e < STATES; e++) {
@@ -116,12 +118,10 @@ static double advance_once(circuit_t *c, double left_s, double rate[], int *even
     double rate_end[ELEMENTS];
     double h = next_step_s(c, left_s);
     double error = step(c, &c->now, h, rate, &next, rate_end);
-    c->steps++;
     while (error > 1.0 && h > 1e-9 * left_s) {
         h *= fmax(0.2, 0.9 / cbrt(error));
         c->step_s = h;
         error = step(c, &c->now, h, rate, &next, rate_end);
-        c->steps++;
     }
     if (error < 0.2 && h > 0.5 * c->step_s) {
         c->step_s = error < 0.02 ? 3.0 * h : 1.5 * h;
@@ -131,7 +131,6 @@ static double advance_once(circuit_t *c, double left_s, double rate[], int *even
         double g = excess(c, &next);
         if (g > 0.0 && *events < MAX_EVENTS) {
             h = locate(c, h, rate, &next, g);
-            c->events++;
             ++*events;
             assert(*events < MAX_EVENTS);
             changed = true;

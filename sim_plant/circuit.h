@@ -7,12 +7,13 @@
  * circuit_advance() uses the Bogacki-Shampine 3(2) pair with error control; a step is as long as the
  * segment if the error allows it and the rotor turns by less than FRAME_TURN_MAX_RAD. Inside a segment it
  * finds the instants at which a diode stops or starts, or friction sticks or breaks away, to the margins
- * stated in bridge.c, and goes on from there. Each such instant is met at most MAX_EVENTS times a segment.
+ * stated in bridge.c, and goes on from there; it asserts that this does not turn into chatter.
  *
  * The flux of a motor with floating legs is projected onto zero leg current after every step, so that the
  * error of integration does not leak into a current that cannot flow.
  *
- * Cost: three evaluations (about 50 multiplications each) a step. Tests: circuit_test.cpp. */
+ * Cost: three evaluations (about 50 multiplications each) a step. Tests: circuit_test.cpp, advance_test.cpp.
+ */
 #ifndef PLANT_CIRCUIT_H
 #define PLANT_CIRCUIT_H
 
@@ -59,7 +60,6 @@ typedef struct {
     double inv_psi_scale_1_Wb;
     double inv_v_scale_1_V;
     double step_s; /* what the error control would allow next */
-    unsigned long steps, events;
 } circuit_t;
 
 void circuit_init(circuit_t *circuit, const plant_config_t *config, double theta_e_rad);

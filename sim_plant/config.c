@@ -19,7 +19,7 @@ static bool not_negative(double x)
         return message;                                                                                      \
     }
 
-static const char *machine_fault(const plant_machine_t *m)
+const char *config_machine_fault(const plant_machine_t *m)
 {
     REQUIRE(not_negative(m->R_s_ohm), "machine.R_s_ohm must be finite and not negative")
     REQUIRE(positive(m->L_d0_H), "machine.L_d0_H must be positive")
@@ -60,7 +60,7 @@ static const char *dclink_fault(const plant_dclink_t *d)
     return NULL;
 }
 
-static const char *sensor_fault(const plant_sensor_t *s, double period_s)
+const char *config_sensor_fault(const plant_sensor_t *s, double period_s)
 {
     REQUIRE(s->bits >= 0 && s->bits <= 16, "sensor.bits must be 0 (ideal) to 16")
     REQUIRE(positive(s->i_full_scale_A), "sensor.i_full_scale_A must be positive")
@@ -76,11 +76,11 @@ static const char *sensor_fault(const plant_sensor_t *s, double period_s)
 
 const char *config_fault(const plant_config_t *config)
 {
-    const char *fault = machine_fault(&config->machine);
+    const char *fault = config_machine_fault(&config->machine);
     fault = fault ? fault : mech_fault(&config->mech);
     fault = fault ? fault : inverter_fault(&config->inverter);
     fault = fault ? fault : dclink_fault(&config->dclink);
-    fault = fault ? fault : sensor_fault(&config->sensor, 1.0 / config->inverter.f_pwm_Hz);
+    fault = fault ? fault : config_sensor_fault(&config->sensor, 1.0 / config->inverter.f_pwm_Hz);
     if (!fault && !(config->tolerance >= 0.0 && config->tolerance <= 1e-2)) {
         fault = "tolerance must be between 0 (default) and 0.01";
     }

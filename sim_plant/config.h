@@ -4,7 +4,9 @@
 
 #include "sim_plant/plant.h"
 
-/* NULL, or a message in static storage that names the field. */
+/* Each: NULL, or a message in static storage that names the field. */
 const char *config_fault(const plant_config_t *config);
+const char *config_machine_fault(const plant_machine_t *machine);
+const char *config_sensor_fault(const plant_sensor_t *sensor, double period_s);
 
 #endif

@@ -5,6 +5,7 @@
 #include "sim_plant/gates.h"
 #include "sim_plant/sensor.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -94,6 +95,7 @@ static void take_parameters(plant_t *plant)
     if (memcmp(&plant->machine, &plant->machine_known, sizeof plant->machine) == 0) {
         return;
     }
+    assert(!config_machine_fault(&plant->machine));
     circuit_t *circuit = &plant->circuit;
     circuit->e_copper_J += 1.5 * circuit->machine.R_s_ohm * circuit->now.x[INT_I2];
     circuit->e_on_J += 1.5 * circuit->bridge.r_on_ohm * circuit->now.x[INT_I2];
@@ -135,6 +137,7 @@ void plant_run_period(plant_t *plant)
 
 void plant_sample(plant_t *plant, plant_adc_t *adc)
 {
+    assert(!config_sensor_fault(&plant->sensor, plant->gates.period_s));
     if (plant->sensor.delay_s >= 0.0) {
         run_until(plant, fmin(plant->sensor.delay_s, plant->gates.period_s));
         capture(plant);
@@ -159,11 +162,13 @@ void plant_trip(plant_t *plant)
 
 void plant_set_load(plant_t *plant, double torque_Nm)
 {
+    assert(isfinite(torque_Nm));
     plant->circuit.mech.load_Nm = torque_Nm;
 }
 
 void plant_set_speed(plant_t *plant, double omega_mech_rad_s)
 {
+    assert(isfinite(omega_mech_rad_s));
     plant->circuit.mech.imposed = true;
     plant->circuit.mech.imposed_rad_s = omega_mech_rad_s;
 }
@@ -180,6 +185,7 @@ void plant_set_locked(plant_t *plant, bool locked)
 
 void plant_set_source(plant_t *plant, double v_source_V)
 {
+    assert(isfinite(v_source_V) && v_source_V >= 0.0);
     plant->circuit.link.v_source_V = v_source_V;
     if (plant->circuit.link.inv_C_1_F == 0.0) {
         plant->circuit.now.x[V_DC] = v_source_V;
@@ -198,6 +204,7 @@ plant_sensor_t *plant_sensor(plant_t *plant)
 
 void plant_turn_rotor(plant_t *plant, double angle_e_rad)
 {
+    assert(isfinite(angle_e_rad));
     double before_J = field_J(plant);
     plant->circuit.now.x[THETA_E] += angle_e_rad;
     circuit_refresh(&plant->circuit);

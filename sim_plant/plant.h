@@ -114,7 +114,7 @@ typedef struct plant plant_t;
 plant_t *plant_create(const plant_config_t *config, double theta_e_rad, const char **error);
 void plant_destroy(plant_t *plant);
 
-/* Values that a scenario may change between periods. */
+/* Values that a scenario may change between periods. One without sense is a bug of the caller: asserted. */
 void plant_set_load(plant_t *plant, double torque_Nm);         /* opposes positive rotation */
 void plant_set_speed(plant_t *plant, double omega_mech_rad_s); /* imposed by an ideal dynamometer ... */
 void plant_free_speed(plant_t *plant);                         /* ... and released again */

@@ -50,6 +50,11 @@ static pm_num_t square(pm_num_t x)
     return pm_num_mul(x, x);
 }
 
+static pm_num_t least(pm_num_t a, pm_num_t b)
+{
+    return pm_num_cmp(a, b) < 0 ? a : b;
+}
+
 /* A parameter over its base as a signal. */
 static pm_q_t per_unit(maker_t *m, drive_param_id_t id, pm_num_t base)
 {
@@ -141,8 +146,7 @@ static void make_flux_weakening(maker_t *m, field_weakening_config_t *c)
     /* loop of 20 Hz where the voltage is omega L_d i_d at base speed */
     const pm_num_t L_d = pm_num_div(si(m, DRIVE_PARAM_L_d), m->inductance);
     const pm_num_t k = pm_num_div(pm_num_mul(PM_NUM_TWO_PI, pm_num_ratio(20, SLOW_HZ)), L_d);
-    const pm_num_t top = pm_num_ratio(2, 5);
-    c->k = fixed(m, pm_num_cmp(k, top) > 0 ? top : k, FRAC_BITS, DRIVE_PARAM_L_d);
+    c->k = fixed(m, least(k, pm_num_ratio(2, 5)), FRAC_BITS, DRIVE_PARAM_L_d);
     c->i_max = per_unit(m, DRIVE_PARAM_i_fw_max, m->base.i);
 }
 
@@ -190,13 +194,26 @@ static void make_flux(maker_t *m, active_flux_config_t *c)
     c->psi_m = per_unit(m, DRIVE_PARAM_psi_m, m->base.psi);
     c->t_s = fixed(m, step, FRAC_BITS, DRIVE_PARAM_f_pwm);
     c->g = fixed(m, pm_num_mul(si(m, DRIVE_PARAM_flux_gain), step), FRAC_BITS, DRIVE_PARAM_flux_gain);
-    c->k_adapt = PM_FRAC(0.002);
-    c->k_seed = fixed(m, pm_num_mul(pm_num(300), m->base.t_s), FRAC_BITS, DRIVE_PARAM_f_pwm);
+    c->k_adapt = PM_FRAC(0.01);
+    /* tie of 300 rad/s; R follows in 8 ms at rated current */
+    const pm_num_t tie = pm_num(300);
+    const pm_num_t follow = pm_num_ratio(1, 8);
+    c->k_seed = fixed(m, pm_num_mul(tie, m->base.t_s), FRAC_BITS, DRIVE_PARAM_f_pwm);
+    c->k_R = 0;
+    if (m->params->resistance_adaptation != 0) {
+        const pm_num_t k_R = pm_num_div(pm_num_mul(follow, tie), pm_num_mul(m->base.omega, square(i_rated)));
+        c->k_R = fixed(m, k_R, GAIN_BITS, DRIVE_PARAM_i_rated);
+    }
+    c->R_min = c->R / 2;
+    c->R_max = c->R < PM_Q(4.0) ? c->R * 2 : PM_Q(7.9);
 }
 
 typedef struct {
     pm_num_t L_d, L_q, L_dq;
 } inductances_t;
+
+/* The loop gain follows the saturating saliency, but not further than this: beyond, it would amplify noise. */
+#define GAIN_RISE pm_num_ratio(5, 2)
 
 /* d eps-free signal / d angle: V_h T_s [(L_q - L_d) + 2 L_dq^2 / L_q] / D, a current per radian. */
 static pm_num_t carrier_slope(const maker_t *m, inductances_t L)
@@ -214,7 +231,7 @@ static void make_square(maker_t *m, pulsating_square_config_t *c)
                                  si(m, DRIVE_PARAM_L_dqh_rated)};
     const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
     const pm_num_t gain_0 = pm_num_div(m->base.i, carrier_slope(m, zero));
-    const pm_num_t gain_r = pm_num_div(m->base.i, carrier_slope(m, rated));
+    const pm_num_t gain_r = least(pm_num_div(m->base.i, carrier_slope(m, rated)), pm_num_mul(GAIN_RISE, gain_0));
     const pm_num_t full = pm_num_div(rated.L_dq, rated.L_q);
     const pm_num_t half = si(m, DRIVE_PARAM_cross_half);
 
@@ -285,7 +302,7 @@ static void make_pulses(maker_t *m, initial_pulses_config_t *c)
     c->periods = (uint16_t)whole;
     c->timeout = (uint16_t)(8 * whole + 50);
     const pm_num_t duty = pm_num_div(exact, pm_num(whole));
-    c->duty = pm_num_cmp(duty, pm_num(1)) > 0 ? PM_ONE : fixed(m, duty, Q_BITS, DRIVE_PARAM_i_pulse);
+    c->duty = fixed(m, least(duty, pm_num(1)), Q_BITS, DRIVE_PARAM_i_pulse);
     const pm_num_t noise = pm_num_div(si(m, DRIVE_PARAM_i_noise), m->base.i);
     c->i_zero = fixed(m, pm_num_mul(pm_num(5), noise), Q_BITS, DRIVE_PARAM_i_noise);
     /* y of the unsaturated machine is 3 i_pulse (L_q - L_d) / L_q */

@@ -3,11 +3,13 @@
 #include "firmware/math/filter.h"
 #include "firmware/math/trig.h"
 
-/* Means of eps and misfit at 1 kHz: 10 ms. */
-#define K_MEAN PM_FRAC(0.1)
-/* The position counts as lost when the mean error signal reaches 0.5 rad or the model is off by 0.6. */
-#define EPS_LOST    PM_Q(0.5)
-#define MISFIT_LOST PM_Q(0.6)
+/* Means of |eps| and |misfit| at 1 kHz: 20 ms. */
+#define K_MEAN PM_FRAC(0.05)
+/* The position counts as lost when the mean error signal reaches 0.3 rad or the model is off by 0.5. */
+#define PER_EPS_LOST    PM_Q(1.0 / 0.3)
+#define PER_MISFIT_LOST PM_Q(1.0 / 0.5)
+/* The weight follows the speed through 5 ms, so that noise of the speed does not move it. */
+#define K_SPEED PM_FRAC(0.2)
 
 void position_reset(position_t *self, const position_config_t *config, pm_angle_t theta, pm_ab_t i)
 {
@@ -52,7 +54,7 @@ void position_follow(position_t *self, const position_config_t *config, pm_ab_t 
 
 static void set_weight(position_t *self, const position_config_t *config)
 {
-    const pm_q_t speed = pm_abs(self->pll.omega);
+    const pm_q_t speed = pm_abs(pm_lp1(&self->omega_mean, self->pll.omega, K_SPEED));
     if (!config->injection) {
         self->weight = PM_ONE;
         return;
@@ -74,13 +76,22 @@ static pm_frac_t between(pm_frac_t low, pm_frac_t high, pm_q_t weight)
     return low + pm_mul(high - low, weight);
 }
 
+/* Means of magnitudes: a source that has slipped shows errors of either sign. While both lead, both must agree. */
 static void set_quality(position_t *self)
 {
-    const pm_q_t misfit = self->weight == PM_ONE ? self->flux_out.misfit : self->square_out.misfit;
-    const pm_q_t eps = self->weight == PM_ONE ? self->flux_out.eps : self->square_out.eps;
+    pm_q_t eps = 0;
+    pm_q_t misfit = 0;
+    if (self->weight > 0) {
+        eps = pm_abs(self->flux_out.eps);
+        misfit = pm_abs(self->flux_out.misfit);
+    }
+    if (self->weight < PM_ONE) {
+        eps = pm_max(eps, pm_abs(self->square_out.eps));
+        misfit = pm_max(misfit, pm_abs(self->square_out.misfit));
+    }
     (void)pm_lp1(&self->eps_mean, eps, K_MEAN);
     (void)pm_lp1(&self->misfit_mean, misfit, K_MEAN);
-    const pm_q_t worst = pm_max(pm_mul(pm_abs(self->eps_mean), PM_Q(1.0 / 0.5)), pm_mul(pm_abs(self->misfit_mean), PM_Q(1.0 / 0.6)));
+    const pm_q_t worst = pm_max(pm_mul(self->eps_mean, PER_EPS_LOST), pm_mul(self->misfit_mean, PER_MISFIT_LOST));
     self->quality = pm_max(0, PM_ONE - worst);
 }
 

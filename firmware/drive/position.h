@@ -30,7 +30,8 @@ typedef struct {
     obs_out_t flux_out, square_out;
     pm_q_t weight;   /* 0: injection, 1: flux observer */
     bool inject;     /* carrier on */
-    pm_q_t eps_mean; /* filtered for the quality */
+    pm_q_t omega_mean; /* filtered for the weight */
+    pm_q_t eps_mean;   /* filtered for the quality */
     pm_q_t misfit_mean;
     pm_q_t quality;
 } position_t;

@@ -70,11 +70,18 @@ static inline int32_t pm_clamp(int32_t x, int32_t lo, int32_t hi) /* lo <= hi */
 /* Within -2^n ... 2^n - 1, n <= 31; a single SSAT on Cortex-M4 when n is a literal. */
 static inline int32_t pm_sat(int32_t x, unsigned n)
 {
+#if PM_HAS_DSP
+    if (__builtin_constant_p(n)) { /* the compiler finds SSAT by itself only now and then */
+        int32_t r;
+        __asm__("ssat %0, %1, %2" : "=r"(r) : "i"(n + 1U), "r"(x));
+        return r;
+    }
+#endif
     const int32_t top = (int32_t)((1U << n) - 1U);
     return pm_clamp(x, -top - 1, top);
 }
 
-#if defined(__ARM_FEATURE_DSP) && __ARM_FEATURE_DSP && defined(__thumb2__)
+#if PM_HAS_DSP
 
 static inline int32_t pm_add_sat(int32_t a, int32_t b)
 {

@@ -11,6 +11,12 @@
 #include <stdint.h>
 
 #if defined(__ARM_FEATURE_DSP) && __ARM_FEATURE_DSP && defined(__thumb2__)
+#define PM_HAS_DSP 1
+#else
+#define PM_HAS_DSP 0
+#endif
+
+#if PM_HAS_DSP
 
 static inline int32_t pm_mulh(int32_t a, int32_t b)
 {

@@ -6,7 +6,8 @@
  *   pm_pll_predict() moves theta from k-1 to k; pm_pll_correct() uses eps(k).
  * Ranges: |eps| <= pi, |omega_limit| <= 4, kp < 0.5, |omega| k_theta < half a turn per step; the speed
  * saturates at the limit. Angle steps are rounded to 2^-30 turn, the speed to 2^-28; an error below 2^-29 /
- * ki does not move the speed. Cost: 3 + 8 instructions inline beside loads and stores. Tests:
+ * ki does not move the speed. Cost:
+ * docs/decisions/001-signal-format.md. Tests:
  * tests/unit/math/pll_test.cpp. */
 #ifndef PM_MATH_PLL_H
 #define PM_MATH_PLL_H

@@ -76,7 +76,7 @@ pm_q_t pm_div(pm_q_t num, pm_q_t x)
     int32_t q;
     if (n >= m) {
         const unsigned left = n - m;
-        q = left > 3U || p > (PM_Q_MAX >> left) ? PM_Q_MAX : p << left;
+        q = p > (PM_Q_MAX >> left) ? PM_Q_MAX : p << left;
     } else {
         const unsigned right = m - n;
         q = (p + (1 << (right - 1U))) >> right;

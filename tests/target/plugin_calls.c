@@ -29,8 +29,8 @@ struct qemu_plugin_tb;
 struct qemu_plugin_insn;
 extern void qemu_plugin_register_vcpu_tb_trans_cb(qemu_plugin_id_t,
                                                   void (*)(qemu_plugin_id_t, struct qemu_plugin_tb *));
-extern void qemu_plugin_register_vcpu_tb_exec_cb(struct qemu_plugin_tb *, void (*)(unsigned, void *), int flags,
-                                                 void *);
+extern void qemu_plugin_register_vcpu_tb_exec_cb(struct qemu_plugin_tb *, void (*)(unsigned, void *),
+                                                 int flags, void *);
 extern void qemu_plugin_register_atexit_cb(qemu_plugin_id_t, void (*)(qemu_plugin_id_t, void *), void *);
 extern size_t qemu_plugin_tb_n_insns(const struct qemu_plugin_tb *);
 extern uint64_t qemu_plugin_tb_vaddr(const struct qemu_plugin_tb *);
@@ -111,7 +111,7 @@ static void push(uint32_t return_to, bool tail, struct function *measured)
     if (depth == MAX_DEPTH) {
         fail("calls nested too deeply");
     }
-    stack[depth] = (struct frame){ return_to, tail, measured, total };
+    stack[depth] = (struct frame){return_to, tail, measured, total};
     depth++;
     open_measured += measured != NULL;
 }
@@ -134,7 +134,8 @@ static void on_block(unsigned vcpu, void *user)
     const struct block *b = user;
     struct function *f = b->function;
     bool enters = f != NULL && f->addr == b->start;
-    bool called = pending_return != 0 && b->start != pending_return; /* equal: a call skipped by its IT block */
+    bool called =
+        pending_return != 0 && b->start != pending_return; /* equal: a call skipped by its IT block */
 
     if (called) {
         push(pending_return, false, enters && f->measured ? f : NULL);
@@ -207,7 +208,7 @@ static void read_map(const char *path)
     }
     rewind(file);
     while (fgets(line, sizeof line, file) != NULL) {
-        struct function f = { 0 };
+        struct function f = {0};
         char kind = 0;
         if (sscanf(line, "%c %" SCNx32 " %95s", &kind, &f.addr, f.name) < 2) {
             fail("bad line in the map");

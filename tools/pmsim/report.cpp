@@ -116,7 +116,8 @@ std::string runs_csv(const ScenarioFile &file, const SweepResult &result)
     for (const auto &entry : file.runs().front().variables) {
         text += "," + entry.first;
     }
-    for (const Expectation &expectation : file.scenario(file.runs().front()).expect) {
+    const Scenario first = file.scenario(file.runs().front());
+    for (const Expectation &expectation : first.expect) {
         text += ",\"" + expectation.label + "\",pass";
     }
     text += '\n';

@@ -86,7 +86,7 @@ class Pool
                 return;
             }
             try {
-                result_.runs[i] = run_scenario(file_.scenario(file_.runs()[i]), nullptr, &done_us_);
+                result_.runs[i] = run_scenario(scenario(i), nullptr, &done_us_);
             } catch (...) {
                 const std::lock_guard<std::mutex> lock(mutex_);
                 error_ = error_ ? error_ : std::current_exception();
@@ -119,6 +119,12 @@ class Pool
     }
 
   private:
+    Scenario scenario(size_t i) // yaml-cpp is not made for threads
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        return file_.scenario(file_.runs()[i]);
+    }
+
     const ScenarioFile &file_;
     SweepResult result_;
     std::atomic<size_t> next_{0}, finished_{0};

@@ -86,13 +86,15 @@ std::vector<std::string> variable_names(const Map &document)
 {
     std::vector<std::string> names;
     if (const auto cases = document.find("cases")) {
-        for (const auto &entry : read_cases(*cases).front().variables) {
+        const Variables first = read_cases(*cases).front().variables;
+        for (const auto &entry : first) {
             names.push_back(entry.first);
         }
         names.emplace_back("case");
     }
     if (const auto sweep = document.find("sweep")) {
-        for (const std::string &key : Map(*sweep).keys()) {
+        const Map axes(*sweep);
+        for (const std::string &key : axes.keys()) {
             names.push_back(key);
         }
     }

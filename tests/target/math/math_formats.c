@@ -1,4 +1,4 @@
-/* Runs the kernel of every number format, for count.py: see README.md of this folder. */
+/* Runs the kernel of every number format, for count.py: see docs/decisions/001-signal-format.md. */
 #include <stddef.h>
 
 #include "tests/target/math/formats.h"

@@ -9,22 +9,22 @@ int32_t known_tail(int32_t x);
 int32_t known_nested(int32_t x);
 int32_t known_skipped_call(int32_t x);
 
-#define FUNCTION(name) \
-    ".balign 4\n.global " #name "\n.thumb_func\n.type " #name ", %function\n" #name ":\n"
-#define END(name) ".size " #name ", . - " #name "\n"
+#define FUNCTION(name) ".balign 4\n.global " #name "\n.thumb_func\n.type " #name ", %function\n" #name ":\n"
+#define END(name)      ".size " #name ", . - " #name "\n"
 
-__asm(".syntax unified\n.text\n.thumb\n"
-      /* 3 */
-      FUNCTION(known_leaf) "adds r0, #1\n nop\n bx lr\n" END(known_leaf)
-      /* 1 + 2 n */
-      FUNCTION(known_loop) "1: subs r0, #1\n bne 1b\n bx lr\n" END(known_loop)
-      /* 2 + leaf 3 = 5, left by a tail call */
-      FUNCTION(known_tail) "nop\n b.w known_leaf\n" END(known_tail)
-      /* 4 + leaf 3 + tail 5 = 12 */
-      FUNCTION(known_nested) "push {r4, lr}\n bl known_leaf\n bl known_tail\n pop {r4, pc}\n" END(known_nested)
-      /* 5 when the call's condition fails, 8 with the leaf */
-      FUNCTION(known_skipped_call) "push {r4, lr}\n cmp r0, #0\n it eq\n bleq known_leaf\n pop {r4, pc}\n"
-      END(known_skipped_call));
+__asm(
+    ".syntax unified\n.text\n.thumb\n"
+    /* 3 */
+    FUNCTION(known_leaf) "adds r0, #1\n nop\n bx lr\n" END(known_leaf)
+    /* 1 + 2 n */
+    FUNCTION(known_loop) "1: subs r0, #1\n bne 1b\n bx lr\n" END(known_loop)
+    /* 2 + leaf 3 = 5, left by a tail call */
+    FUNCTION(known_tail) "nop\n b.w known_leaf\n" END(known_tail)
+    /* 4 + leaf 3 + tail 5 = 12 */
+    FUNCTION(known_nested) "push {r4, lr}\n bl known_leaf\n bl known_tail\n pop {r4, pc}\n" END(known_nested)
+    /* 5 when the call's condition fails, 8 with the leaf */
+    FUNCTION(known_skipped_call) "push {r4, lr}\n cmp r0, #0\n it eq\n bleq known_leaf\n pop {r4, pc}\n" END(
+        known_skipped_call));
 
 int main(int argc, char **argv)
 {

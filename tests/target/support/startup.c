@@ -47,24 +47,24 @@ static int semihost(uint32_t operation, const void *arguments)
 
 void _exit(int status)
 {
-    const uint32_t arguments[2] = { EXIT_APPLICATION, (uint32_t)status };
+    const uint32_t arguments[2] = {EXIT_APPLICATION, (uint32_t)status};
     (void)semihost(SYS_EXIT_EXTENDED, arguments);
     for (;;) {
     }
 }
 
-/* newlib's 0, 1, 2 are the console, which semihosting opens by name: "r" for input, "w" for output. The host counts
- * its own handles from 1, so a file's number is its handle beyond these three. */
+/* newlib's 0, 1, 2 are the console, which semihosting opens by name: "r" for input, "w" for output. The host
+ * counts its own handles from 1, so a file's number is its handle beyond these three. */
 #define FIRST_FILE 3
 
 static int host_file(int file)
 {
-    static int console[3] = { -1, -1, -1 };
+    static int console[3] = {-1, -1, -1};
     if (file >= FIRST_FILE) {
         return file - FIRST_FILE;
     }
     if (console[file] < 0) {
-        const uintptr_t arguments[3] = { (uintptr_t) ":tt", file == 0 ? 0u : file == 1 ? 4u : 8u, 3u };
+        const uintptr_t arguments[3] = {(uintptr_t) ":tt", file == 0 ? 0u : file == 1 ? 4u : 8u, 3u};
         console[file] = semihost(SYS_OPEN, arguments);
     }
     return console[file];
@@ -73,7 +73,7 @@ static int host_file(int file)
 int _open(const char *path, int flags, int mode)
 {
     (void)mode;
-    const uintptr_t arguments[3] = { (uintptr_t)path, (flags & 3) == 0 ? 1u : 5u, strlen(path) };
+    const uintptr_t arguments[3] = {(uintptr_t)path, (flags & 3) == 0 ? 1u : 5u, strlen(path)};
     int file = semihost(SYS_OPEN, arguments);
     if (file < 0) {
         errno = ENOENT;
@@ -84,26 +84,26 @@ int _open(const char *path, int flags, int mode)
 
 int _close(int file)
 {
-    const uintptr_t arguments[1] = { (uintptr_t)host_file(file) };
+    const uintptr_t arguments[1] = {(uintptr_t)host_file(file)};
     return semihost(SYS_CLOSE, arguments);
 }
 
 int _read(int file, char *data, int size)
 {
-    const uintptr_t arguments[3] = { (uintptr_t)host_file(file), (uintptr_t)data, (uintptr_t)size };
+    const uintptr_t arguments[3] = {(uintptr_t)host_file(file), (uintptr_t)data, (uintptr_t)size};
     return size - semihost(SYS_READ, arguments);
 }
 
 int _write(int file, const char *data, int size)
 {
-    const uintptr_t arguments[3] = { (uintptr_t)host_file(file), (uintptr_t)data, (uintptr_t)size };
+    const uintptr_t arguments[3] = {(uintptr_t)host_file(file), (uintptr_t)data, (uintptr_t)size};
     return size - semihost(SYS_WRITE, arguments);
 }
 
 int _lseek(int file, int offset, int whence)
 {
     /* Only absolute positions exist in semihosting; relative ones are not needed by sequential readers. */
-    const uintptr_t arguments[2] = { (uintptr_t)host_file(file), (uintptr_t)offset };
+    const uintptr_t arguments[2] = {(uintptr_t)host_file(file), (uintptr_t)offset};
     if (whence != 0 || semihost(SYS_SEEK, arguments) < 0) {
         errno = ESPIPE;
         return -1;
@@ -151,7 +151,7 @@ void *_sbrk(ptrdiff_t step)
 /* The command line, split at blanks; the first word is the program's path. */
 static int split_command_line(char *line, uint32_t size, char **argv, int most)
 {
-    uintptr_t arguments[2] = { (uintptr_t)line, size };
+    uintptr_t arguments[2] = {(uintptr_t)line, size};
     int argc = 0;
     if (semihost(SYS_GET_CMDLINE, arguments) != 0) {
         return 0;
@@ -183,11 +183,7 @@ void pm_fault_handler(void)
 }
 
 __attribute__((section(".vectors"), used)) static const uintptr_t vectors[16] = {
-    (uintptr_t)pm_stack_top,
-    (uintptr_t)pm_reset_handler,
-    (uintptr_t)pm_fault_handler,
-    (uintptr_t)pm_fault_handler,
-    (uintptr_t)pm_fault_handler,
-    (uintptr_t)pm_fault_handler,
+    (uintptr_t)pm_stack_top,     (uintptr_t)pm_reset_handler, (uintptr_t)pm_fault_handler,
+    (uintptr_t)pm_fault_handler, (uintptr_t)pm_fault_handler, (uintptr_t)pm_fault_handler,
     (uintptr_t)pm_fault_handler,
 };

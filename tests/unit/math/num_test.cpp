@@ -14,8 +14,8 @@ namespace
 using samples::corners;
 using samples::Random;
 
-// num.h promises 2^-30; 2^-29 is what configuration code relies on.
-constexpr long double kRelative = 0x1p-30L;
+// Half a unit of the last of 31 places, and a quarter of that for the quotient that was cut before.
+constexpr long double kRelative = 0x1.4p-31L;
 constexpr int kCount = 1000000;
 
 long double value(pm_num_t x)

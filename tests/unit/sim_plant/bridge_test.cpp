@@ -358,7 +358,7 @@ INSTANTIATE_TEST_SUITE_P(Operation, Legs,
                                          Pattern{"one_leg", 60.0, {0.5, -0.5, -0.5}, 2e-6},
                                          Pattern{"one_leg_fast", 53.0, {-0.5, -0.5, 0.5}, 0.0},
                                          Pattern{"dying_in_the_dead_time", 0.5, {0.6, 0.5, 0.4}, 4e-6},
-                                         Pattern{"turning_through_zero", 30.0, {0.52, 0.5, 0.48}, 3e-6}),
+                                         Pattern{"turning_through_zero", 9.0, {0.52, 0.5, 0.48}, 4e-6}),
                          [](const testing::TestParamInfo<Pattern> &test) { return test.param.name; });
 
 // One leg open, two on switches: the open terminal shows the star point and its EMF (METHODS.md 10.3.2.1).
