@@ -5,6 +5,8 @@
  * the slope of the fundamental removed by a second difference, is h = s (delta_k - delta_k-1)/2 in the present frame:
  *   h_d = F [L_sa + K cos(2e + th_m)] / D,   h_q = F K sin(2e + th_m) / D,   F = V_h T_s, e = position error
  *   eps = gain(i_q) (h_q + lambda(i_q) h_d),  lambda = L_dqh / L_qh: zero at e = 0 whatever the load
+ * The rotor turns while the current changes, so the change belongs half a period back: h_q += (w T_s/2) h_d. Without
+ * it the position lags by L_q/(L_q - L_d) times as much.
  * lambda = i_q (a + b |i_q|), gain = g_0 + g_2 i_q^2 from the commissioned inductances (config.c).
  *
  * Order in period k: pulsating_square_demodulate() with the current at k, then pulsating_square_output() for the
@@ -21,6 +23,7 @@ typedef struct {
     pm_q_t v_h;
     pm_q_t lambda_1, lambda_2; /* a, b */
     int32_t gain_0, gain_2;    /* rad per unit of current, and its change with i_q^2, Q20 */
+    pm_frac_t half_step;       /* T_s w_base / 2: rotation over half a period, per unit of speed */
     pm_q_t h_d;                /* expected h_d without load */
     int32_t h_d_inverse;       /* Q20 */
 } pulsating_square_config_t;

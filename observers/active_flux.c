@@ -60,17 +60,26 @@ void active_flux_step(active_flux_t *self, const active_flux_config_t *config, c
     out->misfit = pm_gain_unit(error_d, self->inverse);
 }
 
-void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, pm_dq_t i, pm_q_t weight)
+static void follow_resistance(active_flux_t *self, const active_flux_config_t *config, pm_q_t i_q)
+{
+    const pm_q_t change = pm_narrow(pm_gain(pm_mul(self->psi_q, i_q), config->k_R));
+    self->R = pm_clamp(self->R + change, config->R_min, config->R_max);
+}
+
+void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, pm_dq_t i, pm_q_t omega, pm_q_t weight)
 {
     const pm_q_t centre = nominal(config, i.d);
-    const pm_q_t band = pm_mul(centre, BAND);
-    pm_q_t target = self->psi_d;
     if (weight == 0) {
-        target = centre; /* the amplitude says little while the flux is tied to the position */
-        const pm_q_t change = pm_narrow(pm_gain(pm_mul(self->psi_q, i.q), config->k_R));
-        self->R = pm_clamp(self->R + change, config->R_min, config->R_max);
+        /* tied to the position, the flux says nothing of the amplitude */
+        self->k_seed = config->k_seed;
+        set_reference(self, centre);
+        if (pm_abs(omega) < config->omega_R) {
+            follow_resistance(self, config, i.q);
+        }
+    } else {
+        const pm_q_t band = pm_mul(centre, BAND);
+        const pm_q_t psi = self->psi_ref + pm_frac(self->psi_d - self->psi_ref, config->k_adapt);
+        self->k_seed = 0;
+        set_reference(self, pm_clamp(psi, centre - band, centre + band));
     }
-    set_reference(self, pm_clamp(self->psi_ref + pm_frac(target - self->psi_ref, config->k_adapt), centre - band,
-                                 centre + band));
-    self->k_seed = weight == 0 ? config->k_seed : 0;
 }

@@ -32,6 +32,7 @@ typedef struct {
     pm_frac_t k_seed;   /* T_s k_q at weight 0, Q32 */
     pm_gain_t k_R;      /* adaptation of R per slow step, Q26; 0: off */
     pm_q_t R_min, R_max;
+    pm_q_t omega_R;     /* R adapts below this speed: above, errors of psi_m outweigh it */
 } active_flux_config_t;
 
 typedef struct {
@@ -50,6 +51,6 @@ void active_flux_reset(active_flux_t *self, const active_flux_config_t *config, 
 void active_flux_step(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in, obs_out_t *out);
 
 /* At 1 kHz: adapts psi_ref and R, ties the flux to the position at weight 0. */
-void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, pm_dq_t i, pm_q_t weight);
+void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, pm_dq_t i, pm_q_t omega, pm_q_t weight);
 
 #endif

@@ -16,6 +16,7 @@ void bridge_init(bridge_t *bridge, const plant_config_t *config)
         .v_diode_V = config->inverter.v_diode_V,
         .r_on_ohm = config->inverter.r_on_ohm,
         .zone_A = ZONE * config->sensor.i_full_scale_A,
+        .switched_1_A = 1.0 / (ZONE * config->sensor.i_full_scale_A),
         .floating = PLANT_LEGS,
     };
 }
@@ -32,25 +33,20 @@ static bool is_diode(const bridge_t *bridge, int k)
 
 static void summarise(bridge_t *bridge)
 {
+    abc_t upper, drop_V;
     bridge->floating = 0;
     bridge->diodes = 0;
-    bridge->rail = (ab_t){0.0, 0.0};
-    bridge->diode_drop_V = (ab_t){0.0, 0.0};
     for (int k = 0; k < PLANT_LEGS; k++) {
         leg_t leg = bridge->leg[k];
         bridge->floating += leg == LEG_FLOATING;
         bridge->diodes += is_diode(bridge, k);
-        bridge->inv_zone_1_A[k] = leg == LEG_LOW || leg == LEG_HIGH ? 1.0 / bridge->zone_A : 0.0;
-        if (leg == LEG_HIGH || leg == LEG_DIODE_HIGH) {
-            bridge->rail.alpha += 2.0 / 3.0 * frame_axis[k].alpha;
-            bridge->rail.beta += 2.0 / 3.0 * frame_axis[k].beta;
-        }
-        if (is_diode(bridge, k)) {
-            double drop_V = leg == LEG_DIODE_LOW ? bridge->v_diode_V : -bridge->v_diode_V;
-            bridge->diode_drop_V.alpha += 2.0 / 3.0 * frame_axis[k].alpha * drop_V;
-            bridge->diode_drop_V.beta += 2.0 / 3.0 * frame_axis[k].beta * drop_V;
-        }
+        bridge->inv_zone_1_A[k] = leg == LEG_LOW || leg == LEG_HIGH ? bridge->switched_1_A : 0.0;
+        upper.x[k] = leg == LEG_HIGH || leg == LEG_DIODE_HIGH ? 1.0 : 0.0;
+        drop_V.x[k] = leg == LEG_DIODE_LOW ? bridge->v_diode_V : 0.0;
+        drop_V.x[k] = leg == LEG_DIODE_HIGH ? -bridge->v_diode_V : drop_V.x[k];
     }
+    bridge->rail = frame_from_abc(upper);
+    bridge->diode_drop_V = frame_from_abc(drop_V);
 }
 
 static leg_t diode_for(const bridge_t *bridge, double i_A)
@@ -160,8 +156,9 @@ double bridge_leg_V(const bridge_t *bridge, const machine_t *machine, const moto
     if (bridge->leg[k] == LEG_FLOATING) {
         return bridge_floating_V(bridge, machine, port, k);
     }
-    double drop_V = bridge->r_on_ohm * frame_dot(frame_axis[k], port->i_A);
-    drop_V += bridge->v_switch_V * bridge_switch_share(bridge, port->i_A, k);
+    double i_A = frame_dot(frame_axis[k], port->i_A);
+    double drop_V = bridge->r_on_ohm * i_A;
+    drop_V += bridge->v_switch_V * bridge_switch_share(i_A * bridge->inv_zone_1_A[k]);
     if (is_diode(bridge, k)) {
         drop_V += bridge->leg[k] == LEG_DIODE_LOW ? bridge->v_diode_V : -bridge->v_diode_V;
     }
@@ -212,20 +209,21 @@ static double reverse_current(const bridge_t *bridge, ab_t i_A, int k)
 {
     double i_leg_A = frame_dot(frame_axis[k], i_A);
     double reverse_A = bridge->leg[k] == LEG_DIODE_LOW ? -i_leg_A : i_leg_A;
-    return reverse_A * ZONE / bridge->zone_A - NO_CURRENT;
+    return reverse_A * ZONE * bridge->switched_1_A - NO_CURRENT;
 }
 
 void bridge_stop_diodes(bridge_t *bridge, ab_t i_A)
 {
-    if (bridge->diodes == 0) {
-        return;
-    }
-    for (int k = 0; k < PLANT_LEGS; k++) {
+    bool stopped = false;
+    for (int k = 0; k < PLANT_LEGS && bridge->diodes > 0; k++) {
         if (is_diode(bridge, k) && reverse_current(bridge, i_A, k) > 0.0) {
             bridge->leg[k] = LEG_FLOATING;
+            stopped = true;
         }
     }
-    drop_lone_diode(bridge);
+    if (stopped) {
+        drop_lone_diode(bridge);
+    }
 }
 
 void bridge_start_diodes(bridge_t *bridge, const machine_t *machine, const motor_port_t *port)

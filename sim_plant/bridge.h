@@ -24,6 +24,7 @@ typedef struct {
     double v_diode_V;
     double r_on_ohm;
     double zone_A;
+    double switched_1_A; /* 1 / zone_A */
     leg_t leg[PLANT_LEGS];
     /* what follows from leg[] */
     int floating;
@@ -66,10 +67,9 @@ double bridge_floating_V(const bridge_t *bridge, const machine_t *machine, const
 /* Voltage of any leg against the negative rail. */
 double bridge_leg_V(const bridge_t *bridge, const machine_t *machine, const motor_port_t *port, int k);
 
-/* Drop of the switch of leg k in units of v_switch; 0 when none is closed. */
-static inline double bridge_switch_share(const bridge_t *b, ab_t i_A, int k)
+/* Drop of a closed switch at a current x in units of the zone, in units of v_switch. */
+static inline double bridge_switch_share(double x)
 {
-    double x = frame_dot(frame_axis[k], i_A) * b->inv_zone_1_A[k];
     x = x > 1.0 ? 1.0 : x;
     x = x < -1.0 ? -1.0 : x;
     return x * (1.5 - 0.5 * x * x);
@@ -78,14 +78,17 @@ static inline double bridge_switch_share(const bridge_t *b, ab_t i_A, int k)
 /* All drops but r_on, as a voltage of the motor. */
 static inline ab_t bridge_drop_V(const bridge_t *b, ab_t i_A)
 {
-    ab_t v = b->diode_drop_V;
-    if (b->v_switch_V > 0.0) {
-        for (int k = 0; k < PLANT_LEGS; k++) {
-            double x = 2.0 / 3.0 * b->v_switch_V * bridge_switch_share(b, i_A, k);
-            v.alpha += frame_axis[k].alpha * x;
-            v.beta += frame_axis[k].beta * x;
-        }
+    if (b->v_switch_V == 0.0) {
+        return b->diode_drop_V;
     }
+    abc_t i = frame_to_abc(i_A);
+    abc_t share;
+    for (int k = 0; k < PLANT_LEGS; k++) {
+        share.x[k] = bridge_switch_share(i.x[k] * b->inv_zone_1_A[k]);
+    }
+    ab_t v = frame_from_abc(share);
+    v.alpha = b->diode_drop_V.alpha + b->v_switch_V * v.alpha;
+    v.beta = b->diode_drop_V.beta + b->v_switch_V * v.beta;
     return v;
 }
 

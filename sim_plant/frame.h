@@ -24,6 +24,25 @@ typedef struct {
  * the others adds (2/3) axis[k] u. */
 static const ab_t frame_axis[3] = {{1.0, 0.0}, {-0.5, SQRT3_2}, {-0.5, -SQRT3_2}};
 
+/* Phase values of a vector, and the vector of phase values. */
+typedef struct {
+    double x[3];
+} abc_t;
+
+static inline abc_t frame_to_abc(ab_t v)
+{
+    double half = -0.5 * v.alpha;
+    double side = SQRT3_2 * v.beta;
+    abc_t to = {{v.alpha, half + side, half - side}};
+    return to;
+}
+
+static inline ab_t frame_from_abc(abc_t v)
+{
+    ab_t to = {2.0 / 3.0 * v.x[0] - 1.0 / 3.0 * (v.x[1] + v.x[2]), 2.0 / 3.0 * SQRT3_2 * (v.x[1] - v.x[2])};
+    return to;
+}
+
 static inline double frame_dot(ab_t x, ab_t y)
 {
     return x.alpha * y.alpha + x.beta * y.beta;

@@ -204,6 +204,7 @@ static void make_flux(maker_t *m, active_flux_config_t *c)
         const pm_num_t k_R = pm_num_div(pm_num_mul(follow, tie), pm_num_mul(m->base.omega, square(i_rated)));
         c->k_R = fixed(m, k_R, GAIN_BITS, DRIVE_PARAM_i_rated);
     }
+    c->omega_R = speed(m, DRIVE_PARAM_speed_low) / 2;
     c->R_min = c->R / 2;
     c->R_max = c->R < PM_Q(4.0) ? c->R * 2 : PM_Q(7.9);
 }
@@ -250,6 +251,8 @@ static void make_square(maker_t *m, pulsating_square_config_t *c)
     const pm_num_t flux = pm_num_mul(si(m, DRIVE_PARAM_v_injection), m->base.t_s);
     const pm_num_t h_d = pm_num_div(pm_num_div(flux, zero.L_d), m->base.i);
     c->h_d = fixed(m, h_d, Q_BITS, DRIVE_PARAM_v_injection);
+    c->half_step = fixed(m, pm_num_mul(pm_num_mul(m->base.t_s, m->base.omega), pm_num_ratio(1, 2)), FRAC_BITS,
+                         DRIVE_PARAM_f_pwm);
     c->h_d_inverse = fixed(m, pm_num_div(pm_num(1), h_d), SMALL_BITS, DRIVE_PARAM_v_injection);
 }
 
@@ -376,7 +379,7 @@ static void check_machine(maker_t *m)
         refuse(m, DRIVE_PARAM_L_q, "below L_d: inverse saliency is not supported");
     } else if (D <= 0) {
         refuse(m, DRIVE_PARAM_L_dqh_rated, "larger than the incremental inductances allow");
-    } else if (p->start_method == 1 && p->L_q == p->L_d) {
+    } else if (p->start_method % 2 == 1 && p->L_q == p->L_d) {
         refuse(m, DRIVE_PARAM_start_method, "injection needs L_q above L_d");
     }
 }
@@ -392,14 +395,15 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     make_base(&m);
     config->base = m.base;
     config->pole_pairs = pole_pairs(&m);
-    config->injection = params->start_method == 1 || (params->start_method == 0 && salient(&m));
+    config->injection = params->start_method % 2 == 1 || (params->start_method == 0 && salient(&m));
+    config->align_first = !config->injection || params->start_method == 3;
     make_modulator(&m, &config->modulator);
     make_current(&m, &config->current);
     make_speed(&m, &config->speed);
     make_mtpa(&m, &config->mtpa);
     make_flux_weakening(&m, &config->field_weakening);
     make_position(&m, config);
-    if (config->injection) {
+    if (!config->align_first) {
         make_pulses(&m, &config->pulses);
     }
     make_open_loop(&m, &config->open_loop);

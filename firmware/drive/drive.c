@@ -156,7 +156,8 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
     out->driven[0] = false;
     out->driven[1] = false;
     out->driven[2] = false;
-    if (drive->fault == DRIVE_FAULT_NONE) {
+    out->trip = drive->fault != DRIVE_FAULT_NONE;
+    if (!out->trip) {
         switch (drive->stage) {
         case STAGE_CALIBRATE:
             calibrate(&drive->calibration, in);

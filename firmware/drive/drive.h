@@ -34,6 +34,7 @@ typedef struct {
 typedef struct {
     uint16_t compare[DRIVE_LEGS][2]; /* timer counts of the rising- and falling-edge half: on-time / half period */
     bool driven[DRIVE_LEGS];         /* false: both switches off */
+    bool trip;                       /* a fault: the port opens the bridge now, not at the update event */
 } drive_out_t;
 
 typedef struct {

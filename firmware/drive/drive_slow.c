@@ -26,7 +26,7 @@ static void begin_calibration(drive_t *drive)
 
 static void begin_finding(drive_t *drive)
 {
-    const bool pulses = drive->config.injection && drive->command.mode != DRIVE_MODE_CURRENT;
+    const bool pulses = !drive->config.align_first && drive->command.mode != DRIVE_MODE_CURRENT;
     initial_pulses_reset(&drive->pulses);
     drive->pulses_state = PM_RUNNING;
     drive->stall_ms = 0;
@@ -55,16 +55,31 @@ static void finish_calibration(drive_t *drive)
     begin_finding(drive);
 }
 
+/* The rotor stands at theta: injection takes over. */
+static void begin_injection(drive_t *drive, pm_angle_t theta)
+{
+    position_reset(&drive->position, &drive->config.position, theta, drive->i_ab);
+    current_control_reset(&drive->current, (pm_dq_t){0, 0});
+    reference_reset(drive, 0);
+    drive->stage = STAGE_VECTOR;
+    drive->state_ms = 0;
+}
+
 static void finish_pulses(drive_t *drive)
 {
     if (drive->pulses_state == PM_DONE) {
-        position_reset(&drive->position, &drive->config.position, drive->pulses.theta, drive->i_ab);
-        current_control_reset(&drive->current, (pm_dq_t){0, 0});
-        reference_reset(drive, 0);
-        drive->stage = STAGE_VECTOR;
-        drive->state_ms = 0;
+        begin_injection(drive, drive->pulses.theta);
     } else if (drive->pulses_state != PM_RUNNING) {
         drive_trip(drive, DRIVE_FAULT_POSITION_NOT_FOUND);
+    }
+}
+
+static void finish_align(drive_t *drive)
+{
+    if (drive->config.injection && drive->command.mode != DRIVE_MODE_CURRENT) {
+        begin_injection(drive, drive->theta_open);
+    } else {
+        drive->state = DRIVE_RUNNING;
     }
 }
 
@@ -77,7 +92,7 @@ static void find(drive_t *drive)
     case STAGE_OPEN_LOOP:
         open_loop_slow(drive);
         if (drive->state_ms >= drive->config.open_loop.align_ms) {
-            drive->state = DRIVE_RUNNING;
+            finish_align(drive);
         }
         break;
     default:

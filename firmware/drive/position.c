@@ -100,6 +100,6 @@ void position_slow(position_t *self, const position_config_t *config, pm_dq_t i)
     set_weight(self, config);
     self->gains.kp = between(config->pll_low.kp, config->pll_high.kp, self->weight);
     self->gains.ki = between(config->pll_low.ki, config->pll_high.ki, self->weight);
-    active_flux_slow(&self->flux, &config->flux, i, self->weight);
+    active_flux_slow(&self->flux, &config->flux, i, self->pll.omega, self->weight);
     set_quality(self);
 }

@@ -2,12 +2,13 @@
  *
  *   u = kp e + integral + feed-forward;  integral += ki e + kb (u_limited - u)
  * u and integral are wide (Q22). The caller limits u (alone or as a vector) between the two calls, so that
- * the limit may couple axes. kb = ki / kp makes the integral follow the limited output with the time constant
- * of the controller: it approaches u_limited - feed-forward, so |integral| <= |u_limited| + |feed-forward|.
- * Then no sum can overflow for |e| < 8, 0 <= kp < 30, 0 <= kb <= 1, |feed-forward| < 8, |u_limited| < 8.
- * A seeded integral must lie within +-16. An error below 2^-23 / ki no longer moves the integral.
- * Call output, limit, update once per period; u belongs to the instant of e. Cost: 2 + 3 instructions inline
- * beside loads and stores. Tests: tests/unit/math/pi_test.cpp. */
+ * the limit may couple axes. kb = ki / kp makes the integral follow the limited output with the time
+ * constant of the controller: it approaches u_limited - feed-forward, so |integral| <= |u_limited| +
+ * |feed-forward|.
+ * Then no sum can overflow for |e| < 8, 0 <= kp < 30, 0 <= kb <= 1, |feed-forward| < 8, |u_limited| < 8. A
+ * seeded integral must lie within +-16. An error below 2^-23 / ki no longer moves the integral.
+ * Call output, limit, update once per period; u belongs to the instant of e. Cost: 2 + 3 instructions
+ * inline beside loads, stores and the limit. Tests: tests/unit/math/pi_test.cpp. */
 #ifndef PM_MATH_PI_H
 #define PM_MATH_PI_H
 

@@ -1,14 +1,17 @@
-/* Square root, length and quotient of signals.
+/* Square root, length and quotient of signals. No loops, no tables.
  *
  * pm_sqrt(x): x in Q28, result Q28, error <= 2^-25; x <= 0 gives 0.
- * pm_hypot(x, y): length of (x, y) in the format of its arguments, error <= 1e-8 relative + 0.5 LSB; saturates.
- * pm_div(num, x): num / x in Q28, error <= 1e-8 relative + 0.5 LSB; saturates. x <= 0 is taken as the smallest
- *   positive x, so the result is the end of the range on num's side; 0 / x = 0. One 32-bit division.
+ * pm_hypot(x, y): length of (x, y) in the format of its arguments; saturates. Error <= 1.1e-8 relative +
+ *   0.5 LSB.
+ * pm_div(num, x): num / x in Q28; saturates. Error <= 1e-8 relative + 0.5 LSB. x <= 0 is taken as the
+ *   smallest positive x, so the result is the end of the range on num's side; 0 / x = 0. One 32-bit
+ *   division.
  * pm_ratio(num, den): num / den in Q31 for 0 <= num <= den, den > 0; error -2^-16 ... 2^-15. One 32-bit
- * division. pm_counts_per_unit(counts, v): 16 counts / v, cut to an integer, so that pm_mulh(x, .) gives
- * counts for a voltage x; 0 <= counts < 2^15, v >= 1/16; relative error <= (v + 1 / v) 2^-16 before the cut.
- * One 32-bit division. No loops, no tables; cost in docs/decisions/001-signal-format.md. Tests:
- * tests/unit/math/root_test.cpp. */
+ *   division.
+ * pm_counts_per_unit(counts, v): 16 counts / v, cut to an integer, so that pm_mulh(x, .) gives counts for
+ *   a voltage x; 0 <= counts < 2^15, v >= 1/16; relative error <= (v + 1 / v) 2^-16 before the cut. One
+ *   32-bit division.
+ * Cost: docs/decisions/001-signal-format.md. Tests: tests/unit/math/root_test.cpp. */
 #ifndef PM_MATH_ROOT_H
 #define PM_MATH_ROOT_H
 

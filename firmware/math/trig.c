@@ -25,11 +25,12 @@ pm_angle_t pm_atan2(int32_t y, int32_t x)
     if (large == 0U) {
         return 0U;
     }
-    /* Sixteen leading bits of the larger one are divisor enough, and keep the division to 32 bits. */
+    /* Sixteen leading bits of the larger one are divisor enough, and keep the division to 32 bits. Cutting
+     * the divisor and cutting the quotient partly make up for each other. */
     const unsigned n = (unsigned)__builtin_clz(large);
     large <<= n;
     small <<= n;
-    const int32_t ratio = (int32_t)((small / ((large >> 16) + ((large >> 15) & 1U))) << 14); /* Q30 */
+    const int32_t ratio = (int32_t)((small / (large >> 16)) << 14); /* Q30 */
 
     const int32_t square = pm_shl(pm_mulh(ratio, ratio), 2); /* r^2 / 4 in Q32 */
     int32_t p = pm_mulh_add(ATAN_3, ATAN_4, square);

@@ -57,7 +57,7 @@ void sim_loop_step(sim_loop_t *loop)
         pwm.driven[leg] = loop->out.driven[leg];
     }
     plant_set_pwm(loop->plant, &pwm);
-    if (loop->in.hw_fault) {
+    if (loop->in.hw_fault || loop->out.trip) {
         plant_trip(loop->plant); /* hardware does not wait for the update event */
     }
     plant_run_period(loop->plant);

@@ -73,6 +73,30 @@ class BackwardMovement : public Metric
     double pole_pairs_, farthest_ = 0.0, back_ = nan;
 };
 
+// Farthest the rotor gets from where it was at the start of the window.
+class Travel : public Metric
+{
+  public:
+    Travel(const Expectation &, const Setup &setup) : pole_pairs_(setup.plant.machine.pole_pairs)
+    {
+    }
+
+    void add(const Sample &s) override
+    {
+        const double position = s.rig.truth.theta_e_rad * to_deg / pole_pairs_;
+        start_ = std::isnan(start_) ? position : start_;
+        farthest_ = std::max(farthest_, std::fabs(position - start_));
+    }
+
+    MetricValue value() const override
+    {
+        return {std::isnan(start_) ? nan : farthest_, ""};
+    }
+
+  private:
+    double pole_pairs_, start_ = nan, farthest_ = 0.0;
+};
+
 // Position error at the instant the drive begins to run: what the initial position search found.
 class FoundAngleError : public Metric
 {
@@ -235,10 +259,12 @@ class EnergyResidual : public Metric
     {
         const double in = last_.e_in_J - first_.e_in_J;
         const double copper = last_.e_copper_J - first_.e_copper_J;
+        const double device = last_.e_device_J - first_.e_device_J;
         const double mech = last_.e_mech_J - first_.e_mech_J;
         const double field = last_.e_field_J - first_.e_field_J;
-        const double scale = std::fabs(in) + std::fabs(copper) + std::fabs(mech) + std::fabs(field);
-        return {scale > 0.0 ? std::fabs(in - copper - mech - field) / scale : nan, ""};
+        const double scale =
+            std::fabs(in) + std::fabs(copper) + std::fabs(device) + std::fabs(mech) + std::fabs(field);
+        return {scale > 0.0 ? std::fabs(in - copper - device - mech - field) / scale : nan, ""};
     }
 
   private:
@@ -274,6 +300,13 @@ const std::vector<SpecialMetric> &special_metrics()
               false,
               {}},
              make<BackwardMovement>},
+            {{"travel_max_deg_mech",
+              "deg",
+              "farthest from the position at the window start, mechanical",
+              false,
+              false,
+              {}},
+             make<Travel>},
             {{"found_angle_error_deg",
               "deg",
               "position error when the drive begins to run, worst of the window",

@@ -17,6 +17,9 @@ Profile::Profile(const Scenario &scenario, rig_t *rig)
     preset(Channel::temperature_degC, room_degC);
     preset(Channel::R_s_ohm, scenario.setup.plant.machine.R_s_ohm);
     preset(Channel::psi_m_Wb, scenario.setup.plant.machine.psi_m_Wb);
+    preset(Channel::L_d0_H, scenario.setup.plant.machine.L_d0_H);
+    preset(Channel::L_q0_H, scenario.setup.plant.machine.L_q0_H);
+    preset(Channel::c_A_Wb5, scenario.setup.plant.machine.c_A_Wb5);
     rig_set_temperature(rig, room_degC);
     rig_set_break(rig, scenario.setup.i_break_A);
 }
@@ -170,6 +173,15 @@ void Profile::apply(Channel channel, double value)
         break;
     case Channel::psi_m_Wb:
         plant_machine(plant)->psi_m_Wb = value;
+        break;
+    case Channel::L_d0_H:
+        plant_machine(plant)->L_d0_H = value;
+        break;
+    case Channel::L_q0_H:
+        plant_machine(plant)->L_q0_H = value;
+        break;
+    case Channel::c_A_Wb5:
+        plant_machine(plant)->c_A_Wb5 = value;
         break;
     case Channel::load_Nm:
     case Channel::load_fan_Nm:

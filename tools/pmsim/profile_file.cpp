@@ -37,6 +37,9 @@ const ChannelKey channel_keys[] = {
     {"R_s_rel", Channel::R_s_ohm, 0.01, 100, [](const Setup &s) { return s.plant.machine.R_s_ohm; }},
     {"psi_m_Wb", Channel::psi_m_Wb, 1e-5, 10, nullptr},
     {"psi_m_rel", Channel::psi_m_Wb, 0.01, 100, [](const Setup &s) { return s.plant.machine.psi_m_Wb; }},
+    {"L_d0_H", Channel::L_d0_H, 1e-7, 10, nullptr},
+    {"L_q0_H", Channel::L_q0_H, 1e-7, 10, nullptr},
+    {"c_A_Wb5", Channel::c_A_Wb5, 0, 1e18, nullptr},
 };
 
 std::vector<std::string> event_keys()

@@ -21,6 +21,7 @@ struct rig {
     double v_V, i_A, omega_mech; /* SI value of one step of a signal */
     drive_command_t command;     /* the last one */
     uint8_t given, given_last;   /* RECORD_...: before the coming period, before the last one */
+    uint32_t fault_seen;         /* period of the last fault that the status has shown */
 };
 
 static double step_of(pm_num_t base)
@@ -51,6 +52,7 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         return NULL;
     }
     const drive_base_t *base = &rig->loop.drive.config.base;
+    rig->fault_seen = UINT32_MAX;
     rig->v_V = step_of(base->v);
     rig->i_A = step_of(base->i);
     rig->omega_mech = step_of(base->omega) / params->pole_pairs;
@@ -111,11 +113,23 @@ void rig_set_break(rig_t *rig, double i_break_A)
     rig->loop.i_break_A = i_break_A;
 }
 
-static void convert(const rig_t *rig, rig_sample_t *sample)
+/* The status is renewed at 1 kHz; the record says at once. */
+static drive_fault_t fault_now(rig_t *rig)
+{
+    const drive_fault_t shown = drive_status(&rig->loop.drive)->fault;
+    const drive_fault_record_t *record = drive_fault_record(&rig->loop.drive);
+    if (shown != DRIVE_FAULT_NONE) {
+        rig->fault_seen = record->period;
+        return shown;
+    }
+    return record->period != rig->fault_seen ? record->fault : DRIVE_FAULT_NONE;
+}
+
+static void convert(rig_t *rig, rig_sample_t *sample)
 {
     const drive_status_t *status = drive_status(&rig->loop.drive);
     sample->state = (int)status->state;
-    sample->fault = (int)status->fault;
+    sample->fault = (int)fault_now(rig);
     sample->limits = status->limits;
     sample->theta_hat_e_rad = ldexp((double)status->theta, -32) * two_pi;
     const double error = sample->truth.theta_e_rad - sample->theta_hat_e_rad;

@@ -23,8 +23,11 @@ enum class Channel {
     v_source_V,
     temperature_degC,
     imposed_speed_rad_s,
-    R_s_ohm, // of the machine itself: heating, demagnetisation
+    R_s_ohm, // of the machine itself: heating, demagnetisation, core
     psi_m_Wb,
+    L_d0_H,
+    L_q0_H,
+    c_A_Wb5,
     count
 };
 

@@ -16,7 +16,7 @@ using samples::real;
 
 // root.h.
 constexpr double kSqrtError = 0x1p-25;
-constexpr double kHypotRelative = 1e-8;
+constexpr double kHypotRelative = 1.1e-8;
 constexpr double kDivRelative = 1e-8;
 constexpr double kHalfLsb = 0x1p-29;
 constexpr double kRatioLow = -0x1p-16;
