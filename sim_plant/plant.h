@@ -8,7 +8,8 @@
  *
  * Use: plant_create(), then for each PWM period plant_sample() -> control -> plant_set_pwm() for the
  * period that follows the coming one (the plant holds the one-period update delay), plant_run_period().
- * All legs are off until the first PWM takes effect. Cost: about 2 us a period on a PC.
+ * All legs are off until the first PWM takes effect. Cost: about 2 us a period on a PC; up to ten times
+ * that where ripple takes the currents through zero in every period and v_switch_V is not zero.
  *
  * Conventions: METHODS.md 0.1. Peak (amplitude-invariant) values; theta_e = 0 when the d-axis is on
  * phase A; positive leg current flows into the motor. The carrier is centre-aligned and a period runs

@@ -323,6 +323,7 @@ static void make_open_loop(maker_t *m, open_loop_config_t *c)
     c->i_slope = c->i / 50 + 1;
     c->slope = fixed(m, pm_num_div(pm_num_mul(slope, t_slow), m->base.omega), Q_BITS, DRIVE_PARAM_open_loop_acceleration);
     c->align_ms = (uint16_t)m->params->t_align;
+    c->sweep = PM_TURN(0.5) / (uint32_t)m->params->t_align;
 }
 
 static void make_protection(maker_t *m, protection_config_t *c)

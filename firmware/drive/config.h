@@ -41,6 +41,7 @@ typedef struct {
     pm_q_t i_slope;        /* per ms */
     pm_q_t slope;          /* of the speed, per ms */
     uint16_t align_ms;
+    pm_angle_t sweep;      /* of the vector per ms while aligning: a quarter turn in half the time */
 } open_loop_config_t;
 
 typedef struct {

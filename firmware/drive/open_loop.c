@@ -3,6 +3,9 @@
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
 
+/* The vector sweeps into its place: a rotor that stands opposite to it would feel no torque. */
+#define SWEEP_FROM PM_TURN(0.75)
+
 /* Agreement of observer and imposed speed before the hand-over, and for how long. */
 #define AGREE_MS 20
 
@@ -11,7 +14,7 @@ void open_loop_start(drive_t *drive)
     drive->stage = STAGE_OPEN_LOOP;
     drive->state_ms = 0;
     drive->still_ms = 0;
-    drive->theta_open = 0;
+    drive->theta_open = SWEEP_FROM;
     drive->omega_open = 0;
     drive->i_open = 0;
     position_reset(&drive->position, &drive->config.position, 0, drive->i_ab);
@@ -69,6 +72,9 @@ void open_loop_slow(drive_t *drive)
     drive->i_open = approach(drive->i_open, i_wanted, c->open_loop.i_slope);
     drive->i_ref = (pm_dq_t){.d = drive->i_open, .q = 0};
     if (drive->state_ms < c->open_loop.align_ms) {
+        const pm_angle_t step = c->open_loop.sweep;
+        drive->theta_open = drive->theta_open > UINT32_MAX - step ? 0 : drive->theta_open + step;
+        drive->theta_open = drive->theta_open < SWEEP_FROM ? 0 : drive->theta_open;
         return;
     }
     const pm_q_t target = wanted_speed(drive);

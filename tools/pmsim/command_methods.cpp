@@ -1,0 +1,40 @@
+#include <cstdio>
+
+#include <CLI/CLI.hpp>
+
+#include "tools/pmsim/commands.h"
+#include "tools/pmsim/methods.h"
+
+namespace pmsim
+{
+
+static void print_methods(bool implemented_only)
+{
+    size_t count = 0;
+    std::printf("%-4s %-9s %-48s %-12s %-22s %s\n", "row", "section", "method", "state", "parameter",
+                "scenario");
+    for (const Method &method : methods()) {
+        count += method.implemented ? 1 : 0;
+        if (method.implemented || !implemented_only) {
+            const char *parameter =
+                method.parameter.empty() && method.implemented ? "(always)" : method.parameter.c_str();
+            std::printf("%-4d %-9s %-48s %-12s %-22s %s\n", method.row, method.section.c_str(),
+                        method.name.c_str(), method.implemented ? "implemented" : "not yet", parameter,
+                        method.scenario.c_str());
+        }
+    }
+    std::printf("%zu of %zu implemented\n", count, methods().size());
+}
+
+void add_methods_command(CLI::App &app)
+{
+    CLI::App *command =
+        app.add_subcommand("methods", "Print every method of the book: is it here, what selects it");
+    auto implemented_only = std::make_shared<bool>(false);
+    command->add_flag("--implemented", *implemented_only, "leave out what is not yet here");
+    command->footer(
+        "A method's scenario is tests/scenario/NAME.yaml; its parameter is explained by `pmsim params`.");
+    command->callback([implemented_only] { print_methods(*implemented_only); });
+}
+
+} // namespace pmsim
