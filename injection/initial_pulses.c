@@ -14,7 +14,8 @@ void initial_pulses_reset(initial_pulses_t *self)
     *self = (initial_pulses_t){0};
 }
 
-static void apply(const initial_pulses_t *self, const initial_pulses_config_t *config, initial_pulses_out_t *out)
+static void apply(const initial_pulses_t *self, const initial_pulses_config_t *config,
+                  initial_pulses_out_t *out)
 {
     const uint16_t leg = self->pulse / 2U;
     const bool reverse = (self->pulse & 1U) != 0U;

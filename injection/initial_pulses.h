@@ -1,14 +1,15 @@
 /* Initial position by six voltage pulses in vector form (METHODS.md 9.2, 9.4.1, 9.4.2; rows 98, 100, 101).
  *
- * Pulses A+ A- B+ B- C+ C- of n periods at a duty, each from zero current; between them all switches are off and the
- * diodes drive the current back to zero. With i_k the current vector at the end of the pulse along g_k:
- *   y = sum i_k e^{j g_k} = 6 I_2 e^{j 2 theta}     saliency: the angle, modulo 180 degrees
- *   w = sum i_k           ~ e^{j theta}             first-order saturation: the polarity
- * Both sums cancel offsets and gain errors of the sensors to first order. Torque averages out over a pair.
+ * Pulses A+ A- B+ B- C+ C- of n periods at a duty, each from zero current; between them all switches are off
+ * and the diodes drive the current back to zero. With i_k the current vector at the end of the pulse along
+ * g_k: y = sum i_k e^{j g_k} = 6 I_2 e^{j 2 theta}     saliency: the angle, modulo 180 degrees w = sum i_k ~
+ * e^{j theta}             first-order saturation: the polarity Both sums cancel offsets and gain errors of
+ * the sensors to first order. Torque averages out over a pair.
  *
- * A one-shot procedure that owns the bridge: call initial_pulses_step() each period until it is not PM_RUNNING.
- * Fails with a reason when the current does not rise or fall in time, or the figures drown in noise.
- * Duration: 6 (2 n + 5) periods about. Tests: tests/unit/injection/initial_pulses_test.cpp, tests/scenario. */
+ * A one-shot procedure that owns the bridge: call initial_pulses_step() each period until it is not
+ * PM_RUNNING. Fails with a reason when the current does not rise or fall in time, or the figures drown in
+ * noise. Duration: 6 (2 n + 5) periods about. Tests: tests/unit/injection/initial_pulses_test.cpp,
+ * tests/scenario. */
 #ifndef INJECTION_INITIAL_PULSES_H
 #define INJECTION_INITIAL_PULSES_H
 

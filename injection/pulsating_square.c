@@ -11,8 +11,8 @@ void pulsating_square_reset(pulsating_square_t *self, pm_ab_t i)
     self->warm = WARM_UP;
 }
 
-void pulsating_square_demodulate(pulsating_square_t *self, const pulsating_square_config_t *config, const obs_in_t *in,
-                                 obs_out_t *out)
+void pulsating_square_demodulate(pulsating_square_t *self, const pulsating_square_config_t *config,
+                                 const obs_in_t *in, obs_out_t *out)
 {
     const pm_ab_t change = {.alpha = in->i.alpha - self->i.alpha, .beta = in->i.beta - self->i.beta};
     const pm_dq_t delta = pm_park(change, in->dir);

@@ -1,19 +1,19 @@
-/* Pulsating square-wave injection in the estimated frame (METHODS.md 4.3.2, row 38) with indirect cross-coupling
- * compensation (5.2.2.2, row 51).
+/* Pulsating square-wave injection in the estimated frame (METHODS.md 4.3.2, row 38) with indirect
+ * cross-coupling compensation (5.2.2.2, row 51).
  *
- * The d-axis voltage alternates by +-V_h each PWM period (f_h = f_pwm/2). The change of current over a period, with
- * the slope of the fundamental removed by a second difference, is h = s (delta_k - delta_k-1)/2 in the present frame:
- *   h_d = F [L_sa + K cos(2e + th_m)] / D,   h_q = F K sin(2e + th_m) / D,   F = V_h T_s, e = position error
- *   eps = gain(i_q) (h_q + lambda(i_q) h_d),  lambda = L_dqh / L_qh: zero at e = 0 whatever the load
- * The rotor turns while the current changes, so the change belongs half a period back: h_q += (w T_s/2) h_d. Without
- * it the position lags by L_q/(L_q - L_d) times as much.
- * lambda = i_q (a + b |i_q|), gain = g_0 + g_2 i_q^2 from the commissioned inductances (config.c).
+ * The d-axis voltage alternates by +-V_h each PWM period (f_h = f_pwm/2). The change of current over a
+ * period, with the slope of the fundamental removed by a second difference, is h = s (delta_k - delta_k-1)/2
+ * in the present frame: h_d = F [L_sa + K cos(2e + th_m)] / D,   h_q = F K sin(2e + th_m) / D,   F = V_h T_s,
+ * e = position error eps = gain(i_q) (h_q + lambda(i_q) h_d),  lambda = L_dqh / L_qh: zero at e = 0 whatever
+ * the load The rotor turns while the current changes, so the change belongs half a period back: h_q += (w
+ * T_s/2) h_d. Without it the position lags by L_q/(L_q - L_d) times as much. lambda = i_q (a + b |i_q|), gain
+ * = g_0 + g_2 i_q^2 from the commissioned inductances (config.c).
  *
- * Order in period k: pulsating_square_demodulate() with the current at k, then pulsating_square_output() for the
- * voltage over [k+1, k+2). eps is exact for small e and 1/2 sin 2e beyond: stable at 0 and 180 degrees, so the
- * polarity must be known. misfit: distance of h_d from its expected value, relative.
- * The fundamental current is the mean of two samples: pulsating_square_fundamental().
- * Tests: tests/unit/injection/pulsating_square_test.cpp, tests/scenario. */
+ * Order in period k: pulsating_square_demodulate() with the current at k, then pulsating_square_output() for
+ * the voltage over [k+1, k+2). eps is exact for small e and 1/2 sin 2e beyond: stable at 0 and 180 degrees,
+ * so the polarity must be known. misfit: distance of h_d from its expected value, relative. The fundamental
+ * current is the mean of two samples: pulsating_square_fundamental(). Tests:
+ * tests/unit/injection/pulsating_square_test.cpp, tests/scenario. */
 #ifndef INJECTION_PULSATING_SQUARE_H
 #define INJECTION_PULSATING_SQUARE_H
 
@@ -29,15 +29,15 @@ typedef struct {
 } pulsating_square_config_t;
 
 typedef struct {
-    pm_ab_t i;      /* current at k-1 */
-    pm_dq_t delta;  /* change over the last period */
-    bool positive;  /* sign commanded in the last period */
-    uint8_t warm;   /* periods until two valid differences exist */
+    pm_ab_t i;     /* current at k-1 */
+    pm_dq_t delta; /* change over the last period */
+    bool positive; /* sign commanded in the last period */
+    uint8_t warm;  /* periods until two valid differences exist */
 } pulsating_square_t;
 
 void pulsating_square_reset(pulsating_square_t *self, pm_ab_t i);
-void pulsating_square_demodulate(pulsating_square_t *self, const pulsating_square_config_t *config, const obs_in_t *in,
-                                 obs_out_t *out);
+void pulsating_square_demodulate(pulsating_square_t *self, const pulsating_square_config_t *config,
+                                 const obs_in_t *in, obs_out_t *out);
 pm_dq_t pulsating_square_output(pulsating_square_t *self, const pulsating_square_config_t *config);
 
 /* Current at k without the carrier; call before pulsating_square_demodulate(). */

@@ -1,17 +1,17 @@
-/* Active-flux observer for salient machines (METHODS.md 2.2.2, row 13), with the drift and delay remedies of 3.2
- * (rows 21 to 23).
+/* Active-flux observer for salient machines (METHODS.md 2.2.2, row 13), with the drift and delay remedies
+ * of 3.2 (rows 21 to 23).
  *
  * psi += T_s (v - R i), i the mean of both ends of the period; psi_a = psi - L_q(i_q) i lies on the d-axis:
  *   eps = psi_a,q / psi_ref
  * Correction without a lag: the flux is fed back along the rotor frame,
  *   psi += T_s [k_d (psi_ref - psi_a,d), -k_q psi_a,q].
- * k_d = g |omega| holds the amplitude and so removes the drift of the integration, which appears as a ripple of the
- * amplitude; it moves no angle as long as psi_ref is the mean amplitude. k_q > 0 ties the flux to the present position: a
- * seed while injection leads, zero when this observer leads. psi_ref follows the amplitude slowly within a band
- * around psi_m + (L_d - L_q) i_d, so an error of psi_m moves no angle either.
- * While the flux is tied, its distance from the current model shows an error of the resistance, k_q psi_a,q = (R - R^) i_q,
- * and R follows it; it is kept when the observer leads. An R set 50 % too high would otherwise make the observer unstable
- * under load below a third of rated speed (docs/decisions/004-resistance.md).
+ * k_d = g |omega| holds the amplitude and so removes the drift of the integration, which appears as a ripple
+ * of the amplitude; it moves no angle as long as psi_ref is the mean amplitude. k_q > 0 ties the flux to the
+ * present position: a seed while injection leads, zero when this observer leads. psi_ref follows the
+ * amplitude slowly within a band around psi_m + (L_d - L_q) i_d, so an error of psi_m moves no angle either.
+ * While the flux is tied, its distance from the current model shows an error of the resistance, k_q psi_a,q =
+ * (R - R^) i_q, and R follows it; it is kept when the observer leads. An R set 50 % too high would otherwise
+ * make the observer unstable under load below a third of rated speed (docs/decisions/004-resistance.md).
  * L_q(i_q) = L_q + L_q2 i_q^2: at 4 A on IPM-1000 a constant L_q costs 4 degrees.
  *
  * Called each period; result belongs to k. Range: |psi| < 4, |i| < 2. misfit: distance of the amplitude from
@@ -24,23 +24,21 @@
 typedef struct {
     pm_q_t R;
     pm_q_t L_d, L_q;
-    pm_q_t L_q2;        /* change of L_q with i_q^2, <= 0 */
+    pm_q_t L_q2; /* change of L_q with i_q^2, <= 0 */
     pm_q_t psi_m;
-    pm_frac_t t_s;      /* T_s w_base, Q32 */
-    pm_frac_t g;        /* amplitude feedback per radian: g T_s w_base, Q32 */
-    pm_frac_t k_adapt;  /* filter constant of psi_ref per slow step */
-    pm_frac_t k_seed;   /* T_s k_q at weight 0, Q32 */
-    pm_gain_t k_R;      /* adaptation of R per slow step, Q26; 0: off */
+    pm_frac_t t_s;     /* T_s w_base, Q32 */
+    pm_frac_t g;       /* amplitude feedback per radian: g T_s w_base, Q32 */
+    pm_frac_t k_adapt; /* filter constant of psi_ref per slow step */
+    pm_frac_t k_seed;  /* T_s k_q at weight 0, Q32 */
+    pm_gain_t k_R;     /* adaptation of R per slow step, Q26; 0: off */
     pm_q_t R_min, R_max;
-    pm_q_t omega_R;     /* R adapts below this speed: above, errors of psi_m outweigh it */
+    pm_q_t omega_R; /* R adapts below this speed: above, errors of psi_m outweigh it */
 } active_flux_config_t;
 
 typedef struct {
-    pm_ab_t psi;       /* stator flux */
-    pm_ab_t i;         /* current at k-1 */
-    pm_q_t R;          /* adapted */
-    pm_q_t psi_q;      /* active flux across the present position, last step */
-    pm_q_t psi_d;      /* amplitude of the active flux, last step */
+    pm_ab_t psi; /* stator flux */
+    pm_ab_t i;   /* current at k-1 */
+    pm_q_t R;    /* adapted */
     pm_q_t psi_ref;
     pm_gain_t inverse; /* 1 / psi_ref, Q26 */
     pm_frac_t k_seed;  /* present k_q T_s */
@@ -48,9 +46,12 @@ typedef struct {
 
 /* Flux of the current model at the given position: no transient follows when the position is right. */
 void active_flux_reset(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in);
-void active_flux_step(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in, obs_out_t *out);
+void active_flux_step(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in,
+                      obs_out_t *out);
 
-/* At 1 kHz: adapts psi_ref and R, ties the flux to the position at weight 0. */
-void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, pm_dq_t i, pm_q_t omega, pm_q_t weight);
+/* At 1 kHz, with what went into the last step and came out (i_dq and omega, vector): adapts psi_ref and R,
+ * ties the flux to the position at weight 0. */
+void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in,
+                      const obs_out_t *out, pm_q_t weight);
 
 #endif

@@ -8,8 +8,8 @@ void current_control_reset(current_control_t *self, pm_dq_t v)
     self->q.integral = pm_widen(v.q);
 }
 
-void current_control_step(current_control_t *self, const current_control_config_t *config, pm_dq_t i, pm_dq_t i_ref,
-                          pm_q_t omega, pm_q_t v_max, current_control_out_t *out)
+void current_control_step(current_control_t *self, const current_control_config_t *config, pm_dq_t i,
+                          pm_dq_t i_ref, pm_q_t omega, pm_q_t v_max, current_control_out_t *out)
 {
     const pm_q_t e_d = i_ref.d - i.d;
     const pm_q_t e_q = i_ref.q - i.q;
@@ -32,6 +32,5 @@ void current_control_step(current_control_t *self, const current_control_config_
     pm_pi_update(&self->q, &config->q, e_q, excess_q);
 
     out->v = (pm_dq_t){.d = v_d, .q = v_q};
-    /* widening truncates: more than that is a limit at work */
-    out->limited = pm_abs(excess_d) > 1 || pm_abs(excess_q) > 1;
+    out->limited = (excess_d | excess_q) != 0;
 }

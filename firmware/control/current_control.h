@@ -1,9 +1,9 @@
 /* Current control in the rotor frame (METHODS.md 1.3.2.2, row 5).
  *
- * PI per axis with kp = w_c L, ki = w_c R T_s, decoupling -w L_q i_q and w (L_d i_d + psi), a circular voltage
- * limit in which the d-axis has priority (flux before torque), and back-calculation: each integral follows the
- * limited voltage. Step response 10-90 %: 0.35/f_c; overshoot <= 10 % with the 1.5-period delay and f_c <= f_pwm/20.
- * Uses the current at k; the voltage belongs to the frame at the middle of [k+1, k+2).
+ * PI per axis with kp = w_c L, ki = w_c R T_s, decoupling -w L_q i_q and w (L_d i_d + psi), a circular
+ * voltage limit in which the d-axis has priority (flux before torque), and back-calculation: each integral
+ * follows the limited voltage. Step response 10-90 %: 0.35/f_c; overshoot <= 10 % with the 1.5-period delay
+ * and f_c <= f_pwm/20. Uses the current at k; the voltage belongs to the frame at the middle of [k+1, k+2).
  * Tests: tests/unit/control/current_control_test.cpp. */
 #ifndef CONTROL_CURRENT_CONTROL_H
 #define CONTROL_CURRENT_CONTROL_H
@@ -28,7 +28,7 @@ typedef struct {
 
 /* Integrals such that the first output is v at zero error. */
 void current_control_reset(current_control_t *self, pm_dq_t v);
-void current_control_step(current_control_t *self, const current_control_config_t *config, pm_dq_t i, pm_dq_t i_ref,
-                          pm_q_t omega, pm_q_t v_max, current_control_out_t *out);
+void current_control_step(current_control_t *self, const current_control_config_t *config, pm_dq_t i,
+                          pm_dq_t i_ref, pm_q_t omega, pm_q_t v_max, current_control_out_t *out);
 
 #endif

@@ -1,8 +1,9 @@
 /* Field weakening by voltage feedback (row 5).
  *
  * An integral drives i_d negative while the voltage exceeds a share of what the link allows and releases it
- * afterwards: i_fw += k (v_top - |v|), 0 >= i_fw >= -i_fw_max. The loop gain falls with speed, so the configured
- * k is for base speed: stable there means stable above. Runs at 1 kHz. Tests: tests/unit/control/field_weakening_test.cpp. */
+ * afterwards: i_fw += k (v_top - |v|), 0 >= i_fw >= -i_fw_max. The loop gain falls with speed, so the
+ * configured k is for base speed: stable there means stable above. Runs at 1 kHz. Tests:
+ * tests/unit/control/field_weakening_test.cpp. */
 #ifndef CONTROL_FIELD_WEAKENING_H
 #define CONTROL_FIELD_WEAKENING_H
 
@@ -17,6 +18,7 @@ typedef struct {
     pm_q_t i_d; /* <= 0, to be added to the reference */
 } field_weakening_t;
 
-pm_q_t field_weakening_step(field_weakening_t *self, const field_weakening_config_t *config, pm_q_t v, pm_q_t v_top);
+pm_q_t field_weakening_step(field_weakening_t *self, const field_weakening_config_t *config, pm_q_t v,
+                            pm_q_t v_top);
 
 #endif

@@ -46,7 +46,14 @@ void modulator_step(const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc, pm
         b += compensation(leg.b, config->zone_gain, lost);
         c += compensation(leg.c, config->zone_gain, lost);
     }
-    out->on[0] = pm_clamp(a, 0, config->counts);
-    out->on[1] = pm_clamp(b, 0, config->counts);
-    out->on[2] = pm_clamp(c, 0, config->counts);
+    out->on[0] = a;
+    out->on[1] = b;
+    out->on[2] = c;
+    /* rare: near the rails, by compensation or rounding */
+    if (!pm_within(a, 0, config->counts) || !pm_within(b, 0, config->counts) ||
+        !pm_within(c, 0, config->counts)) {
+        out->on[0] = pm_clamp(a, 0, config->counts);
+        out->on[1] = pm_clamp(b, 0, config->counts);
+        out->on[2] = pm_clamp(c, 0, config->counts);
+    }
 }

@@ -1,23 +1,25 @@
-/* Space-vector modulation with overmodulation (METHODS.md 1.3.2.1, row 4) and dead-time compensation (5.6.1.1).
+/* Space-vector modulation with overmodulation (METHODS.md 1.3.2.1, row 4) and dead-time compensation
+ * (5.6.1.1).
  *
- * Min-max zero sequence: linear up to v_dc/sqrt(3) in every direction, to the hexagon in its corners. Beyond the
- * hexagon the vector is shortened on its own direction, so the angle is kept; the realised vector is returned.
- * Compensation adds to each leg the on-time that dead time and device drops take from it, by the sign of the
- * leg's current with a linear zone around zero: +-(T_dt/T_s + V_drop/v_dc), in timer counts. The returned vector is
- * the one without compensation, which is what the motor then sees.
+ * Min-max zero sequence: linear up to v_dc/sqrt(3) in every direction, to the hexagon in its corners. Beyond
+ * the hexagon the vector is shortened on its own direction, so the angle is kept; the realised vector is
+ * returned. Compensation adds to each leg the on-time that dead time and device drops take from it, by the
+ * sign of the leg's current with a linear zone around zero: +-(T_dt/T_s + V_drop/v_dc), in timer counts. The
+ * returned vector is the one without compensation, which is what the motor then sees.
  *
  * Called once per period; the output holds over the next one, so i is the current expected there.
- * One division. Range: |v| < 4, v_dc >= 1/16, timer_counts < 2^15. Tests: tests/unit/control/modulator_test.cpp. */
+ * One division. Range: |v| < 4, v_dc >= 1/16, timer_counts < 2^15. Tests:
+ * tests/unit/control/modulator_test.cpp. */
 #ifndef CONTROL_MODULATOR_H
 #define CONTROL_MODULATOR_H
 
 #include "firmware/math/frames.h"
 
 typedef struct {
-    int32_t counts;     /* timer counts of half a period */
-    int32_t dead_counts;/* counts that dead time takes, per half period */
-    pm_q_t drop;        /* device drop */
-    int32_t zone_gain;  /* 2^15 / zone in mulh units: i at the zone's edge gives 2^15 */
+    int32_t counts;      /* timer counts of half a period */
+    int32_t dead_counts; /* counts that dead time takes, per half period */
+    pm_q_t drop;         /* device drop */
+    int32_t zone_gain;   /* 2^15 / zone in mulh units: i at the zone's edge gives 2^15 */
     bool compensate;
 } modulator_config_t;
 
@@ -27,6 +29,7 @@ typedef struct {
     bool limited;  /* the vector was shortened */
 } modulator_out_t;
 
-void modulator_step(const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc, pm_ab_t i, modulator_out_t *out);
+void modulator_step(const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc, pm_ab_t i,
+                    modulator_out_t *out);
 
 #endif

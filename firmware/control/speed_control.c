@@ -6,8 +6,8 @@ void speed_control_reset(speed_control_t *self, pm_q_t omega, pm_q_t i_q)
     self->pi.integral = pm_widen(i_q);
 }
 
-pm_q_t speed_control_step(speed_control_t *self, const speed_control_config_t *config, pm_q_t target, pm_q_t omega,
-                          pm_q_t i_min, pm_q_t i_max, bool *limited)
+pm_q_t speed_control_step(speed_control_t *self, const speed_control_config_t *config, pm_q_t target,
+                          pm_q_t omega, pm_q_t i_min, pm_q_t i_max, bool *limited)
 {
     const pm_q_t step = pm_clamp(target - self->reference, -config->slope, config->slope);
     self->reference += step;

@@ -1,8 +1,8 @@
 /* Speed control (row 5): reference ramp, PI with acceleration feed-forward, q-axis current out.
  *
- * kp = w_s J / (1.5 P^2 psi) and ki = kp w_s / 4 T in per-unit: two real poles at half the bandwidth when the current
- * loop is fast. The integral stops where the current limit holds it (back-calculation). Runs at 1 kHz.
- * Tests: tests/unit/control/speed_control_test.cpp. */
+ * kp = w_s J / (1.5 P^2 psi) and ki = kp w_s / 4 T in per-unit: two real poles at half the bandwidth when the
+ * current loop is fast. The integral stops where the current limit holds it (back-calculation). Runs at 1
+ * kHz. Tests: tests/unit/control/speed_control_test.cpp. */
 #ifndef CONTROL_SPEED_CONTROL_H
 #define CONTROL_SPEED_CONTROL_H
 
@@ -10,9 +10,9 @@
 #include "firmware/math/pi.h"
 
 typedef struct {
-    pm_pi_config_t pi;    /* speed error -> i_q */
-    pm_q_t slope;         /* change of the reference per call */
-    pm_q_t i_per_slope;   /* i_q that accelerates by `slope` per call */
+    pm_pi_config_t pi;  /* speed error -> i_q */
+    pm_q_t slope;       /* change of the reference per call */
+    pm_q_t i_per_slope; /* i_q that accelerates by `slope` per call */
 } speed_control_config_t;
 
 typedef struct {
@@ -23,7 +23,7 @@ typedef struct {
 void speed_control_reset(speed_control_t *self, pm_q_t omega, pm_q_t i_q);
 
 /* i_min <= result <= i_max; *limited when a bound holds it. */
-pm_q_t speed_control_step(speed_control_t *self, const speed_control_config_t *config, pm_q_t target, pm_q_t omega,
-                          pm_q_t i_min, pm_q_t i_max, bool *limited);
+pm_q_t speed_control_step(speed_control_t *self, const speed_control_config_t *config, pm_q_t target,
+                          pm_q_t omega, pm_q_t i_min, pm_q_t i_max, bool *limited);
 
 #endif

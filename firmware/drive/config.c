@@ -137,8 +137,10 @@ static void make_speed(maker_t *m, speed_control_config_t *c)
     c->pi.kp = fixed(m, kp, GAIN_BITS, DRIVE_PARAM_speed_bandwidth);
     c->pi.ki = fixed(m, ki, GAIN_BITS, DRIVE_PARAM_speed_bandwidth);
     c->pi.kb = fixed(m, pm_num_div(ki, kp), UNIT_BITS, DRIVE_PARAM_speed_bandwidth);
-    c->slope = fixed(m, pm_num_div(pm_num_mul(slope, t_slow), m->base.omega), Q_BITS, DRIVE_PARAM_acceleration);
-    c->i_per_slope = fixed(m, pm_num_div(pm_num_mul(slope, inertia), m->base.i), Q_BITS, DRIVE_PARAM_acceleration);
+    c->slope =
+        fixed(m, pm_num_div(pm_num_mul(slope, t_slow), m->base.omega), Q_BITS, DRIVE_PARAM_acceleration);
+    c->i_per_slope =
+        fixed(m, pm_num_div(pm_num_mul(slope, inertia), m->base.i), Q_BITS, DRIVE_PARAM_acceleration);
 }
 
 static void make_flux_weakening(maker_t *m, field_weakening_config_t *c)
@@ -213,7 +215,8 @@ typedef struct {
     pm_num_t L_d, L_q, L_dq;
 } inductances_t;
 
-/* The loop gain follows the saturating saliency, but not further than this: beyond, it would amplify noise. */
+/* The loop gain follows the saturating saliency, but not further than this: beyond, it would amplify noise.
+ */
 #define GAIN_RISE pm_num_ratio(5, 2)
 
 /* d eps-free signal / d angle: V_h T_s [(L_q - L_d) + 2 L_dq^2 / L_q] / D, a current per radian. */
@@ -232,13 +235,15 @@ static void make_square(maker_t *m, pulsating_square_config_t *c)
                                  si(m, DRIVE_PARAM_L_dqh_rated)};
     const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
     const pm_num_t gain_0 = pm_num_div(m->base.i, carrier_slope(m, zero));
-    const pm_num_t gain_r = least(pm_num_div(m->base.i, carrier_slope(m, rated)), pm_num_mul(GAIN_RISE, gain_0));
+    const pm_num_t gain_r =
+        least(pm_num_div(m->base.i, carrier_slope(m, rated)), pm_num_mul(GAIN_RISE, gain_0));
     const pm_num_t full = pm_num_div(rated.L_dq, rated.L_q);
     const pm_num_t half = si(m, DRIVE_PARAM_cross_half);
 
     c->v_h = per_unit(m, DRIVE_PARAM_v_injection, m->base.v);
     c->gain_0 = fixed(m, gain_0, SMALL_BITS, DRIVE_PARAM_v_injection);
-    c->gain_2 = fixed(m, pm_num_div(pm_num_sub(gain_r, gain_0), square(i_rated)), SMALL_BITS, DRIVE_PARAM_v_injection);
+    c->gain_2 = fixed(m, pm_num_div(pm_num_sub(gain_r, gain_0), square(i_rated)), SMALL_BITS,
+                      DRIVE_PARAM_v_injection);
     c->lambda_1 = 0;
     c->lambda_2 = 0;
     if (m->params->cross_coupling_comp != 0) {
@@ -282,7 +287,8 @@ static void make_position(maker_t *m, drive_config_t *config)
         return;
     }
     const pm_num_t span = pm_num_sub(si(m, DRIVE_PARAM_speed_high), si(m, DRIVE_PARAM_speed_low));
-    c->per_span = fixed(m, pm_num_div(m->base.omega, pm_num_mul(span, pole_pairs(m))), SMALL_BITS, DRIVE_PARAM_speed_high);
+    c->per_span = fixed(m, pm_num_div(m->base.omega, pm_num_mul(span, pole_pairs(m))), SMALL_BITS,
+                        DRIVE_PARAM_speed_high);
     if (config->injection) {
         make_square(m, &c->square);
     }
@@ -321,7 +327,8 @@ static void make_open_loop(maker_t *m, open_loop_config_t *c)
     const pm_num_t slope = pm_num_mul(si(m, DRIVE_PARAM_open_loop_acceleration), pole_pairs(m));
     c->i = per_unit(m, DRIVE_PARAM_i_open_loop, m->base.i);
     c->i_slope = c->i / 50 + 1;
-    c->slope = fixed(m, pm_num_div(pm_num_mul(slope, t_slow), m->base.omega), Q_BITS, DRIVE_PARAM_open_loop_acceleration);
+    c->slope = fixed(m, pm_num_div(pm_num_mul(slope, t_slow), m->base.omega), Q_BITS,
+                     DRIVE_PARAM_open_loop_acceleration);
     c->align_ms = (uint16_t)m->params->t_align;
     c->sweep = PM_TURN(0.5) / (uint32_t)m->params->t_align;
 }
@@ -334,7 +341,8 @@ static void make_protection(maker_t *m, protection_config_t *c)
     c->v_dc_min = per_unit(m, DRIVE_PARAM_v_dc_min, m->base.v);
     c->v_dc_derate = per_unit(m, DRIVE_PARAM_v_dc_derate, m->base.v);
     c->i_sum = PM_Q(0.1);
-    c->offset_max = fixed(m, pm_num_div(si(m, DRIVE_PARAM_offset_max), m->base.i), 15, DRIVE_PARAM_offset_max);
+    c->offset_max =
+        fixed(m, pm_num_div(si(m, DRIVE_PARAM_offset_max), m->base.i), 15, DRIVE_PARAM_offset_max);
     c->temp_derate_dC = p->temp_derate;
     c->temp_trip_dC = p->temp_trip;
     c->omega_stall = speed(m, DRIVE_PARAM_speed_max) / 50;
@@ -357,7 +365,8 @@ static void make_protection(maker_t *m, protection_config_t *c)
     } else if (p->speed_trip <= p->speed_max) {
         refuse(m, DRIVE_PARAM_speed_trip, "not above speed_max");
     } else if (p->i_open_loop > p->i_max || p->i_pulse > p->i_trip) {
-        refuse(m, p->i_pulse > p->i_trip ? DRIVE_PARAM_i_pulse : DRIVE_PARAM_i_open_loop, "above the current limit");
+        refuse(m, p->i_pulse > p->i_trip ? DRIVE_PARAM_i_pulse : DRIVE_PARAM_i_open_loop,
+               "above the current limit");
     }
 }
 
@@ -371,7 +380,8 @@ static void check_ranges(maker_t *m)
     }
 }
 
-/* dL >= 0 is assumed by MTPA, injection and pulses; the incremental inductances must be those of a passive machine. */
+/* dL >= 0 is assumed by MTPA, injection and pulses; the incremental inductances must be those of a passive
+ * machine. */
 static void check_machine(maker_t *m)
 {
     const drive_params_t *p = m->params;
@@ -413,8 +423,8 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     config->i_max = per_unit(&m, DRIVE_PARAM_i_max, m.base.i);
     config->i_d_light = per_unit(&m, DRIVE_PARAM_i_d_light, m.base.i);
     config->omega_max = speed(&m, DRIVE_PARAM_speed_max);
-    config->v_linear = fixed(&m, pm_num_mul(pm_num_ratio(98, 100), pm_num_sqrt(pm_num_ratio(1, 3))), UNIT_BITS,
-                             DRIVE_PARAM_v_full_scale);
+    config->v_linear = fixed(&m, pm_num_mul(pm_num_ratio(98, 100), pm_num_sqrt(pm_num_ratio(1, 3))),
+                             UNIT_BITS, DRIVE_PARAM_v_full_scale);
     config->psi_m = config->current.psi_m;
     config->dL = config->current.L_d - config->current.L_q;
     return m.result;

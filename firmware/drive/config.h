@@ -28,20 +28,20 @@ typedef struct {
 typedef struct {
     pm_q_t i_trip;
     pm_q_t v_dc_max, v_dc_min, v_dc_derate;
-    pm_q_t i_sum;              /* largest believable sum of the phase currents */
-    int32_t offset_max;        /* of a 16-bit code */
+    pm_q_t i_sum;       /* largest believable sum of the phase currents */
+    int32_t offset_max; /* of a 16-bit code */
     int32_t temp_derate_dC, temp_trip_dC;
-    pm_q_t omega_stall;        /* below: not turning */
+    pm_q_t omega_stall; /* below: not turning */
     uint16_t stall_ms, lost_ms;
 } protection_config_t;
 
 /* Align and open-loop start, current mode. */
 typedef struct {
-    pm_q_t i;              /* current amplitude */
-    pm_q_t i_slope;        /* per ms */
-    pm_q_t slope;          /* of the speed, per ms */
+    pm_q_t i;       /* current amplitude */
+    pm_q_t i_slope; /* per ms */
+    pm_q_t slope;   /* of the speed, per ms */
     uint16_t align_ms;
-    pm_angle_t sweep;      /* of the vector per ms while aligning: a quarter turn in half the time */
+    pm_angle_t sweep; /* of the vector per ms while aligning: a quarter turn in half the time */
 } open_loop_config_t;
 
 typedef struct {
@@ -56,15 +56,15 @@ typedef struct {
     open_loop_config_t open_loop;
     protection_config_t protection;
     pm_num_t pole_pairs;
-    bool injection;        /* injection leads at low speed; else open-loop start */
-    bool align_first;      /* the initial position comes from aligning, not from pulses */
-    int32_t k_theta;       /* pm_omega_to_angle() */
+    bool injection;   /* injection leads at low speed; else open-loop start */
+    bool align_first; /* the initial position comes from aligning, not from pulses */
+    int32_t k_theta;  /* pm_omega_to_angle() */
     pm_q_t i_max;
     pm_q_t i_d_light;
     pm_q_t omega_max;
-    pm_unit_t v_linear;    /* share of v_dc that the voltage vector may reach */
+    pm_unit_t v_linear; /* share of v_dc that the voltage vector may reach */
     pm_q_t psi_m;
-    pm_q_t dL;             /* L_d - L_q */
+    pm_q_t dL; /* L_d - L_q */
 } drive_config_t;
 
 typedef struct {

@@ -1,5 +1,7 @@
 #include "firmware/drive/drive.h"
 
+#include <stddef.h>
+
 #include "firmware/drive/drive_parts.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
@@ -60,7 +62,6 @@ static void measure(drive_t *drive, const drive_in_t *in)
     drive->hw_fault = in->hw_fault;
     drive->v_past = drive->v_now;
     drive->v_now = drive->v_next;
-    drive->v_next = (pm_ab_t){0, 0};
 }
 
 static void calibrate(calibration_t *self, const drive_in_t *in)
@@ -128,24 +129,30 @@ static void control(drive_t *drive, pm_angle_t theta, pm_q_t omega, pm_dq_t i, d
 
 static void vector(drive_t *drive, drive_out_t *out)
 {
-    pm_dir_t dir;
-    pm_dq_t i;
-    position_step(&drive->position, &drive->config.position, drive->v_past, drive->i_ab, &dir, &i);
-    control(drive, drive->position.pll.theta, drive->position.pll.omega, i, out);
+    const bool imposed = drive->stage == STAGE_OPEN_LOOP;
+    pm_pll_t open = {0};
+    if (imposed) {
+        drive->theta_open += (pm_angle_t)pm_omega_to_angle(drive->omega_open, drive->config.k_theta);
+        open = (pm_pll_t){.theta = drive->theta_open, .omega = drive->omega_open};
+    }
+    /* below this speed the observer would drift on an imposed angle: it is led along */
+    const bool led = imposed && pm_abs(open.omega) < drive->config.position.omega_low;
+    position_out_t p;
+    position_step(&drive->position, &drive->config.position, drive->v_past, drive->i_ab, led ? &open : NULL,
+                  &p);
+    if (imposed) {
+        p.i = pm_park(drive->i_ab, pm_dir(open.theta));
+    } else {
+        open = drive->position.pll;
+    }
+    control(drive, open.theta, open.omega, p.i, out);
 }
 
-static void open_loop(drive_t *drive, drive_out_t *out)
+static void off(drive_out_t *out)
 {
-    const position_config_t *c = &drive->config.position;
-    drive->theta_open += (pm_angle_t)pm_omega_to_angle(drive->omega_open, drive->config.k_theta);
-    if (pm_abs(drive->omega_open) < c->omega_low) {
-        position_follow(&drive->position, c, drive->v_past, drive->i_ab, drive->theta_open, drive->omega_open);
-    } else {
-        pm_dir_t dir;
-        pm_dq_t i;
-        position_step(&drive->position, c, drive->v_past, drive->i_ab, &dir, &i);
+    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
+        out->driven[x] = false;
     }
-    control(drive, drive->theta_open, drive->omega_open, pm_park(drive->i_ab, pm_dir(drive->theta_open)), out);
 }
 
 void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
@@ -153,27 +160,18 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
     drive->period++;
     measure(drive, in);
     protection_step(drive, in);
-    out->driven[0] = false;
-    out->driven[1] = false;
-    out->driven[2] = false;
     out->trip = drive->fault != DRIVE_FAULT_NONE;
-    if (!out->trip) {
-        switch (drive->stage) {
-        case STAGE_CALIBRATE:
-            calibrate(&drive->calibration, in);
-            break;
-        case STAGE_PULSES:
+    if (!out->trip && drive->stage >= STAGE_OPEN_LOOP) {
+        vector(drive, out);
+    } else {
+        drive->v_next = (pm_ab_t){0, 0};
+        if (!out->trip && drive->stage == STAGE_PULSES) {
             pulses(drive, out);
-            break;
-        case STAGE_OPEN_LOOP:
-            open_loop(drive, out);
-            break;
-        case STAGE_VECTOR:
-            vector(drive, out);
-            break;
-        case STAGE_OFF:
-        default:
-            break;
+        } else {
+            off(out);
+            if (drive->stage == STAGE_CALIBRATE) {
+                calibrate(&drive->calibration, in);
+            }
         }
     }
     drive->status.theta = drive->position.pll.theta;

@@ -1,7 +1,8 @@
 /* The drive: from converter codes to timer counts, once per PWM period.
  *
  * drive_step() runs in the ADC interrupt, drive_slow() at 1 kHz, everything else in thread context. DESIGN.md
- * section 3. No function blocks or allocates. The bridge is off (out->driven all false) unless the state says on.
+ * section 3. No function blocks or allocates. The bridge is off (out->driven all false) unless the state says
+ * on.
  *
  *   drive_init(d, params)        configuration from SI parameters; refuses bad ones and names the first
  *   drive_step(d, in, out)       one control period
@@ -9,9 +10,9 @@
  *   drive_command(d, cmd)        what the user wants; may be called at any time from thread context
  *   drive_clear_fault(d)         only when off; a fault never clears or restarts by itself
  *
- * Timing: in is sampled at t_k, the centre of the all-low zero vector; out takes effect at t_k+1 and holds until
- * t_k+2. out->sample_delay is reserved for methods that shift the instant.
- * Tests: tests/unit/drive, tests/scenario. Cost: docs/decisions and tests/target. */
+ * Timing: in is sampled at t_k, the centre of the all-low zero vector; out takes effect at t_k+1 and holds
+ * until t_k+2. out->sample_delay is reserved for methods that shift the instant. Tests: tests/unit/drive,
+ * tests/scenario. Cost: docs/decisions and tests/target. */
 #ifndef DRIVE_DRIVE_H
 #define DRIVE_DRIVE_H
 
@@ -32,9 +33,10 @@ typedef struct {
 } drive_in_t;
 
 typedef struct {
-    uint16_t compare[DRIVE_LEGS][2]; /* timer counts of the rising- and falling-edge half: on-time / half period */
-    bool driven[DRIVE_LEGS];         /* false: both switches off */
-    bool trip;                       /* a fault: the port opens the bridge now, not at the update event */
+    uint16_t compare[DRIVE_LEGS]
+                    [2];     /* timer counts of the rising- and falling-edge half: on-time / half period */
+    bool driven[DRIVE_LEGS]; /* false: both switches off */
+    bool trip;               /* a fault: the port opens the bridge now, not at the update event */
 } drive_out_t;
 
 typedef struct {
@@ -46,7 +48,7 @@ typedef enum {
     DRIVE_CALIBRATING, /* current offsets, bridge off */
     DRIVE_FINDING,     /* initial position: pulses, or align */
     DRIVE_RUNNING,
-    DRIVE_STOPPING,    /* speed ramps to zero, then off */
+    DRIVE_STOPPING, /* speed ramps to zero, then off */
     DRIVE_FAULT,
 } drive_state_t;
 
@@ -57,11 +59,11 @@ typedef enum {
 } drive_mode_t;
 
 typedef struct {
-    bool enable;            /* false while running: stop, then off */
-    drive_mode_t mode;      /* taken when the drive starts */
-    int32_t speed_mrad_s;   /* mechanical, signed */
+    bool enable;          /* false while running: stop, then off */
+    drive_mode_t mode;    /* taken when the drive starts */
+    int32_t speed_mrad_s; /* mechanical, signed */
     int32_t torque_uNm;
-    int32_t current_mA;     /* current mode */
+    int32_t current_mA; /* current mode */
 } drive_command_t;
 
 /* Limits at work: information, not faults. */
@@ -78,14 +80,14 @@ typedef struct {
     drive_state_t state;
     drive_fault_t fault;
     uint32_t limits;
-    pm_angle_t theta;   /* estimated, at the sample instant */
-    pm_q_t omega;       /* estimated, electrical */
-    pm_q_t omega_ref;   /* after the ramp */
-    pm_dq_t i, i_ref;   /* estimated frame */
-    pm_ab_t v;          /* voltage realised by the step's output */
+    pm_angle_t theta; /* estimated, at the sample instant */
+    pm_q_t omega;     /* estimated, electrical */
+    pm_q_t omega_ref; /* after the ramp */
+    pm_dq_t i, i_ref; /* estimated frame */
+    pm_ab_t v;        /* voltage realised by the step's output */
     pm_q_t v_dc;
-    pm_q_t weight;      /* 0: injection, 1: flux observer */
-    pm_q_t quality;     /* 1: good, 0: lost */
+    pm_q_t weight;  /* 0: injection, 1: flux observer */
+    pm_q_t quality; /* 1: good, 0: lost */
 } drive_status_t;
 
 typedef struct drive drive_t; /* caller-owned: the struct stands in drive_state.h */

@@ -6,17 +6,18 @@
 
 /* protection.c */
 
-/* Latches the first fault with the values of the moment. The step that runs next, or this one, opens the bridge. */
+/* Latches the first fault with the values of the moment. The step that runs next, or this one, opens the
+ * bridge. */
 void drive_trip(drive_t *drive, drive_fault_t fault);
 void protection_step(drive_t *drive, const drive_in_t *in); /* each period: currents, DC link, break input */
-void protection_slow(drive_t *drive);                       /* 1 kHz: temperature, speed, position, stall, sum */
+void protection_slow(drive_t *drive); /* 1 kHz: temperature, speed, position, stall, sum */
 
 /* Limits of the q-axis current after derating, for the present direction of rotation. */
 void protection_current_limits(drive_t *drive, pm_q_t *i_min, pm_q_t *i_max);
 
 /* reference.c: at 1 kHz, from the command to current references. */
-void reference_take(drive_t *drive);        /* command to per-unit */
-void reference_vector(drive_t *drive);      /* speed or torque -> i_ref */
+void reference_take(drive_t *drive);   /* command to per-unit */
+void reference_vector(drive_t *drive); /* speed or torque -> i_ref */
 void reference_reset(drive_t *drive, pm_q_t i_q);
 
 /* open_loop.c: align, open-loop start, current mode, hand-over to the observer and back. */

@@ -116,7 +116,8 @@ static void run(drive_t *drive)
     }
     reference_vector(drive);
     /* without injection nothing shows the position at low speed */
-    if (!c->injection && pm_abs(drive->speed.reference) < c->omega_low && pm_abs(drive->position.pll.omega) < c->omega_low) {
+    if (!c->injection && pm_abs(drive->speed.reference) < c->omega_low &&
+        pm_abs(drive->position.pll.omega) < c->omega_low) {
         open_loop_resume(drive);
     }
 }

@@ -17,7 +17,7 @@ typedef enum {
 typedef struct {
     int32_t offset[DRIVE_LEGS]; /* code at zero current */
     int32_t sum[DRIVE_LEGS];
-    uint16_t count;             /* periods taken */
+    uint16_t count; /* periods taken */
 } calibration_t;
 
 struct drive {

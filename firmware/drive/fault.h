@@ -1,4 +1,5 @@
-/* Fault codes and the record of the first one. A fault is latched; the bridge is off before it is recorded. */
+/* Fault codes and the record of the first one. A fault is latched; the bridge is off before it is recorded.
+ */
 #ifndef DRIVE_FAULT_H
 #define DRIVE_FAULT_H
 
@@ -19,7 +20,7 @@ typedef struct {
     pm_q_t omega;     /* per-unit, estimated, electrical */
     pm_angle_t theta; /* estimated */
     int32_t temperature_dC;
-    uint32_t period;  /* control periods since drive_init */
+    uint32_t period; /* control periods since drive_init */
 } drive_fault_record_t;
 
 const char *drive_fault_text(drive_fault_t fault);

@@ -1,4 +1,5 @@
-/* Parameters of the drive in SI decimals: one table, from which the per-unit configuration is made (config.h).
+/* Parameters of the drive in SI decimals: one table, from which the per-unit configuration is made
+ * (config.h).
  *
  * drive_params_t holds one int32 per parameter; drive_param_table describes them in the same order. A value
  * outside its range, or a combination that cannot be, is refused by drive_configure(), which names it.

@@ -1,5 +1,7 @@
 #include "firmware/drive/position.h"
 
+#include <stddef.h>
+
 #include "firmware/math/filter.h"
 #include "firmware/math/trig.h"
 
@@ -24,32 +26,28 @@ void position_reset(position_t *self, const position_config_t *config, pm_angle_
     pulsating_square_reset(&self->square, i);
 }
 
-void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i, pm_dir_t *dir, pm_dq_t *i_dq)
+void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i,
+                   const pm_pll_t *imposed, position_out_t *out)
 {
     pm_pll_predict(&self->pll, &self->gains);
-    *dir = pm_dir(self->pll.theta);
+    if (imposed != NULL) {
+        self->pll = *imposed;
+        self->flux.k_seed = config->flux.k_seed;
+    }
+    out->dir = pm_dir(self->pll.theta);
     const pm_ab_t fundamental = self->inject ? pulsating_square_fundamental(&self->square, i) : i;
-    *i_dq = pm_park(fundamental, *dir);
+    out->i = pm_park(fundamental, out->dir);
 
-    const obs_in_t in = {.v = v, .i = i, .dir = *dir, .omega = self->pll.omega, .i_dq = *i_dq};
+    const obs_in_t in = {.v = v, .i = i, .dir = out->dir, .omega = self->pll.omega, .i_dq = out->i};
     active_flux_step(&self->flux, &config->flux, &in, &self->flux_out);
     pm_q_t eps = self->flux_out.eps;
     if (self->inject) {
         pulsating_square_demodulate(&self->square, &config->square, &in, &self->square_out);
         eps = self->square_out.eps + pm_mul(self->weight, eps - self->square_out.eps);
     }
-    pm_pll_correct(&self->pll, &self->gains, eps);
-}
-
-void position_follow(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i, pm_angle_t theta,
-                     pm_q_t omega)
-{
-    self->pll.theta = theta;
-    self->pll.omega = omega;
-    self->flux.k_seed = config->flux.k_seed;
-    const pm_dir_t dir = pm_dir(theta);
-    const obs_in_t in = {.v = v, .i = i, .dir = dir, .omega = omega, .i_dq = pm_park(i, dir)};
-    active_flux_step(&self->flux, &config->flux, &in, &self->flux_out);
+    if (imposed == NULL) {
+        pm_pll_correct(&self->pll, &self->gains, eps);
+    }
 }
 
 static void set_weight(position_t *self, const position_config_t *config)
@@ -76,7 +74,8 @@ static pm_frac_t between(pm_frac_t low, pm_frac_t high, pm_q_t weight)
     return low + pm_mul(high - low, weight);
 }
 
-/* Means of magnitudes: a source that has slipped shows errors of either sign. While both lead, both must agree. */
+/* Means of magnitudes: a source that has slipped shows errors of either sign. While both lead, both must
+ * agree. */
 static void set_quality(position_t *self)
 {
     pm_q_t eps = 0;
@@ -91,15 +90,17 @@ static void set_quality(position_t *self)
     }
     (void)pm_lp1(&self->eps_mean, eps, K_MEAN);
     (void)pm_lp1(&self->misfit_mean, misfit, K_MEAN);
-    const pm_q_t worst = pm_max(pm_mul(self->eps_mean, PER_EPS_LOST), pm_mul(self->misfit_mean, PER_MISFIT_LOST));
+    const pm_q_t worst =
+        pm_max(pm_mul(self->eps_mean, PER_EPS_LOST), pm_mul(self->misfit_mean, PER_MISFIT_LOST));
     self->quality = pm_max(0, PM_ONE - worst);
 }
 
 void position_slow(position_t *self, const position_config_t *config, pm_dq_t i)
 {
+    const obs_in_t in = {.omega = self->pll.omega, .i_dq = i};
     set_weight(self, config);
     self->gains.kp = between(config->pll_low.kp, config->pll_high.kp, self->weight);
     self->gains.ki = between(config->pll_low.ki, config->pll_high.ki, self->weight);
-    active_flux_slow(&self->flux, &config->flux, i, self->pll.omega, self->weight);
+    active_flux_slow(&self->flux, &config->flux, &in, &self->flux_out, self->weight);
     set_quality(self);
 }

@@ -1,10 +1,11 @@
-/* The position of the rotor: injection at low speed, active flux above, one phase-locked loop (METHODS.md 5.9, row 69).
+/* The position of the rotor: injection at low speed, active flux above, one phase-locked loop
+ * (METHODS.md 5.9, row 69).
  *
  *   eps = eps_injection + weight (eps_flux - eps_injection)
- * weight goes from 0 at omega_low to 1 at omega_high; the carrier is on below omega_high and off above 1.1 omega_high
- * (hysteresis). The loop's bandwidth moves with the weight. This is the only place that knows both sources.
- * Quality: 1 while the sources agree with the measurement, 0 when the position is lost.
- * Tests: tests/unit/drive/position_test.cpp, tests/scenario. */
+ * weight goes from 0 at omega_low to 1 at omega_high; the carrier is on below omega_high and off above 1.1
+ * omega_high (hysteresis). The loop's bandwidth moves with the weight. This is the only place that knows both
+ * sources. Quality: 1 while the sources agree with the measurement, 0 when the position is lost. Tests:
+ * tests/unit/drive/position_test.cpp, tests/scenario. */
 #ifndef DRIVE_POSITION_H
 #define DRIVE_POSITION_H
 
@@ -28,8 +29,8 @@ typedef struct {
     active_flux_t flux;
     pulsating_square_t square;
     obs_out_t flux_out, square_out;
-    pm_q_t weight;   /* 0: injection, 1: flux observer */
-    bool inject;     /* carrier on */
+    pm_q_t weight;     /* 0: injection, 1: flux observer */
+    bool inject;       /* carrier on */
     pm_q_t omega_mean; /* filtered for the weight */
     pm_q_t eps_mean;   /* filtered for the quality */
     pm_q_t misfit_mean;
@@ -39,14 +40,16 @@ typedef struct {
 /* Starts at standstill with the rotor at theta. */
 void position_reset(position_t *self, const position_config_t *config, pm_angle_t theta, pm_ab_t i);
 
-/* One period: v is the mean voltage over [k-1, k), i the current at k. Gives the direction of the present position and
- * the fundamental current in it. */
-void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i, pm_dir_t *dir, pm_dq_t *i_dq);
+typedef struct {
+    pm_dir_t dir; /* direction of the present position */
+    pm_dq_t i;    /* fundamental current in it */
+} position_out_t;
 
-/* Instead of position_step() while the angle is imposed (align, open-loop start): the loop follows theta and omega, and
- * the flux is tied to them. */
-void position_follow(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i, pm_angle_t theta,
-                     pm_q_t omega);
+/* One period: v is the mean voltage over [k-1, k), i the current at k. `imposed` (angle and speed, NULL
+ * normally) takes the place of the loop while the rotor follows a given vector, and ties the flux to it:
+ * align, open-loop start. */
+void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i,
+                   const pm_pll_t *imposed, position_out_t *out);
 
 /* At 1 kHz: weight, carrier, loop gains, quality. */
 void position_slow(position_t *self, const position_config_t *config, pm_dq_t i);

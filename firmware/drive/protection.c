@@ -29,14 +29,13 @@ void protection_step(drive_t *drive, const drive_in_t *in)
     if (drive->stage <= STAGE_CALIBRATE) {
         return; /* the offsets are not known yet and nothing is driven */
     }
-    if (pm_abs(i.a) > c->i_trip || pm_abs(i.b) > c->i_trip || pm_abs(i.c) > c->i_trip) {
+    if (!pm_within(i.a, -c->i_trip, c->i_trip) || !pm_within(i.b, -c->i_trip, c->i_trip) ||
+        !pm_within(i.c, -c->i_trip, c->i_trip)) {
         drive_trip(drive, DRIVE_FAULT_OVER_CURRENT);
     }
-    if (drive->status.v_dc > c->v_dc_max) {
-        drive_trip(drive, DRIVE_FAULT_OVER_VOLTAGE);
-    }
-    if (drive->status.v_dc < c->v_dc_min) {
-        drive_trip(drive, DRIVE_FAULT_UNDER_VOLTAGE);
+    const pm_q_t v_dc = drive->status.v_dc;
+    if (!pm_within(v_dc, c->v_dc_min, c->v_dc_max)) {
+        drive_trip(drive, v_dc > c->v_dc_max ? DRIVE_FAULT_OVER_VOLTAGE : DRIVE_FAULT_UNDER_VOLTAGE);
     }
 }
 
@@ -68,9 +67,10 @@ void protection_slow(drive_t *drive)
     if (lasts(&drive->lost_ms, turning && drive->position.quality == 0, c->lost_ms)) {
         drive_trip(drive, DRIVE_FAULT_POSITION_LOST);
     }
-    const bool stalled = turning && drive->state == DRIVE_RUNNING && drive->command.mode == DRIVE_MODE_SPEED &&
-                         (drive->status.limits & DRIVE_LIMIT_CURRENT) != 0U && pm_abs(omega) < c->omega_stall &&
-                         pm_abs(drive->speed.reference) > c->omega_stall;
+    const bool stalled = turning && drive->state == DRIVE_RUNNING &&
+                         drive->command.mode == DRIVE_MODE_SPEED &&
+                         (drive->status.limits & DRIVE_LIMIT_CURRENT) != 0U &&
+                         pm_abs(omega) < c->omega_stall && pm_abs(drive->speed.reference) > c->omega_stall;
     if (lasts(&drive->stall_ms, stalled, c->stall_ms)) {
         drive_trip(drive, DRIVE_FAULT_STALL);
     }

@@ -2,7 +2,8 @@
 
 #include "firmware/math/root.h"
 
-/* A value in 10^exponent SI as a signal; what does not fit saturates, and the limits below clamp it with a flag. */
+/* A value in 10^exponent SI as a signal; what does not fit saturates, and the limits below clamp it with a
+ * flag. */
 static pm_q_t to_signal(int32_t value, int exponent10, pm_num_t base)
 {
     int32_t x;
@@ -30,7 +31,8 @@ void reference_reset(drive_t *drive, pm_q_t i_q)
 /* T = psi_a i_q in per-unit, psi_a = psi_m + (L_d - L_q) i_d with the present reference. */
 static pm_q_t current_for(const drive_t *drive, pm_q_t torque)
 {
-    const pm_q_t psi = pm_max(drive->config.psi_m + pm_mul(drive->config.dL, drive->i_ref.d), drive->config.psi_m / 4);
+    const pm_q_t psi =
+        pm_max(drive->config.psi_m + pm_mul(drive->config.dL, drive->i_ref.d), drive->config.psi_m / 4);
     const pm_q_t i = pm_div(pm_abs(torque), psi);
     return torque < 0 ? -i : i;
 }
@@ -68,7 +70,8 @@ void reference_vector(drive_t *drive)
         const pm_q_t wanted = stopping ? 0 : drive->omega_target;
         const pm_q_t target = pm_clamp(wanted, -c->omega_max, c->omega_max);
         drive->status.limits |= target != wanted ? DRIVE_LIMIT_SPEED : 0U;
-        i_q = speed_control_step(&drive->speed, &c->speed, target, drive->position.pll.omega, i_min, i_max, &limited);
+        i_q = speed_control_step(&drive->speed, &c->speed, target, drive->position.pll.omega, i_min, i_max,
+                                 &limited);
     }
     drive->status.limits |= limited ? DRIVE_LIMIT_CURRENT : 0U;
     drive->i_ref = (pm_dq_t){.d = flux_current(drive, i_q), .q = i_q};

@@ -116,6 +116,12 @@ static inline int32_t pm_sub_sat(int32_t a, int32_t b)
 
 #endif
 
+/* lo <= x <= hi by one comparison; lo <= hi. */
+static inline bool pm_within(int32_t x, int32_t lo, int32_t hi)
+{
+    return (uint32_t)x - (uint32_t)lo <= (uint32_t)hi - (uint32_t)lo;
+}
+
 static inline int32_t pm_abs(int32_t x) /* INT32_MIN -> INT32_MAX */
 {
     return x < 0 ? pm_sub_sat(0, x) : x;

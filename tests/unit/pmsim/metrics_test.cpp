@@ -1,0 +1,251 @@
+#include "tools/pmsim/metrics.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "tools/pmsim/setup.h"
+
+namespace pmsim
+{
+namespace
+{
+
+const double pi = 3.14159265358979323846;
+const double exact = 1e-9; // sums of a few thousand doubles
+
+Setup test_setup()
+{
+    Setup setup = default_setup();
+    setup.plant.machine.pole_pairs = 3;
+    setup.rated = {4.0, 100.0, 2.0, 300.0};
+    return setup;
+}
+
+// 1000 periods of 0.1 ms, each as the test describes it.
+template <class Describe> MetricValue gather(const Expectation &expectation, Describe describe)
+{
+    const Setup setup = test_setup();
+    const std::unique_ptr<Metric> metric = make_metric(expectation, setup);
+    for (int k = 0; k < 1000; ++k) {
+        Sample sample{};
+        sample.rig.state = RIG_RUNNING;
+        sample.rig.truth.t_s = 1e-4 * k;
+        describe(sample, k);
+        metric->add(sample);
+    }
+    return metric->value();
+}
+
+template <class Describe> MetricValue gather(const char *name, Describe describe)
+{
+    Expectation expectation;
+    expectation.metric = name;
+    return gather(expectation, describe);
+}
+
+TEST(Metrics, AngleErrorOfAWaveAboutAnOffset)
+{
+    const auto wave = [](Sample &s, int k) {
+        s.rig.angle_error_rad = (2.0 + 3.0 * std::sin(2 * pi * k / 100.0)) * pi / 180.0;
+    };
+    EXPECT_NEAR(gather("angle_error_mean_deg", wave).number, 2.0, exact);
+    EXPECT_NEAR(gather("angle_error_std_deg", wave).number, 3.0 / std::sqrt(2.0), exact);
+    EXPECT_NEAR(gather("angle_error_rms_deg", wave).number, std::sqrt(4.0 + 4.5), exact);
+    EXPECT_NEAR(gather("angle_error_max_deg", wave).number, 5.0, exact);
+}
+
+TEST(Metrics, LargestErrorIsThatOfEitherSign)
+{
+    const auto wave = [](Sample &s, int k) { s.rig.angle_error_rad = k == 500 ? -0.1 : 0.05; };
+    EXPECT_NEAR(gather("angle_error_max_deg", wave).number, 0.1 * 180.0 / pi, exact);
+}
+
+TEST(Metrics, WithoutAPositionThereIsNothingToJudge)
+{
+    const auto off = [](Sample &s, int) { s.rig.state = RIG_FINDING; };
+    EXPECT_TRUE(std::isnan(gather("angle_error_max_deg", off).number));
+    const auto half = [](Sample &s, int k) {
+        s.rig.state = k < 500 ? RIG_CALIBRATING : RIG_RUNNING;
+        s.rig.angle_error_rad = k < 500 ? 3.0 : 0.01;
+    };
+    EXPECT_NEAR(gather("angle_error_max_deg", half).number, 0.01 * 180.0 / pi, exact);
+}
+
+TEST(Metrics, Speeds)
+{
+    const auto ramp = [](Sample &s, int k) {
+        s.rig.truth.omega_mech_rad_s = 0.1 * k;
+        s.rig.omega_ref_mech_rad_s = 0.1 * k + 1.0;
+        s.rig.omega_hat_mech_rad_s = 0.1 * k - 2.0;
+    };
+    EXPECT_NEAR(gather("speed_final_rel", ramp).number, 0.999, exact);
+    EXPECT_NEAR(gather("speed_mean_rel", ramp).number, 0.4995, exact);
+    EXPECT_NEAR(gather("speed_error_max_rel", ramp).number, 0.01, exact);
+    EXPECT_NEAR(gather("speed_estimate_error_max_rel", ramp).number, 0.02, exact);
+}
+
+TEST(Metrics, TimeToSpeedCountsTheCommandedDirectionOnly)
+{
+    Expectation expectation;
+    expectation.metric = "time_to_speed_s";
+    expectation.fraction = 0.5;
+    expectation.t0_s = 0.01;
+    const auto forward = [](Sample &s, int k) {
+        s.direction = 1;
+        s.rig.truth.omega_mech_rad_s = 0.1 * k; // 50 rad/s at k = 500
+    };
+    const auto wrong_way = [](Sample &s, int k) {
+        s.direction = -1;
+        s.rig.truth.omega_mech_rad_s = 0.1 * k;
+    };
+    EXPECT_NEAR(gather(expectation, forward).number, 0.05 - 0.01, exact);
+    EXPECT_TRUE(std::isnan(gather(expectation, wrong_way).number));
+}
+
+TEST(Metrics, BackwardMovementIsMechanicalAndFromTheFarthestPoint)
+{
+    const auto there_and_back = [](Sample &s, int k) {
+        s.direction = 1;
+        const double mech_deg = k < 500 ? 0.1 * k : 49.9 - 0.01 * (k - 499);
+        s.rig.truth.theta_e_rad = 3 * mech_deg * pi / 180.0;
+    };
+    EXPECT_NEAR(gather("backward_movement_deg_mech", there_and_back).number, 5.0, 1e-6);
+    EXPECT_NEAR(gather("travel_max_deg_mech", there_and_back).number, 49.9, 1e-6);
+}
+
+TEST(Metrics, BackwardMovementFollowsTheDirection)
+{
+    const auto turned_round = [](Sample &s, int k) {
+        s.direction = k < 500 ? 1 : -1;
+        s.rig.truth.theta_e_rad = k < 500 ? 0.01 * k : 0.01 * (1000 - k);
+    };
+    EXPECT_NEAR(gather("backward_movement_deg_mech", turned_round).number, 0.0, exact);
+}
+
+TEST(Metrics, FoundAngleErrorIsThatOfTheFirstRunningPeriod)
+{
+    const auto found = [](Sample &s, int k) {
+        s.rig.state = k < 300 ? RIG_FINDING : RIG_RUNNING;
+        s.rig.angle_error_rad = k == 300 ? -0.2 : 1.0;
+    };
+    EXPECT_NEAR(gather("found_angle_error_deg", found).number, -0.2 * 180.0 / pi, exact);
+}
+
+// A fault at k = 400; the bridge stays on for two more periods, and comes back at k = 700.
+void fault_story(Sample &s, int k)
+{
+    s.rig.driven = k < 402 || k >= 700;
+    s.rig.fault = k >= 400 && k < 650 ? 8 : 0;
+    s.rig.state = k >= 400 && k < 650 ? RIG_FAULT : (k >= 650 && k < 700 ? RIG_OFF : RIG_RUNNING);
+}
+
+TEST(Metrics, FaultAndWhatTheBridgeDoes)
+{
+    EXPECT_EQ(gather("fault", fault_story).text, "POSITION_LOST");
+    EXPECT_EQ(gather("fault_count", fault_story).number, 1.0);
+    EXPECT_EQ(gather("position_lost_count", fault_story).number, 1.0);
+    EXPECT_EQ(gather("fault_latency_periods", fault_story).number, 2.0);
+    EXPECT_EQ(gather("driven_after_fault_periods", fault_story).number, 2.0 + 300.0);
+    EXPECT_EQ(gather("restarts", fault_story).number, 1.0);
+    EXPECT_EQ(gather("state_final", fault_story).text, "running");
+    EXPECT_NEAR(gather("fault_delay_s", fault_story).number, 0.04, exact);
+}
+
+TEST(Metrics, NoFaultMeansNothingToJudge)
+{
+    const auto fine = [](Sample &, int) {};
+    EXPECT_EQ(gather("fault", fine).text, "NONE");
+    EXPECT_EQ(gather("fault_count", fine).number, 0.0);
+    EXPECT_TRUE(std::isnan(gather("fault_latency_periods", fine).number));
+    EXPECT_TRUE(std::isnan(gather("restarts", fine).number));
+}
+
+TEST(Metrics, EnergyResidual)
+{
+    const auto lossless = [](Sample &s, int k) {
+        s.rig.truth.e_in_J = 5.0 + k;
+        s.rig.truth.e_copper_J = 0.3 * k;
+        s.rig.truth.e_device_J = 0.1 * k;
+        s.rig.truth.e_mech_J = 0.5 * k;
+        s.rig.truth.e_field_J = 0.1 * k;
+    };
+    EXPECT_NEAR(gather("energy_residual_rel", lossless).number, 0.0, exact);
+    const auto invents = [&](Sample &s, int k) {
+        lossless(s, k);
+        s.rig.truth.e_mech_J *= 1.2;
+    };
+    EXPECT_NEAR(gather("energy_residual_rel", invents).number, 0.1 / 2.1, exact);
+}
+
+TEST(Metrics, LimitFlagsAreSeconds)
+{
+    const auto limits = [](Sample &s, int k) { s.rig.limits = k < 250 ? 1U << 2 : 1U << 0; };
+    EXPECT_NEAR(gather("limit_temperature_s", limits).number, 0.025, exact);
+    EXPECT_NEAR(gather("limit_current_s", limits).number, 0.075, exact);
+    EXPECT_EQ(gather("limit_speed_s", limits).number, 0.0);
+}
+
+TEST(Metrics, CurrentsAndTorque)
+{
+    const auto constant = [](Sample &s, int k) {
+        s.rig.truth.i_A[1] = k == 10 ? -7.0 : 1.0;
+        s.rig.truth.i_d_A = -3.0;
+        s.rig.truth.i_q_A = 4.0;
+        s.rig.truth.torque_Nm = k % 2 == 0 ? 1.5 : 2.5;
+    };
+    EXPECT_EQ(gather("current_peak_A", constant).number, 7.0);
+    EXPECT_NEAR(gather("current_amplitude_mean_A", constant).number, 5.0, exact);
+    EXPECT_NEAR(gather("torque_mean_Nm", constant).number, 2.0, exact);
+    EXPECT_NEAR(gather("torque_mean_rel", constant).number, 1.0, exact);
+    EXPECT_NEAR(gather("torque_span_Nm", constant).number, 1.0, exact);
+}
+
+TEST(Metrics, EveryMetricOfTheTableCanBeMade)
+{
+    const Setup setup = test_setup();
+    for (const MetricInfo &info : metric_infos()) {
+        Expectation expectation;
+        expectation.metric = info.name;
+        EXPECT_NE(make_metric(expectation, setup), nullptr) << info.name;
+    }
+}
+
+Expectation bounded(std::optional<double> min, std::optional<double> max, std::optional<double> max_abs)
+{
+    Expectation expectation;
+    expectation.min = min;
+    expectation.max = max;
+    expectation.max_abs = max_abs;
+    return expectation;
+}
+
+TEST(Judge, Bounds)
+{
+    const std::optional<double> no;
+    EXPECT_TRUE(judge(bounded(no, 2.0, no), {2.0, ""}).pass);
+    EXPECT_FALSE(judge(bounded(no, 2.0, no), {2.001, ""}).pass);
+    EXPECT_TRUE(judge(bounded(1.0, no, no), {1.0, ""}).pass);
+    EXPECT_FALSE(judge(bounded(1.0, no, no), {0.999, ""}).pass);
+    EXPECT_FALSE(judge(bounded(no, no, 2.0), {-2.001, ""}).pass);
+    EXPECT_TRUE(judge(bounded(no, no, 2.0), {-2.0, ""}).pass);
+    EXPECT_FALSE(judge(bounded(no, 0.0, no), {1e-12, ""}).pass);
+}
+
+TEST(Judge, NothingToJudgeFails)
+{
+    const std::optional<double> no;
+    EXPECT_FALSE(judge(bounded(no, 2.0, no), {std::numeric_limits<double>::quiet_NaN(), ""}).pass);
+}
+
+TEST(Judge, Words)
+{
+    Expectation expectation;
+    expectation.equals = "NONE";
+    EXPECT_TRUE(judge(expectation, {0.0, "NONE"}).pass);
+    EXPECT_FALSE(judge(expectation, {0.0, "STALL"}).pass);
+}
+
+} // namespace
+} // namespace pmsim

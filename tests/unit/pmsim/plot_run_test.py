@@ -1,0 +1,47 @@
+"""plot_run.py draws a trace, short or long, and refuses what is none."""
+
+import math
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+SCRIPT = "tools/plot_run.py"
+COLUMNS = ("t_s", "angle_error_deg", "omega_mech_rad_s", "omega_hat_mech_rad_s", "omega_ref_mech_rad_s", "ia_A",
+           "ib_A", "ic_A", "id_A", "iq_A", "torque_Nm", "load_Nm", "weight", "state", "fault")
+
+
+def write_trace(folder, rows):
+    lines = [",".join(COLUMNS)]
+    for k in range(rows):
+        t = 0.001 * k
+        state = "finding" if t < 0.1 else ("running" if t < 0.9 else "fault")
+        numbers = [t] + [math.sin(0.05 * k + n) for n in range(len(COLUMNS) - 4)]
+        weight = min(1.0, max(0.0, t - 0.3) / 0.2)
+        fault = "STALL" if t >= 0.9 else "NONE"
+        lines.append(",".join([f"{x:.6g}" for x in numbers + [weight]] + [state, fault]))
+    (folder / "trace.csv").write_text("\n".join(lines) + "\n")
+
+
+def run(*arguments):
+    return subprocess.run([sys.executable, SCRIPT, *map(str, arguments)], capture_output=True, text=True, check=False)
+
+
+def main():
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        assert run(folder).returncode != 0, "there is no trace yet"
+        for rows in (1, 1000):
+            write_trace(folder, rows)
+            (folder / "summary.txt").write_text("A title\nPASS x\n")
+            result = run(folder, "-o", folder / "demo.png")
+            assert result.returncode == 0, result.stderr
+            picture = (folder / "demo.png").read_bytes()
+            assert picture.startswith(b"\x89PNG"), "not a picture"
+            assert len(picture) > 20000, "nothing drawn"
+        write_trace(folder, 0)
+        assert run(folder / "trace.csv").returncode != 0, "an empty trace is not refused"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,199 @@
+#include "tools/pmsim/runner.h"
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include <gmock/gmock.h>
+
+#include "tests/unit/pmsim/support.h"
+#include "tools/pmsim/loop.h"
+#include "tools/pmsim/record_file.h"
+#include "tools/pmsim/report.h"
+#include "tools/pmsim/trace.h"
+
+namespace pmsim
+{
+namespace
+{
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+ScenarioFile file_of(const std::string &text)
+{
+    return ScenarioFile(Value::from_text(text, "s.yaml"), {});
+}
+
+Scenario load(const std::string &text)
+{
+    const ScenarioFile file = file_of(text);
+    return file.scenario(file.runs().front());
+}
+
+std::string content(const std::string &path)
+{
+    std::ifstream file(path, std::ios::binary);
+    std::ostringstream text;
+    text << file.rdbuf();
+    return text.str();
+}
+
+std::string trace_of(const std::string &text, const std::string &name)
+{
+    const std::string path = testing::TempDir() + name;
+    const Scenario scenario = load(text);
+    TraceWriter trace(path, scenario, 7);
+    run_scenario(scenario, [&trace](const Sample &sample) { trace.add(sample); });
+    trace.close();
+    const std::string read = content(path);
+    std::filesystem::remove(path);
+    return read;
+}
+
+TEST(Runner, SameSeedSameTraceOtherSeedOtherTrace)
+{
+    const std::string one = trace_of(small_scenario() + "seed: 3\n", "pmsim_a.csv");
+    EXPECT_EQ(one, trace_of(small_scenario() + "seed: 3\n", "pmsim_b.csv"));
+    EXPECT_NE(one, trace_of(small_scenario() + "seed: 4\n", "pmsim_c.csv"));
+}
+
+TEST(Runner, TraceHasARowEveryNthPeriodAndAllItsColumns)
+{
+    std::istringstream lines(trace_of(small_scenario(), "pmsim_d.csv"));
+    std::string header, line;
+    std::getline(lines, header);
+    EXPECT_THAT(header, StartsWith("t_s,theta_e_rad,theta_hat_rad,angle_error_deg,"));
+    EXPECT_THAT(header, HasSubstr(",weight,quality,limits,driven,state,fault"));
+    int rows = 0;
+    while (std::getline(lines, line)) {
+        ++rows;
+        EXPECT_EQ(std::count(line.begin(), line.end(), ','), std::count(header.begin(), header.end(), ','));
+    }
+    EXPECT_EQ(rows, (3000 + 6) / 7);
+}
+
+TEST(Runner, ThreadsDoNotChangeAnything)
+{
+    const std::string text = replaced(small_scenario(), "theta_e_deg: 30", "theta_e_deg: $angle") +
+                             "  - {metric: current_peak_A, max: 100, book: x}\n"
+                             "sweep: {angle: [0, 50, 100, 150, 200]}\n";
+    const ScenarioFile file = file_of(text);
+    EXPECT_EQ(runs_csv(file, run_all(file, 1, false)), runs_csv(file, run_all(file, 3, false)));
+}
+
+TEST(Runner, ABadRunStopsTheSweepWithItsError)
+{
+    const ScenarioFile file =
+        file_of(replaced(small_scenario(), "speed_rel: 0.1", "speed_rel: $v") + "sweep: {v: [0.1, fast]}\n");
+    EXPECT_THAT(error_of([&] { run_all(file, 2, false); }), HasSubstr("s.yaml:6:36: expected a number"));
+}
+
+TEST(Runner, ADriveThatRefusesItsParametersIsAnErrorThatNamesThem)
+{
+    EXPECT_THAT(
+        error_of([] { run_scenario(load(small_scenario() + "drive: {speed_low: 30, speed_high: 20}\n")); }),
+        HasSubstr("IPM-1000: drive refuses parameter speed_high"));
+}
+
+// Twin: the metrics see what the plant does, not what the drive believes.
+TEST(Runner, AHeldRotorDoesNotMoveAndAFreeOneDoes)
+{
+    const std::string free = replaced(small_scenario(), "duration_s: 0.3", "duration_s: 0.6") +
+                             "  - {metric: travel_max_deg_mech, min: 10, book: x}\n";
+    EXPECT_TRUE(run_scenario(load(free)).outcomes[1].pass);
+    const RunResult held = run_scenario(load(free + "mechanics: {locked: true}\n"));
+    EXPECT_FALSE(held.outcomes[1].pass);
+    EXPECT_EQ(held.outcomes[1].value.number, 0.0);
+}
+
+// A dynamometer imposes speed and position is known exactly: a check of the profile against arithmetic.
+TEST(Runner, ImposedSpeedRampsAsTheProfileSays)
+{
+    const Scenario scenario = load("title: dynamometer\n"
+                                   "machine: sim_plant/machines/ipm_1000.yaml\n"
+                                   "start: {theta_e_deg: 0}\n"
+                                   "duration_s: 0.2\n"
+                                   "profile:\n"
+                                   "  - {t_s: 0.05, imposed_speed_rad_s: 40, ramp_s: 0.1}\n");
+    double at_middle = 0.0, at_end = 0.0;
+    run_scenario(scenario, [&](const Sample &s) {
+        at_middle = s.rig.truth.t_s <= 0.1 ? s.rig.truth.omega_mech_rad_s : at_middle;
+        at_end = s.rig.truth.omega_mech_rad_s;
+    });
+    EXPECT_NEAR(at_middle, 20.0, 0.1); // one period of the ramp is 0.04 rad/s
+    EXPECT_NEAR(at_end, 40.0, 1e-6);
+}
+
+TEST(Runner, EventsWaitForAState)
+{
+    const Scenario scenario = load(small_scenario() + "  - {metric: fault, equals: NONE, book: x}\n");
+    Scenario waiting = scenario;
+    Event event;
+    event.state = RIG_RUNNING;
+    event.t_s = 0.01;
+    event.targets[static_cast<size_t>(Channel::load_Nm)] = 0.25;
+    waiting.profile.push_back(event);
+    double running_since_s = -1.0, load_since_s = -1.0;
+    run_scenario(waiting, [&](const Sample &s) {
+        if (running_since_s < 0.0 && s.rig.state == RIG_RUNNING) {
+            running_since_s = s.rig.truth.t_s;
+        }
+        if (load_since_s < 0.0 && s.load_Nm > 0.0) {
+            load_since_s = s.rig.truth.t_s;
+        }
+    });
+    ASSERT_GT(running_since_s, 0.0);
+    EXPECT_NEAR(load_since_s - running_since_s, 0.01, 2.1e-4); // seen one period later
+}
+
+TEST(Record, ReplayGivesTheSameBits)
+{
+    const Scenario scenario = load(small_scenario());
+    const Recording recording = record_scenario(scenario, 2500);
+    ASSERT_EQ(recording.periods.size(), 2500U);
+    Loop loop(scenario);
+    size_t different = 0;
+    for (const record_period_t &period : recording.periods) {
+        different += loop.step_drive(period) ? 0 : 1;
+    }
+    EXPECT_EQ(different, 0U);
+}
+
+TEST(Record, FileHasTheSizeAndHeaderThatTheFormatSays)
+{
+    const std::string path = testing::TempDir() + "pmsim.rec";
+    write_recording(record_scenario(load(small_scenario()), 100), path);
+    const std::string bytes = content(path);
+    std::filesystem::remove(path);
+    EXPECT_EQ(bytes.size(),
+              sizeof(record_header_t) + 4U * DRIVE_PARAM_COUNT + 100U * sizeof(record_period_t));
+    EXPECT_EQ(bytes.substr(0, 8), RECORD_MAGIC);
+    EXPECT_EQ(bytes[12], 100); // periods, little-endian
+}
+
+TEST(Report, WorstRunIsNamed)
+{
+    const ScenarioFile file = file_of(replaced(small_scenario(), "theta_e_deg: 30", "theta_e_deg: $angle") +
+                                      "  - {metric: current_peak_A, max: 100, book: \"9.2\"}\n"
+                                      "sweep: {angle: [0, 50]}\n");
+    SweepResult result;
+    for (const double current : {3.0, 120.0}) {
+        RunResult run;
+        run.outcomes.push_back({{0.0, "NONE"}, true, 1.0});
+        run.outcomes.push_back({{current, ""}, current < 100.0, (100.0 - current) / 100.0});
+        result.runs.push_back(run);
+    }
+    const std::vector<Verdict> list = verdicts(file, result);
+    EXPECT_FALSE(all_pass(list));
+    EXPECT_EQ(worst_run(list), 1U);
+    const std::string lines = verdict_lines(file, list);
+    EXPECT_THAT(lines, HasSubstr("PASS  fault"));
+    EXPECT_THAT(lines,
+                HasSubstr("FAIL  current_peak_A        120  <= 100 A  (9.2)  1 of 2, worst: angle=50"));
+    EXPECT_THAT(verdict_json(file, list, 0.6, 0.1), HasSubstr("\"name\": \"current_peak_A\""));
+}
+
+} // namespace
+} // namespace pmsim
