@@ -1,9 +1,10 @@
-# pm_target_program(NAME n SOURCES file... [LIBS lib...])
+# pm_target_program(NAME n SOURCES file... [LIBS lib...] [LTO])
 # A program for QEMU's Cortex-M4 board, to be run by tests/target/count.py. main() may print and read files.
+# LTO: link as the flashed image is linked; without it every function keeps its name and can be counted.
 set(pm_target_support ${PROJECT_SOURCE_DIR}/tests/target/support)
 
 function(pm_target_program)
-    cmake_parse_arguments(ARG "" "NAME" "SOURCES;LIBS" ${ARGN})
+    cmake_parse_arguments(ARG "LTO" "NAME" "SOURCES;LIBS" ${ARGN})
     if(ARG_UNPARSED_ARGUMENTS)
         message(FATAL_ERROR "pm_target_program: do not know what to do with ${ARG_UNPARSED_ARGUMENTS}")
     endif()
@@ -16,7 +17,7 @@ function(pm_target_program)
         LINK_DEPENDS ${pm_target_support}/mps2.ld)
     target_link_libraries(${ARG_NAME} PRIVATE ${ARG_LIBS})
     target_link_options(${ARG_NAME} PRIVATE
-        -nostartfiles --specs=nano.specs -Wl,--gc-sections -T ${pm_target_support}/mps2.ld)
+        $<IF:$<BOOL:${ARG_LTO}>,-flto,-fno-lto> -nostartfiles --specs=nano.specs -Wl,--gc-sections -T ${pm_target_support}/mps2.ld)
 endfunction()
 
 # pm_add_count_test(NAME n PROGRAM target FUNCTIONS f... [LIMITS f=N...] [ARGUMENTS word...])

@@ -112,7 +112,7 @@ static std::optional<std::string> same_but_unit(const std::string &word,
                                                 const std::vector<std::string> &known)
 {
     for (const std::string &key : known) {
-        if (stem(key) != key && stem(key) == stem(word)) {
+        if (stem(key) != key && (stem(key) == stem(word) || stem(key) == word)) {
             return key;
         }
     }
@@ -125,7 +125,7 @@ std::optional<std::string> nearest(const std::string &word, const std::vector<st
     if (best) {
         return best;
     }
-    size_t limit = std::max<size_t>(2, word.size() / 3);
+    size_t limit = std::max<size_t>(1, (word.size() + 2) / 3);
     for (const std::string &key : known) {
         const size_t distance = edit_distance(word, key);
         if (distance <= limit && distance < key.size()) {

@@ -90,7 +90,7 @@ class MachineFiles : public testing::TestWithParam<std::string>
 
 TEST_P(MachineFiles, LoadsAndIsAcceptedByPlantAndDrive)
 {
-    const Setup setup = load_machine_file(GetParam());
+    const pmsim::Setup setup = load_machine_file(GetParam());
     char error[200] = "";
     rig_t *rig = rig_create(&setup.plant, 0.0, &setup.params, false, error, sizeof error);
     EXPECT_NE(rig, nullptr) << error;
@@ -99,7 +99,7 @@ TEST_P(MachineFiles, LoadsAndIsAcceptedByPlantAndDrive)
 
 TEST_P(MachineFiles, RatedTorqueBelongsToRatedCurrent)
 {
-    const Setup setup = load_machine_file(GetParam());
+    const pmsim::Setup setup = load_machine_file(GetParam());
     const Core core(setup.plant.machine);
     const auto psi = core.flux(0.0, setup.rated.i_rated_A);
     const double torque_Nm = 1.5 * setup.plant.machine.pole_pairs * psi[0] * setup.rated.i_rated_A;
@@ -109,7 +109,7 @@ TEST_P(MachineFiles, RatedTorqueBelongsToRatedCurrent)
 // The voltage suffices for rated speed and torque, with what the drive keeps back.
 TEST_P(MachineFiles, RatedPointLiesWithinTheVoltage)
 {
-    const Setup setup = load_machine_file(GetParam());
+    const pmsim::Setup setup = load_machine_file(GetParam());
     const Core core(setup.plant.machine);
     const double i_A = setup.rated.i_rated_A;
     const auto psi = core.flux(0.0, i_A);
@@ -120,7 +120,7 @@ TEST_P(MachineFiles, RatedPointLiesWithinTheVoltage)
 
 TEST_P(MachineFiles, DriveKnowsTheMachine)
 {
-    const Setup setup = load_machine_file(GetParam());
+    const pmsim::Setup setup = load_machine_file(GetParam());
     const plant_machine_t &m = setup.plant.machine;
     const auto si = [&setup](drive_param_id_t id) { return parameter_si(setup.params, id); };
     const Core core(m);
@@ -148,7 +148,7 @@ double mtpa_i_d(const drive_params_t &p, double i_q)
 
 TEST_P(MachineFiles, RatedInductancesAreThoseOfTheCore)
 {
-    const Setup setup = load_machine_file(GetParam());
+    const pmsim::Setup setup = load_machine_file(GetParam());
     const auto si = [&setup](drive_param_id_t id) { return parameter_si(setup.params, id); };
     const Core core(setup.plant.machine);
     const double i_q = setup.rated.i_rated_A;
@@ -171,7 +171,7 @@ INSTANTIATE_TEST_SUITE_P(All, MachineFiles, testing::ValuesIn(machine_files()), 
 // parameters.def says that its defaults are this machine.
 TEST(MachineFile, Ipm1000IsTheFirmwaresDefault)
 {
-    const Setup setup = load_machine_file("sim_plant/machines/ipm_1000.yaml");
+    const pmsim::Setup setup = load_machine_file("sim_plant/machines/ipm_1000.yaml");
     for (int i = 0; i < DRIVE_PARAM_COUNT; ++i) {
         const auto id = static_cast<drive_param_id_t>(i);
         if (id != DRIVE_PARAM_i_noise) { // derived from the converter
@@ -217,7 +217,7 @@ TEST(MachineFile, ErrorsNameThePlace)
 
 TEST(MachineFile, BoardParametersFollowTheBoardUnlessGiven)
 {
-    Setup setup = load_machine_file("sim_plant/machines/ipm_1000.yaml");
+    pmsim::Setup setup = load_machine_file("sim_plant/machines/ipm_1000.yaml");
     const auto set = [&setup](const char *section, const char *key, const char *value) {
         read_setting(setup, section, key, Value::from_text(value, "t"));
     };

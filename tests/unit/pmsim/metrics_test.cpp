@@ -17,7 +17,7 @@ const double exact = 1e-9; // sums of a few thousand doubles
 
 Setup test_setup()
 {
-    Setup setup = default_setup();
+    pmsim::Setup setup = default_setup();
     setup.plant.machine.pole_pairs = 3;
     setup.rated = {4.0, 100.0, 2.0, 300.0};
     return setup;
@@ -26,7 +26,7 @@ Setup test_setup()
 // 1000 periods of 0.1 ms, each as the test describes it.
 template <class Describe> MetricValue gather(const Expectation &expectation, Describe describe)
 {
-    const Setup setup = test_setup();
+    const pmsim::Setup setup = test_setup();
     const std::unique_ptr<Metric> metric = make_metric(expectation, setup);
     for (int k = 0; k < 1000; ++k) {
         Sample sample{};
@@ -204,7 +204,7 @@ TEST(Metrics, CurrentsAndTorque)
 
 TEST(Metrics, EveryMetricOfTheTableCanBeMade)
 {
-    const Setup setup = test_setup();
+    const pmsim::Setup setup = test_setup();
     for (const MetricInfo &info : metric_infos()) {
         Expectation expectation;
         expectation.metric = info.name;

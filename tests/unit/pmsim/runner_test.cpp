@@ -87,7 +87,7 @@ TEST(Runner, ABadRunStopsTheSweepWithItsError)
 {
     const ScenarioFile file =
         file_of(replaced(small_scenario(), "speed_rel: 0.1", "speed_rel: $v") + "sweep: {v: [0.1, fast]}\n");
-    EXPECT_THAT(error_of([&] { run_all(file, 2, false); }), HasSubstr("s.yaml:6:36: expected a number"));
+    EXPECT_THAT(error_of([&] { run_all(file, 2, false); }), HasSubstr("s.yaml:6:38: expected a number"));
 }
 
 TEST(Runner, ADriveThatRefusesItsParametersIsAnErrorThatNamesThem)

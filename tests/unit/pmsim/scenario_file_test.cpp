@@ -82,8 +82,7 @@ TEST(ScenarioFile, ErrorsOfTheDocument)
               "s.yaml:2:10: there is no machine file sim_plant/machines/ipm.yaml");
     EXPECT_EQ(error_with("theta_e_deg", "theta_e_rad"),
               "s.yaml:3:9: unknown key \"theta_e_rad\": wrong unit; did you mean \"theta_e_deg\"?");
-    EXPECT_EQ(error_with("start:", "drive: {R_x: 1}\nstart:").substr(0, 31),
-              "s.yaml:3:9: unknown key \"R_x\";");
+    EXPECT_THAT(error_with("start:", "drive: {R_x: 1}\nstart:"), StartsWith("s.yaml:3:9: unknown key \"R_x\""));
     EXPECT_EQ(error_with("start:", "title: again\nstart:"),
               "s.yaml:3:1: key \"title\" stands here a second time; first at line 1");
 }
@@ -161,7 +160,7 @@ TEST(ScenarioFile, TheProjectsScenariosLoad)
     for (const auto &entry : fs::directory_iterator("tests/scenario")) {
         if (entry.path().extension() == ".yaml") {
             const ScenarioFile file(entry.path().string());
-            for (const Run &run : file.runs()) {
+            for (const pmsim::Run &run : file.runs()) {
                 EXPECT_EQ(error_of([&] { file.scenario(run); }), "no error") << entry.path();
             }
         }

@@ -13,27 +13,27 @@ namespace
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-std::vector<Run> runs_of(const std::string &text, const Variables &fixed = {})
+std::vector<pmsim::Run> runs_of(const std::string &text, const Variables &fixed = {})
 {
     return expand_runs(Map(Value::from_text(text, "s.yaml")), fixed);
 }
 
 TEST(Sweep, NothingIsOneRun)
 {
-    const std::vector<Run> runs = runs_of("title: x");
+    const std::vector<pmsim::Run> runs = runs_of("title: x");
     ASSERT_EQ(runs.size(), 1U);
     EXPECT_EQ(runs[0].name, "");
 }
 
 TEST(Sweep, GridIsEveryCombinationOnceWithBothEnds)
 {
-    const std::vector<Run> runs = runs_of("sweep:\n"
+    const std::vector<pmsim::Run> runs = runs_of("sweep:\n"
                                           "  angle: {from: 0, to: 355, step: 5}\n"
                                           "  direction: [1, -1]\n"
                                           "  load: [0, 0.5]\n");
     ASSERT_EQ(runs.size(), 72U * 2U * 2U);
     std::set<std::string> names;
-    for (const Run &run : runs) {
+    for (const pmsim::Run &run : runs) {
         names.insert(run.name);
     }
     EXPECT_EQ(names.size(), runs.size());
@@ -43,7 +43,7 @@ TEST(Sweep, GridIsEveryCombinationOnceWithBothEnds)
 
 TEST(Sweep, StepsDoNotDrift)
 {
-    const std::vector<Run> runs = runs_of("sweep: {x: {from: 0, to: 1, step: 0.1}}");
+    const std::vector<pmsim::Run> runs = runs_of("sweep: {x: {from: 0, to: 1, step: 0.1}}");
     ASSERT_EQ(runs.size(), 11U);
     EXPECT_EQ(runs[3].variables.at("x"), "0.3");
     EXPECT_EQ(runs[10].variables.at("x"), "1");
@@ -51,12 +51,12 @@ TEST(Sweep, StepsDoNotDrift)
 
 TEST(Sweep, CasesAreCrossedWithTheGrid)
 {
-    const std::vector<Run> runs = runs_of("cases:\n"
+    const std::vector<pmsim::Run> runs = runs_of("cases:\n"
                                           "  - {name: small, R: 1, L: 2}\n"
                                           "  - {R: 3, L: 4}\n"
                                           "sweep: {x: [5, 6]}\n");
     std::vector<std::string> names;
-    for (const Run &run : runs) {
+    for (const pmsim::Run &run : runs) {
         names.push_back(run.name);
     }
     EXPECT_THAT(names, ElementsAre("small x=5", "small x=6", "L=4 R=3 x=5", "L=4 R=3 x=6"));
@@ -67,7 +67,7 @@ TEST(Sweep, OneValueCanBeChosen)
 {
     const std::string text = "cases: [{name: a, R: 1}, {name: b, R: 2}]\nsweep: {x: [5, 6]}\n";
     EXPECT_EQ(runs_of(text, {{"x", "7"}}).size(), 2U);
-    const std::vector<Run> one = runs_of(text, {{"x", "5"}, {"case", "b"}});
+    const std::vector<pmsim::Run> one = runs_of(text, {{"x", "5"}, {"case", "b"}});
     ASSERT_EQ(one.size(), 1U);
     EXPECT_EQ(one[0].variables.at("R"), "2");
     EXPECT_THAT(error_of([&] {

@@ -1,0 +1,19 @@
+// The firmware's headers as a C++ test sees them. They are C11: some have no linkage of their own, and inline
+// functions use compound literals, which -Wpedantic refuses in C++.
+#pragma once
+
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpedantic"
+extern "C" {
+#include "firmware/control/current_control.h"
+#include "firmware/control/field_weakening.h"
+#include "firmware/control/modulator.h"
+#include "firmware/control/mtpa.h"
+#include "firmware/control/speed_control.h"
+#include "firmware/drive/drive_parts.h"
+#include "firmware/math/estimate.h"
+#include "injection/initial_pulses.h"
+#include "injection/pulsating_square.h"
+#include "observers/active_flux.h"
+}
+#pragma GCC diagnostic pop
