@@ -60,8 +60,6 @@ static void measure(drive_t *drive, const drive_in_t *in)
     drive->i_ab = pm_clarke(drive->i_abc);
     drive->status.v_dc = pm_max(pm_shl((int32_t)in->v_dc, PM_Q_BITS - 16), V_DC_LEAST);
     drive->hw_fault = in->hw_fault;
-    drive->v_past = drive->v_now;
-    drive->v_now = drive->v_next;
 }
 
 static void calibrate(calibration_t *self, const drive_in_t *in)
@@ -94,6 +92,11 @@ static void pulses(drive_t *drive, drive_out_t *out)
     }
 }
 
+static inline pm_ab_t *voltage_slot(drive_t *drive)
+{
+    return &drive->v[drive->period & 1U];
+}
+
 static void write_out(drive_t *drive, pm_ab_t v, pm_ab_t i, drive_out_t *out)
 {
     modulator_out_t m;
@@ -103,7 +106,7 @@ static void write_out(drive_t *drive, pm_ab_t v, pm_ab_t i, drive_out_t *out)
         out->compare[x][1] = (uint16_t)m.on[x];
         out->driven[x] = true;
     }
-    drive->v_next = m.v;
+    *voltage_slot(drive) = m.v;
     drive->limited = m.limited;
 }
 
@@ -138,8 +141,8 @@ static void vector(drive_t *drive, drive_out_t *out)
     /* below this speed the observer would drift on an imposed angle: it is led along */
     const bool led = imposed && pm_abs(open.omega) < drive->config.position.omega_low;
     position_out_t p;
-    position_step(&drive->position, &drive->config.position, drive->v_past, drive->i_ab, led ? &open : NULL,
-                  &p);
+    position_step(&drive->position, &drive->config.position, *voltage_slot(drive), drive->i_ab,
+                  led ? &open : NULL, &p);
     if (imposed) {
         p.i = pm_park(drive->i_ab, pm_dir(open.theta));
     } else {
@@ -164,7 +167,7 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
     if (!out->trip && drive->stage >= STAGE_OPEN_LOOP) {
         vector(drive, out);
     } else {
-        drive->v_next = (pm_ab_t){0, 0};
+        *voltage_slot(drive) = (pm_ab_t){0, 0};
         if (!out->trip && drive->stage == STAGE_PULSES) {
             pulses(drive, out);
         } else {

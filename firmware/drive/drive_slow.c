@@ -181,7 +181,7 @@ static void report(drive_t *drive)
     s->omega = drive->position.pll.omega;
     s->omega_ref = drive->stage == STAGE_OPEN_LOOP ? drive->omega_open : drive->speed.reference;
     s->i_ref = drive->i_ref;
-    s->v = drive->v_next;
+    s->v = drive->v[drive->period & 1U];
     s->weight = drive->position.weight;
     s->quality = drive->position.quality;
 }

@@ -37,8 +37,8 @@ struct drive {
     bool hw_fault;
     bool limited; /* the voltage was, in the last step */
     pm_dq_t u;    /* voltage of the current control, without carrier */
-    /* commanded at k, k-1 and k-2, acting over [k+1, k+2), [k, k+1) and [k-1, k) */
-    pm_ab_t v_next, v_now, v_past;
+    pm_ab_t v[2]; /* by parity of the period: read at k as commanded at k-2, which acted over [k-1, k), then
+                     rewritten */
 
     position_t position;
     initial_pulses_t pulses;

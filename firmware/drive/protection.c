@@ -19,23 +19,27 @@ void drive_trip(drive_t *drive, drive_fault_t fault)
     };
 }
 
+static bool current_within(const drive_t *drive)
+{
+    const pm_q_t top = drive->config.protection.i_trip;
+    const pm_abc_t i = drive->i_abc;
+    return pm_within(i.a, -top, top) && pm_within(i.b, -top, top) && pm_within(i.c, -top, top);
+}
+
 void protection_step(drive_t *drive, const drive_in_t *in)
 {
     const protection_config_t *c = &drive->config.protection;
-    const pm_abc_t i = drive->i_abc;
+    const pm_q_t v_dc = drive->status.v_dc;
+    /* before the calibration the offsets are not known, and nothing is driven */
+    const bool live = drive->stage > STAGE_CALIBRATE;
     if (in->hw_fault) {
         drive_trip(drive, DRIVE_FAULT_HARDWARE);
-    }
-    if (drive->stage <= STAGE_CALIBRATE) {
-        return; /* the offsets are not known yet and nothing is driven */
-    }
-    if (!pm_within(i.a, -c->i_trip, c->i_trip) || !pm_within(i.b, -c->i_trip, c->i_trip) ||
-        !pm_within(i.c, -c->i_trip, c->i_trip)) {
+    } else if (live && !current_within(drive)) {
         drive_trip(drive, DRIVE_FAULT_OVER_CURRENT);
-    }
-    const pm_q_t v_dc = drive->status.v_dc;
-    if (!pm_within(v_dc, c->v_dc_min, c->v_dc_max)) {
+    } else if (live && !pm_within(v_dc, c->v_dc_min, c->v_dc_max)) {
         drive_trip(drive, v_dc > c->v_dc_max ? DRIVE_FAULT_OVER_VOLTAGE : DRIVE_FAULT_UNDER_VOLTAGE);
+    } else {
+        /* all is well */
     }
 }
 

@@ -168,11 +168,12 @@ inline active_flux_config_t flux_config(const Machine &linear, const Base &b, do
 class Rotation
 {
   public:
-    Rotation(const Machine &m, const Base &b, double omega_pu, Complex i_dq_A, double theta_rad = 0)
-        : theta_rad(theta_rad), omega_rad_s(omega_pu * b.omega_rad_s), i_dq_A(i_dq_A), m_(m), b_(b)
+    Rotation(const Machine &m, const Base &b, double omega_pu, Complex i_A, double start_rad = 0)
+        : theta_rad(start_rad), omega_rad_s(omega_pu * b.omega_rad_s), i_dq_A(i_A), m_(m), b_(b)
     {
         i_A_ = i_dq_A * std::polar(1.0, theta_rad);
-        psi_Wb_ = m.flux_Wb(i_dq_A) * std::polar(1.0, theta_rad);
+        psi_dq_Wb_ = m.flux_Wb(i_dq_A);
+        psi_Wb_ = psi_dq_Wb_ * std::polar(1.0, theta_rad);
     }
 
     // To the next sample. The mean voltage is exact: change of flux and resistive drop of the mean current.
@@ -183,7 +184,7 @@ class Rotation
         const double turn = omega_rad_s * b_.period_s;
         theta_rad += turn;
         i_A_ = i_dq_A * std::polar(1.0, theta_rad);
-        psi_Wb_ = m_.flux_Wb(i_dq_A) * std::polar(1.0, theta_rad);
+        psi_Wb_ = psi_dq_Wb_ * std::polar(1.0, theta_rad);
         const Complex i_mean = std::abs(turn) < 1e-9 ? i_A_ : (i_A_ - i_past) / (kJ * turn);
         v_V_ = (psi_Wb_ - psi_past) / b_.period_s + m_.R_ohm * i_mean;
     }
@@ -202,12 +203,12 @@ class Rotation
     }
 
     double theta_rad, omega_rad_s;
-    Complex i_dq_A;
+    const Complex i_dq_A;
 
   private:
     Machine m_;
     Base b_;
-    Complex i_A_, psi_Wb_, v_V_ = 0;
+    Complex i_A_, psi_dq_Wb_, psi_Wb_, v_V_ = 0;
 };
 
 // METHODS.md 2.4.2, in the order of firmware/math/pll.h.

@@ -4,6 +4,7 @@
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wpedantic"
+#pragma GCC diagnostic ignored "-Wc++20-extensions"
 extern "C" {
 #include "firmware/control/current_control.h"
 #include "firmware/control/field_weakening.h"

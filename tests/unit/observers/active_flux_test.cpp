@@ -60,7 +60,7 @@ Fixture ipm_saturated()
 class Closed
 {
   public:
-    Closed(const Fixture &f, Rotation rotation) : f_(f), rotation(rotation)
+    Closed(const Fixture &f, const Rotation &truth) : rotation(truth), f_(f)
     {
         loop.theta_rad = rotation.theta_rad;
         loop.omega_rad_s = rotation.omega_rad_s;
@@ -77,7 +77,7 @@ class Closed
         active_flux_step(&state, &f_.config, &in, &out);
         loop.correct(real(out.eps), f_.base.period_s);
         if (++periods_ % kSlow == 0) {
-            active_flux_slow(&state, &f_.config, in.i_dq, in.omega, PM_ONE);
+            active_flux_slow(&state, &f_.config, &in, &out, PM_ONE);
         }
     }
 
@@ -94,14 +94,13 @@ class Closed
         return error_deg();
     }
 
-  private:
-    Fixture f_;
-    int periods_ = 0;
-
-  public:
     active_flux_t state = {};
     bench::Loop loop;
     Rotation rotation;
+
+  private:
+    Fixture f_;
+    int periods_ = 0;
 };
 
 TEST(ActiveFlux, FindsThePositionOfALinearMachine)
@@ -373,7 +372,7 @@ class Tied
             const obs_in_t in = rotation_.seen(rotation_.theta_rad, rotation_.omega_rad_s);
             active_flux_step(&state, &f_.config, &in, &out);
             if (++periods_ % kSlow == 0) {
-                active_flux_slow(&state, &f_.config, in.i_dq, in.omega, weight);
+                active_flux_slow(&state, &f_.config, &in, &out, weight);
             }
         }
     }

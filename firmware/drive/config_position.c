@@ -1,0 +1,156 @@
+/* Configuration of the position sources. */
+#include "firmware/drive/config_maker.h"
+
+static pm_pll_config_t make_pll(maker_t *m, drive_param_id_t bandwidth)
+{
+    const pm_num_t w_n = angular(m, bandwidth);
+    const pm_num_t kp = mul3(pm_num_ratio(9, 5), w_n, m->base.t_s); /* zeta = 0.9 */
+    const pm_num_t ki = pm_num_div(pm_num_mul(square(w_n), m->base.t_s), m->base.omega);
+    const pm_num_t turns = pm_num_div(pm_num_mul(m->base.omega, m->base.t_s), PM_NUM_TWO_PI);
+    return (pm_pll_config_t){
+        .kp = fixed(m, kp, FRAC_BITS, bandwidth),
+        .ki = fixed(m, ki, FRAC_BITS, bandwidth),
+        .k_theta = fixed(m, pm_num_mul(turns, pm_num(16)), 30, DRIVE_PARAM_speed_trip),
+        .omega_limit = PM_Q(1.25),
+    };
+}
+
+static void make_flux(maker_t *m, active_flux_config_t *c)
+{
+    const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
+    const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
+    const pm_num_t change = pm_num_sub(si(m, DRIVE_PARAM_L_q_rated), si(m, DRIVE_PARAM_L_q));
+    c->R = per_unit(m, DRIVE_PARAM_R_s, m->impedance);
+    c->L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
+    c->L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);
+    c->L_q2 = 0;
+    if (m->params->saturation_comp != 0) {
+        c->L_q2 = fixed(m, pm_num_div(pm_num_div(change, m->inductance), square(i_rated)), Q_BITS,
+                        DRIVE_PARAM_L_q_rated);
+    }
+    c->psi_m = per_unit(m, DRIVE_PARAM_psi_m, m->base.psi);
+    c->t_s = fixed(m, step, FRAC_BITS, DRIVE_PARAM_f_pwm);
+    c->g = fixed(m, pm_num_mul(si(m, DRIVE_PARAM_flux_gain), step), FRAC_BITS, DRIVE_PARAM_flux_gain);
+    c->k_adapt = PM_FRAC(0.01);
+    /* tie of 300 rad/s; R follows in 8 ms at rated current */
+    const pm_num_t tie = pm_num(300);
+    const pm_num_t follow = pm_num_ratio(1, 8);
+    c->k_seed = fixed(m, pm_num_mul(tie, m->base.t_s), FRAC_BITS, DRIVE_PARAM_f_pwm);
+    c->k_R = 0;
+    if (m->params->resistance_adaptation != 0) {
+        const pm_num_t k_R = pm_num_div(pm_num_mul(follow, tie), pm_num_mul(m->base.omega, square(i_rated)));
+        c->k_R = fixed(m, k_R, GAIN_BITS, DRIVE_PARAM_i_rated);
+    }
+    c->omega_R = speed(m, DRIVE_PARAM_speed_low) / 2;
+    c->R_min = c->R / 2;
+    c->R_max = c->R < PM_Q(4.0) ? c->R * 2 : PM_Q(7.9);
+}
+
+typedef struct {
+    pm_num_t L_d, L_q, L_dq;
+} inductances_t;
+
+/* The loop gain follows the saturating saliency, but not further than this: beyond, it would amplify noise.
+ */
+#define GAIN_RISE pm_num_ratio(5, 2)
+
+/* d eps-free signal / d angle: V_h T_s [(L_q - L_d) + 2 L_dq^2 / L_q] / D, a current per radian. */
+static pm_num_t carrier_slope(const maker_t *m, inductances_t L)
+{
+    const pm_num_t flux = pm_num_mul(si(m, DRIVE_PARAM_v_injection), m->base.t_s);
+    const pm_num_t cross = pm_num_mul(pm_num(2), pm_num_div(square(L.L_dq), L.L_q));
+    const pm_num_t D = pm_num_sub(pm_num_mul(L.L_d, L.L_q), square(L.L_dq));
+    return pm_num_div(pm_num_mul(flux, pm_num_add(pm_num_sub(L.L_q, L.L_d), cross)), D);
+}
+
+static void make_square(maker_t *m, pulsating_square_config_t *c)
+{
+    const inductances_t zero = {si(m, DRIVE_PARAM_L_d), si(m, DRIVE_PARAM_L_q), pm_num(0)};
+    const inductances_t rated = {si(m, DRIVE_PARAM_L_dh_rated), si(m, DRIVE_PARAM_L_qh_rated),
+                                 si(m, DRIVE_PARAM_L_dqh_rated)};
+    const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
+    const pm_num_t gain_0 = pm_num_div(m->base.i, carrier_slope(m, zero));
+    const pm_num_t gain_r =
+        least(pm_num_div(m->base.i, carrier_slope(m, rated)), pm_num_mul(GAIN_RISE, gain_0));
+    const pm_num_t full = pm_num_div(rated.L_dq, rated.L_q);
+    const pm_num_t half = si(m, DRIVE_PARAM_cross_half);
+
+    c->v_h = per_unit(m, DRIVE_PARAM_v_injection, m->base.v);
+    c->gain_0 = fixed(m, gain_0, SMALL_BITS, DRIVE_PARAM_v_injection);
+    c->gain_2 = fixed(m, pm_num_div(pm_num_sub(gain_r, gain_0), square(i_rated)), SMALL_BITS,
+                      DRIVE_PARAM_v_injection);
+    c->lambda_1 = 0;
+    c->lambda_2 = 0;
+    if (m->params->cross_coupling_comp != 0) {
+        /* parabola through lambda = 0, half, full at i_q = 0, i_rated/2, i_rated */
+        const pm_num_t a = pm_num_sub(pm_num_mul(pm_num(4), half), full);
+        const pm_num_t b = pm_num_mul(pm_num(2), pm_num_sub(full, pm_num_mul(pm_num(2), half)));
+        c->lambda_1 = fixed(m, pm_num_div(a, i_rated), Q_BITS, DRIVE_PARAM_L_dqh_rated);
+        c->lambda_2 = fixed(m, pm_num_div(b, square(i_rated)), Q_BITS, DRIVE_PARAM_L_dqh_rated);
+    }
+    const pm_num_t flux = pm_num_mul(si(m, DRIVE_PARAM_v_injection), m->base.t_s);
+    const pm_num_t h_d = pm_num_div(pm_num_div(flux, zero.L_d), m->base.i);
+    c->h_d = fixed(m, h_d, Q_BITS, DRIVE_PARAM_v_injection);
+    c->half_step = fixed(m, pm_num_mul(pm_num_mul(m->base.t_s, m->base.omega), pm_num_ratio(1, 2)), FRAC_BITS,
+                         DRIVE_PARAM_f_pwm);
+    c->h_d_inverse = fixed(m, pm_num_div(pm_num(1), h_d), SMALL_BITS, DRIVE_PARAM_v_injection);
+}
+
+/* The carrier must be seen: eight times the noise of a sample at 45 degrees of error, and 5 % of saliency. */
+bool salient(const maker_t *m)
+{
+    const pm_num_t L_d = si(m, DRIVE_PARAM_L_d);
+    const pm_num_t L_q = si(m, DRIVE_PARAM_L_q);
+    const pm_num_t flux = pm_num_mul(si(m, DRIVE_PARAM_v_injection), m->base.t_s);
+    const pm_num_t dL = pm_num_sub(L_q, L_d);
+    const pm_num_t signal = pm_num_div(pm_num_mul(flux, dL), pm_num_mul(pm_num(2), pm_num_mul(L_d, L_q)));
+    const pm_num_t noise = pm_num_mul(pm_num(4), si(m, DRIVE_PARAM_i_noise));
+    return pm_num_cmp(signal, noise) > 0 && pm_num_cmp(dL, pm_num_mul(L_q, pm_num_ratio(1, 20))) > 0;
+}
+
+void make_position(maker_t *m, position_config_t *c, bool injection)
+{
+    make_flux(m, &c->flux);
+    c->injection = injection;
+    c->omega_low = speed(m, DRIVE_PARAM_speed_low);
+    c->omega_high = speed(m, DRIVE_PARAM_speed_high);
+    c->pll_low = make_pll(m, DRIVE_PARAM_injection_bandwidth);
+    c->pll_high = make_pll(m, DRIVE_PARAM_flux_bandwidth);
+    if (m->params->speed_high <= m->params->speed_low) {
+        refuse(m, DRIVE_PARAM_speed_high, "must be above speed_low");
+        return;
+    }
+    const pm_num_t span = pm_num_sub(si(m, DRIVE_PARAM_speed_high), si(m, DRIVE_PARAM_speed_low));
+    c->per_span = fixed(m, pm_num_div(m->base.omega, pm_num_mul(span, pole_pairs(m))), SMALL_BITS,
+                        DRIVE_PARAM_speed_high);
+    if (injection) {
+        make_square(m, &c->square);
+    }
+}
+
+/* Flux that gives i_pulse along the d-axis, by whole periods at a duty <= 1. */
+void make_pulses(maker_t *m, initial_pulses_config_t *c)
+{
+    const pm_num_t L_d = si(m, DRIVE_PARAM_L_d);
+    const pm_num_t L_q = si(m, DRIVE_PARAM_L_q);
+    const pm_num_t flux = pm_num_mul(si(m, DRIVE_PARAM_i_pulse), L_d);
+    const pm_num_t per_period = mul3(pm_num_ratio(2, 3), si(m, DRIVE_PARAM_v_dc_nominal), m->base.t_s);
+    const pm_num_t exact = pm_num_div(flux, per_period);
+    int32_t whole;
+    if (!pm_num_to_fixed(pm_num_add(exact, pm_num_ratio(1, 2)), 0, &whole) || whole > 10000) {
+        refuse(m, DRIVE_PARAM_i_pulse, "pulse longer than 10000 periods");
+        return;
+    }
+    whole = whole < 1 ? 1 : whole;
+    c->periods = (uint16_t)whole;
+    c->timeout = (uint16_t)(8 * whole + 50);
+    const pm_num_t duty = pm_num_div(exact, pm_num(whole));
+    c->duty = fixed(m, least(duty, pm_num(1)), Q_BITS, DRIVE_PARAM_i_pulse);
+    const pm_num_t noise = pm_num_div(si(m, DRIVE_PARAM_i_noise), m->base.i);
+    c->i_zero = fixed(m, pm_num_mul(pm_num(5), noise), Q_BITS, DRIVE_PARAM_i_noise);
+    /* y of the unsaturated machine is 3 i_pulse (L_q - L_d) / L_q */
+    const pm_num_t share = pm_num_div(pm_num_sub(L_q, L_d), L_q);
+    const pm_num_t i_pulse = pm_num_div(si(m, DRIVE_PARAM_i_pulse), m->base.i);
+    c->y_min = fixed(m, mul3(share, i_pulse, pm_num_ratio(3, 4)), Q_BITS, DRIVE_PARAM_i_pulse);
+    c->w_min = fixed(m, pm_num_mul(pm_num(10), noise), Q_BITS, DRIVE_PARAM_i_noise);
+}
