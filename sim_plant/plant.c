@@ -88,11 +88,17 @@ static void capture(plant_t *plant)
     plant->v_sampled_V = plant->circuit.now.x[V_DC];
 }
 
+static bool same_machine(const plant_machine_t *a, const plant_machine_t *b)
+{
+    return a->R_s_ohm == b->R_s_ohm && a->L_d0_H == b->L_d0_H && a->L_q0_H == b->L_q0_H &&
+           a->c_A_Wb5 == b->c_A_Wb5 && a->psi_m_Wb == b->psi_m_Wb && a->pole_pairs == b->pole_pairs;
+}
+
 /* Drift is not the circuit's doing: ohmic energy so far is booked with the old resistance, and the field
  * energy that the change itself brings is left out of the balance. */
 static void take_parameters(plant_t *plant)
 {
-    if (memcmp(&plant->machine, &plant->machine_known, sizeof plant->machine) == 0) {
+    if (same_machine(&plant->machine, &plant->machine_known)) {
         return;
     }
     assert(!config_machine_fault(&plant->machine));

@@ -96,6 +96,15 @@ static void make_square(maker_t *m, pulsating_square_config_t *c)
     c->h_d_inverse = fixed(m, pm_num_div(pm_num(1), h_d), SMALL_BITS, DRIVE_PARAM_v_injection);
 }
 
+/* Carrier and control share the voltage vector: at most 0.6 of v_dc / sqrt(3) may go to the carrier. */
+static void check_carrier(maker_t *m)
+{
+    const pm_num_t linear = pm_num_mul(si(m, DRIVE_PARAM_v_dc_nominal), pm_num_sqrt(pm_num_ratio(1, 3)));
+    if (pm_num_cmp(si(m, DRIVE_PARAM_v_injection), pm_num_mul(linear, pm_num_ratio(3, 5))) > 0) {
+        refuse(m, DRIVE_PARAM_v_injection, "leaves too little of v_dc_nominal for control");
+    }
+}
+
 /* The carrier must be seen: eight times the noise of a sample at 45 degrees of error, and 5 % of saliency. */
 bool salient(const maker_t *m)
 {
@@ -124,6 +133,7 @@ void make_position(maker_t *m, position_config_t *c, bool injection)
     c->per_span = fixed(m, pm_num_div(m->base.omega, pm_num_mul(span, pole_pairs(m))), SMALL_BITS,
                         DRIVE_PARAM_speed_high);
     if (injection) {
+        check_carrier(m);
         make_square(m, &c->square);
     }
 }

@@ -115,7 +115,10 @@ static void control(drive_t *drive, pm_angle_t theta, pm_q_t omega, pm_dq_t i, d
 {
     const drive_config_t *c = &drive->config;
     const bool inject = drive->position.inject && drive->stage == STAGE_VECTOR;
-    const pm_q_t v_max = pm_unit(drive->status.v_dc, c->v_linear) - (inject ? c->position.square.v_h : 0);
+    pm_q_t v_max = pm_unit(drive->status.v_dc, c->v_linear);
+    if (inject) { /* a sagging link must not leave nothing to control with */
+        v_max = pm_max(v_max - c->position.square.v_h, v_max >> 2);
+    }
     current_control_out_t u;
     current_control_step(&drive->current, &c->current, i, drive->i_ref, omega, v_max, &u);
     drive->u = u.v;

@@ -72,9 +72,8 @@ void open_loop_slow(drive_t *drive)
     drive->i_open = approach(drive->i_open, i_wanted, c->open_loop.i_slope);
     drive->i_ref = (pm_dq_t){.d = drive->i_open, .q = 0};
     if (drive->state_ms < c->open_loop.align_ms) {
-        const pm_angle_t step = c->open_loop.sweep;
-        drive->theta_open = drive->theta_open > UINT32_MAX - step ? 0 : drive->theta_open + step;
-        drive->theta_open = drive->theta_open < SWEEP_FROM ? 0 : drive->theta_open;
+        const pm_angle_t left = 0U - drive->theta_open; /* to angle zero */
+        drive->theta_open += left < c->open_loop.sweep ? left : c->open_loop.sweep;
         return;
     }
     const pm_q_t target = wanted_speed(drive);

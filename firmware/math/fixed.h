@@ -71,7 +71,7 @@ static inline int32_t pm_clamp(int32_t x, int32_t lo, int32_t hi) /* lo <= hi */
 static inline int32_t pm_sat(int32_t x, unsigned n)
 {
 #if PM_HAS_DSP
-    if (__builtin_constant_p(n)) { /* the compiler finds SSAT by itself only now and then */
+    if (__builtin_constant_p(n) != 0) { /* the compiler finds SSAT by itself only now and then */
         int32_t r;
         __asm__("ssat %0, %1, %2" : "=r"(r) : "i"(n + 1U), "r"(x));
         return r;

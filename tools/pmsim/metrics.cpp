@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "tools/pmsim/metrics_special.h"
-#include "tools/pmsim/names.h"
 
 namespace pmsim
 {
@@ -192,6 +191,17 @@ class FoldMetric : public Metric
 
 } // namespace
 
+static const std::vector<SpecialMetric> &special_metrics()
+{
+    static const std::vector<SpecialMetric> table = [] {
+        std::vector<SpecialMetric> list = motion_metrics();
+        const std::vector<SpecialMetric> drive = drive_metrics();
+        list.insert(list.end(), drive.begin(), drive.end());
+        return list;
+    }();
+    return table;
+}
+
 bool has_position(const Sample &sample)
 {
     return sample.rig.state == RIG_RUNNING || sample.rig.state == RIG_STOPPING;
@@ -204,8 +214,9 @@ const std::vector<MetricInfo> &metric_infos()
         for (const FoldedMetric &metric : folded_metrics) {
             list.push_back({metric.name, metric.unit, metric.help, false, false, {}});
         }
-        const std::vector<MetricInfo> special = special_metric_infos();
-        list.insert(list.end(), special.begin(), special.end());
+        for (const SpecialMetric &metric : special_metrics()) {
+            list.push_back(metric.info);
+        }
         return list;
     }();
     return infos;
@@ -237,7 +248,12 @@ std::unique_ptr<Metric> make_metric(const Expectation &expectation, const Setup 
             return std::make_unique<FoldMetric>(metric, setup);
         }
     }
-    return make_special_metric(expectation, setup);
+    for (const SpecialMetric &metric : special_metrics()) {
+        if (expectation.metric == metric.info.name) {
+            return metric.make(expectation, setup);
+        }
+    }
+    return nullptr;
 }
 
 } // namespace pmsim

@@ -1,4 +1,4 @@
-// Metrics that are more than one folded signal: times, faults, travel, energy.
+// Metrics that are more than one folded signal: times, travel, faults, energy.
 #ifndef PMSIM_METRICS_SPECIAL_H
 #define PMSIM_METRICS_SPECIAL_H
 
@@ -7,9 +7,19 @@
 namespace pmsim
 {
 
+struct SpecialMetric {
+    MetricInfo info;
+    std::unique_ptr<Metric> (*make)(const Expectation &, const Setup &);
+};
+
+template <class T> std::unique_ptr<Metric> make_special(const Expectation &expectation, const Setup &setup)
+{
+    return std::make_unique<T>(expectation, setup);
+}
+
 bool has_position(const Sample &sample);
-std::vector<MetricInfo> special_metric_infos();
-std::unique_ptr<Metric> make_special_metric(const Expectation &expectation, const Setup &setup);
+std::vector<SpecialMetric> motion_metrics(); // metrics_motion.cpp
+std::vector<SpecialMetric> drive_metrics();  // metrics_drive.cpp
 
 } // namespace pmsim
 

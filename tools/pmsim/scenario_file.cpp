@@ -106,7 +106,8 @@ void ScenarioFile::check_settings() const
     }
     for (const std::string &section : setup_sections()) {
         for (const std::string &key : section_keys(section)) {
-            known.push_back(section + "." + key);
+            known.push_back(section);
+            known.back().append(".").append(key);
         }
     }
     for (const auto &setting : settings_) {

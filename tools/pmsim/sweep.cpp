@@ -137,7 +137,7 @@ std::vector<Run> expand_runs(const Map &document, const Variables &fixed)
         for (const Run &run : runs) {
             for (const std::string &value : values) {
                 product.push_back(run);
-                product.back().name += (run.name.empty() ? "" : " ") + key + "=" + value;
+                product.back().name.append(run.name.empty() ? "" : " ").append(key).append("=").append(value);
                 if (!product.back().variables.emplace(key, value).second) {
                     throw InputError(axes.key_place(key), "variable \"" + key + "\" is given by cases too");
                 }

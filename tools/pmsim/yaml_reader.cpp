@@ -36,8 +36,8 @@ static Place place_of(const YAML::Mark &mark, const std::string &file)
     return {file, mark.line + 1, mark.column + 1};
 }
 
-Value::Value(YAML::Node node, std::string file, const Variables *variables)
-    : node_(std::move(node)), file_(std::move(file)), variables_(variables)
+Value::Value(const YAML::Node &node, std::string file, const Variables *variables)
+    : node_(node), file_(std::move(file)), variables_(variables)
 {
 }
 
@@ -145,9 +145,11 @@ double Value::evaluate(const std::string &text) const
         const char *end = digits.data() + digits.size();
         const auto result = std::from_chars(digits.data(), end, value);
         if (digits.empty() || result.ptr != end) {
-            fail("expected a number, found \"" + text + "\"" +
-                 (is_variable ? " (" + factor + " is \"" + digits + "\")" : "") +
-                 "; a unit belongs in the key");
+            std::string found = "\"" + text + "\"";
+            if (is_variable) {
+                found.append(" (").append(factor).append(" is \"").append(digits).append("\")");
+            }
+            fail("expected a number, found " + found + "; a unit belongs in the key");
         }
         if (result.ec != std::errc() || !std::isfinite(value)) {
             fail("\"" + text + "\" is not a finite number");
@@ -179,9 +181,9 @@ int64_t Value::integer(int64_t min, int64_t max) const
 
 std::string Value::text() const
 {
-    const std::string text = scalar();
+    std::string text = scalar();
     if (text.size() > 1 && text[0] == '$') {
-        return variable(text.substr(1));
+        text = variable(text.substr(1));
     }
     return text;
 }
@@ -200,7 +202,7 @@ bool Value::flag() const
 
 std::string Value::word(const std::vector<std::string> &known) const
 {
-    const std::string value = text();
+    std::string value = text();
     if (std::find(known.begin(), known.end(), value) == known.end()) {
         fail("\"" + value + "\" is not known here; one of: " + join(known, ", ") +
              did_you_mean(nearest(value, known)));

@@ -40,7 +40,7 @@ using Variables = std::map<std::string, std::string>;
 class Value
 {
   public:
-    Value(YAML::Node node, std::string file, const Variables *variables = nullptr);
+    Value(const YAML::Node &node, std::string file, const Variables *variables = nullptr);
 
     static Value from_file(const std::string &path, const Variables *variables = nullptr);
     static Value from_text(const std::string &text, const std::string &name,

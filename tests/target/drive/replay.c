@@ -1,5 +1,5 @@
-/* Replays a record of `pmsim record` on the target: the outputs must be the recorded bits, and every call of step_*()
- * is one control period to be counted, by mode. */
+/* Replays a record of `pmsim record` on the target: the outputs must be the recorded bits, and every call of
+ * step_*() is one control period to be counted, by mode. */
 #include <stdio.h>
 #include <string.h>
 
@@ -7,12 +7,12 @@
 #include "tools/pmsim/record.h"
 
 /* Wrappers tell the modes apart; each adds its call, two instructions and its mark. */
-#define MODE(name, mark)                                                                                              \
-    void step_##name(drive_t *d, const drive_in_t *in, drive_out_t *out);                                             \
-    __attribute__((noinline, noclone)) void step_##name(drive_t *d, const drive_in_t *in, drive_out_t *out)           \
-    {                                                                                                                 \
-        __asm volatile(mark);                                                                                         \
-        drive_step(d, in, out);                                                                                       \
+#define MODE(name, mark)                                                                                     \
+    void step_##name(drive_t *d, const drive_in_t *in, drive_out_t *out);                                    \
+    __attribute__((noinline, noclone)) void step_##name(drive_t *d, const drive_in_t *in, drive_out_t *out)  \
+    {                                                                                                        \
+        __asm volatile(mark);                                                                                \
+        drive_step(d, in, out);                                                                              \
     }
 MODE(flux, "")
 MODE(injection, "nop")
@@ -37,7 +37,8 @@ static bool same(const record_period_t *r, const drive_out_t *out)
         if (out->driven[x] != (r->driven[x] != 0U)) {
             return false;
         }
-        if (out->driven[x] && (out->compare[x][0] != r->compare[x][0] || out->compare[x][1] != r->compare[x][1])) {
+        if (out->driven[x] &&
+            (out->compare[x][0] != r->compare[x][0] || out->compare[x][1] != r->compare[x][1])) {
             return false;
         }
     }
@@ -62,7 +63,8 @@ static void give(const record_period_t *r)
 static bool open_record(FILE *file, record_header_t *header)
 {
     drive_params_t params;
-    if (fread(header, sizeof *header, 1, file) != 1 || memcmp(header->magic, RECORD_MAGIC, sizeof header->magic) != 0 ||
+    if (fread(header, sizeof *header, 1, file) != 1 ||
+        memcmp(header->magic, RECORD_MAGIC, sizeof header->magic) != 0 ||
         header->parameters != DRIVE_PARAM_COUNT || header->period_bytes != sizeof(record_period_t)) {
         return false;
     }

@@ -24,8 +24,8 @@ constexpr double kFormula = 0.20;
 constexpr double kClosedForm = 0.05;
 // Rounding of one period in flux: 2^-27, gathered over the observer's memory of some hundred periods.
 constexpr double kRounding = 1e-6;
-// The tie's own lag, 1/300 s, stands in series with the 8 ms of the adaptation.
-constexpr double kAdaptationTime = 0.5;
+// The adaptation is sampled at 1 kHz: it lags the continuous form by half a millisecond of 8.
+constexpr double kAdaptationPath = 0.07;
 constexpr double kAdapted = 0.02;
 
 constexpr int kSlow = 10; // periods of 1 ms
@@ -404,18 +404,21 @@ TEST(ActiveFlux, ResistanceIsFoundWhileInjectionLeads)
     }
 }
 
-TEST(ActiveFlux, ResistanceFollowsInEightMilliseconds)
+// Tie k_q in series with the adaptation in 8 ms: r'' + k_q r' + k_q r / 8 ms = 0, an error r at rest.
+TEST(ActiveFlux, ResistanceFollowsAtTheRateDerived)
 {
     Fixture f = ipm_linear();
     const double truth = real(f.config.R);
     f.config.R = static_cast<pm_q_t>(1.4 * f.config.R);
+    const double k_q = 300, damping = k_q / 2, swing = std::sqrt(k_q / 8e-3 - damping * damping);
     Tied tied(f, 0, {0, 4});
-    tied.run(0.012); // the tie has settled
-    const double start = real(tied.state.R) - truth;
-    tied.run(0.008);
-    const double ratio = (real(tied.state.R) - truth) / start;
-    EXPECT_GT(-1 / std::log(ratio), 1 - kAdaptationTime);
-    EXPECT_LT(-1 / std::log(ratio), 1 + kAdaptationTime);
+    for (int ms = 1; ms <= 40; ++ms) {
+        tied.run(1e-3);
+        const double t = ms * 1e-3;
+        const double expected =
+            std::exp(-damping * t) * (std::cos(swing * t) + damping / swing * std::sin(swing * t));
+        EXPECT_NEAR((real(tied.state.R) - truth) / (0.4 * truth), expected, kAdaptationPath) << ms;
+    }
 }
 
 TEST(ActiveFlux, ResistanceStaysWhereItCannotBeSeen)

@@ -47,7 +47,7 @@ std::string trace_of(const std::string &text, const std::string &name)
     TraceWriter trace(path, scenario, 7);
     run_scenario(scenario, [&trace](const Sample &sample) { trace.add(sample); });
     trace.close();
-    const std::string read = content(path);
+    std::string read = content(path);
     std::filesystem::remove(path);
     return read;
 }

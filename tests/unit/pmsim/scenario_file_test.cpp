@@ -82,7 +82,8 @@ TEST(ScenarioFile, ErrorsOfTheDocument)
               "s.yaml:2:10: there is no machine file sim_plant/machines/ipm.yaml");
     EXPECT_EQ(error_with("theta_e_deg", "theta_e_rad"),
               "s.yaml:3:9: unknown key \"theta_e_rad\": wrong unit; did you mean \"theta_e_deg\"?");
-    EXPECT_THAT(error_with("start:", "drive: {R_x: 1}\nstart:"), StartsWith("s.yaml:3:9: unknown key \"R_x\""));
+    EXPECT_THAT(error_with("start:", "drive: {R_x: 1}\nstart:"),
+                StartsWith("s.yaml:3:9: unknown key \"R_x\""));
     EXPECT_EQ(error_with("start:", "title: again\nstart:"),
               "s.yaml:3:1: key \"title\" stands here a second time; first at line 1");
 }

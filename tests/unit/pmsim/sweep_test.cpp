@@ -28,9 +28,9 @@ TEST(Sweep, NothingIsOneRun)
 TEST(Sweep, GridIsEveryCombinationOnceWithBothEnds)
 {
     const std::vector<pmsim::Run> runs = runs_of("sweep:\n"
-                                          "  angle: {from: 0, to: 355, step: 5}\n"
-                                          "  direction: [1, -1]\n"
-                                          "  load: [0, 0.5]\n");
+                                                 "  angle: {from: 0, to: 355, step: 5}\n"
+                                                 "  direction: [1, -1]\n"
+                                                 "  load: [0, 0.5]\n");
     ASSERT_EQ(runs.size(), 72U * 2U * 2U);
     std::set<std::string> names;
     for (const pmsim::Run &run : runs) {
@@ -52,10 +52,11 @@ TEST(Sweep, StepsDoNotDrift)
 TEST(Sweep, CasesAreCrossedWithTheGrid)
 {
     const std::vector<pmsim::Run> runs = runs_of("cases:\n"
-                                          "  - {name: small, R: 1, L: 2}\n"
-                                          "  - {R: 3, L: 4}\n"
-                                          "sweep: {x: [5, 6]}\n");
+                                                 "  - {name: small, R: 1, L: 2}\n"
+                                                 "  - {R: 3, L: 4}\n"
+                                                 "sweep: {x: [5, 6]}\n");
     std::vector<std::string> names;
+    names.reserve(runs.size());
     for (const pmsim::Run &run : runs) {
         names.push_back(run.name);
     }

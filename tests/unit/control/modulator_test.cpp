@@ -1,0 +1,267 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "tests/contract/bench.h"
+#include "tests/unit/math/samples.h"
+
+namespace
+{
+
+using bench::Complex;
+using bench::fixed;
+using bench::kDegree;
+using bench::real;
+
+// A leg is rounded to the nearest count; the scale is cut, relative (v + 1/v) 2^-16 of half the counts.
+constexpr double kLeg_counts = 1.0;
+// Compensation is rounded down once more, and the positive end of the zone is one below its full value.
+constexpr double kCompensation_counts = 2.0;
+// METHODS.md 1.3.2.1 (e).
+constexpr double kFundamental = 0.005;
+constexpr double kAngle_deg = 1.0;
+// pm_ratio(): 2^-16 ... 2^-15 of the span that was asked for.
+constexpr double kShorten = 0x1p-15;
+
+constexpr int kCounts = 8500;
+constexpr double kLink = 300.0 / 450.0;
+
+modulator_config_t plain(int counts = kCounts)
+{
+    modulator_config_t c = {};
+    c.counts = counts;
+    return c;
+}
+
+// 2 us at 10 kHz, 1 V of 450 V, linear below 30 mA of 10 A.
+constexpr double kDead = 0.02, kDrop = 1.0 / 450, kZone = 0.003;
+
+modulator_config_t compensating(int counts = kCounts)
+{
+    modulator_config_t c = plain(counts);
+    c.dead_counts = static_cast<int32_t>(std::lround(kDead * counts));
+    c.drop = fixed(kDrop, 28);
+    c.zone_gain = fixed(1 / kZone, 15 + 4); // 2^15 at the edge: zone 2^28 gain 2^-32
+    c.compensate = true;
+    return c;
+}
+
+struct Legs {
+    double x[3];
+
+    double top() const
+    {
+        return *std::max_element(x, x + 3);
+    }
+    double bottom() const
+    {
+        return *std::min_element(x, x + 3);
+    }
+};
+
+Legs phases(Complex v)
+{
+    return {{v.real(), -0.5 * v.real() + std::sqrt(0.75) * v.imag(), -0.5 * v.real() - std::sqrt(0.75) * v.imag()}};
+}
+
+// Duties of the textbook: each phase about the middle of the largest and the smallest.
+Legs reference(Complex v, double v_dc)
+{
+    const Legs u = phases(v);
+    const double zero = (u.top() + u.bottom()) / 2;
+    Legs duty = {};
+    for (int leg = 0; leg < 3; ++leg) {
+        duty.x[leg] = 0.5 + (u.x[leg] - zero) / v_dc;
+    }
+    return duty;
+}
+
+Complex realised(const modulator_out_t &out, int counts, double v_dc)
+{
+    double u[3];
+    for (int leg = 0; leg < 3; ++leg) {
+        u[leg] = v_dc * out.on[leg] / counts;
+    }
+    return {(2 * u[0] - u[1] - u[2]) / 3, (u[1] - u[2]) / std::sqrt(3.0)};
+}
+
+modulator_out_t step(const modulator_config_t &c, Complex v, double v_dc, Complex i = 0)
+{
+    modulator_out_t out;
+    modulator_step(&c, bench::ab(v), fixed(v_dc, 28), bench::ab(i), &out);
+    return out;
+}
+
+TEST(Modulator, DutyIsThatOfTheTextbook)
+{
+    for (const int counts : {200, 8500, 8501, 32767}) {
+        const modulator_config_t c = plain(counts);
+        for (const double v_dc : {1.0 / 16, 0.2, kLink, 1.0}) {
+            for (int a = 0; a < 360; a += 3) {
+                for (const double share : {0.0, 0.01, 0.3, 0.7, 1.0 - 1e-6}) {
+                    const Complex v = std::polar(share * v_dc / std::sqrt(3.0), a * kDegree);
+                    const modulator_out_t out = step(c, v, v_dc);
+                    const Legs duty = reference(v, v_dc);
+                    const double scale = (v_dc + 1 / v_dc) * 0x1p-16 * counts / 2;
+                    for (int leg = 0; leg < 3; ++leg) {
+                        ASSERT_NEAR(out.on[leg], counts * duty.x[leg], kLeg_counts + scale)
+                            << counts << ' ' << v_dc << ' ' << a << ' ' << share;
+                    }
+                }
+            }
+        }
+    }
+}
+
+TEST(Modulator, FundamentalIsTheCommandBelowTheLimit)
+{
+    const modulator_config_t c = plain();
+    for (double share = 0.05; share <= 1.0; share += 0.05) {
+        const double amplitude = share * kLink / std::sqrt(3.0);
+        Complex sum = 0;
+        const int n = 360;
+        for (int k = 0; k < n; ++k) {
+            const double angle = k * 2 * bench::kPi / n;
+            sum += realised(step(c, std::polar(amplitude, angle), kLink), c.counts, kLink) * std::polar(1.0, -angle);
+        }
+        EXPECT_NEAR(std::abs(sum) / n, amplitude, kFundamental * amplitude) << share;
+        EXPECT_NEAR(std::arg(sum) / kDegree, 0, 0.05) << share;
+    }
+}
+
+TEST(Modulator, LinearUpToTheInscribedCircleExactly)
+{
+    const modulator_config_t c = plain();
+    const double limit = kLink / std::sqrt(3.0);
+    int limited = 0;
+    for (double angle = 0; angle < 360; angle += 0.25) {
+        const Complex inside = std::polar(limit * (1 - 1e-7), angle * kDegree);
+        const modulator_out_t out = step(c, inside, kLink);
+        ASSERT_FALSE(out.limited) << angle;
+        ASSERT_EQ(out.v.alpha, bench::ab(inside).alpha);
+        ASSERT_EQ(out.v.beta, bench::ab(inside).beta);
+        limited += step(c, std::polar(limit * 1.001, angle * kDegree), kLink).limited ? 1 : 0;
+    }
+    // a circle larger by e crosses the hexagon near the middle of its sides, for 2 acos(1/(1+e)) of each 60
+    const double share = 2 * std::acos(1 / 1.001) / (60 * kDegree);
+    EXPECT_NEAR(limited / 1440.0, share, 0.01);
+}
+
+// The corners of the hexagon are reached: 2/3 v_dc along the phases.
+TEST(Modulator, LinearUpToTheCorners)
+{
+    const modulator_config_t c = plain();
+    for (int k = 0; k < 6; ++k) {
+        const modulator_out_t out = step(c, std::polar(2.0 / 3 * kLink * (1 - 1e-6), k * 60 * kDegree), kLink);
+        EXPECT_FALSE(out.limited);
+        EXPECT_NEAR(std::abs(realised(out, c.counts, kLink)), 2.0 / 3 * kLink, 1.5 * kLink / c.counts);
+    }
+}
+
+TEST(Modulator, OvermodulationKeepsTheAngleOnTheHexagon)
+{
+    const modulator_config_t c = plain();
+    const double count = kLink / c.counts;
+    for (int a = 0; a < 720; ++a) {
+        for (const double times : {1.16, 1.3, 2.0, 5.0}) {
+            const double angle = a * 0.5 * kDegree;
+            const Complex v = std::polar(times * kLink / std::sqrt(3.0), angle);
+            const modulator_out_t out = step(c, v, kLink);
+            ASSERT_TRUE(out.limited);
+            const Complex real_v = realised(out, c.counts, kLink);
+            ASSERT_LE(std::abs(std::arg(real_v * std::polar(1.0, -angle))), kAngle_deg * kDegree) << a;
+            // on the hexagon: one leg always on, one always off
+            ASSERT_NEAR(std::max({out.on[0], out.on[1], out.on[2]}), c.counts, 1) << a;
+            ASSERT_NEAR(std::min({out.on[0], out.on[1], out.on[2]}), 0, 1) << a;
+            const Legs u = phases(bench::complex(out.v));
+            const Legs asked = phases(v);
+            ASSERT_NEAR(u.top() - u.bottom(), kLink, kShorten * (asked.top() - asked.bottom()) + 1e-7) << a;
+            // what is returned is what the counts do
+            const Legs counted = phases(real_v);
+            for (int leg = 0; leg < 3; ++leg) {
+                ASSERT_NEAR(counted.x[leg], u.x[leg], count) << a << ' ' << times;
+            }
+        }
+    }
+}
+
+TEST(Modulator, CountsStayWithinTheTimer)
+{
+    samples::Random random;
+    for (int n = 0; n < 100000; ++n) {
+        const int counts = 200 + (random.word() & 0x7fff) % (32768 - 200);
+        modulator_config_t c = compensating(counts);
+        c.compensate = (n & 1) != 0;
+        const Complex v = std::polar(random.within(0, 3.99), random.within(-4, 4));
+        const Complex i = std::polar(random.within(0, 2), random.within(-4, 4));
+        const modulator_out_t out = step(c, v, random.within(1.0 / 16, 1), i);
+        for (const int32_t on : out.on) {
+            ASSERT_GE(on, 0) << n;
+            ASSERT_LE(on, counts) << n;
+        }
+    }
+}
+
+double lost_counts(const modulator_config_t &c, double v_dc)
+{
+    return c.counts * (kDead + kDrop / v_dc);
+}
+
+TEST(Modulator, CompensationGivesBackWhatDeadTimeTakes)
+{
+    const modulator_config_t on = compensating();
+    modulator_config_t off = on;
+    off.compensate = false;
+    for (const double v_dc : {0.25, kLink, 1.0}) {
+        for (int a = 0; a < 360; a += 7) {
+            const Complex i = std::polar(0.3, a * kDegree);
+            const Complex v = std::polar(0.3 * v_dc, 2 * a * kDegree);
+            const modulator_out_t with = step(on, v, v_dc, i);
+            const modulator_out_t without = step(off, v, v_dc, i);
+            const Legs leg = phases(i);
+            for (int x = 0; x < 3; ++x) {
+                if (std::abs(leg.x[x]) > kZone) {
+                    const double expected = std::copysign(lost_counts(on, v_dc), leg.x[x]);
+                    ASSERT_NEAR(with.on[x] - without.on[x], expected, kCompensation_counts) << a << ' ' << x;
+                }
+            }
+            ASSERT_EQ(with.v.alpha, without.v.alpha); // the motor sees the command
+            ASSERT_EQ(with.v.beta, without.v.beta);
+        }
+    }
+}
+
+TEST(Modulator, CompensationIsLinearInItsZone)
+{
+    const modulator_config_t c = compensating();
+    const double full = lost_counts(c, kLink);
+    for (double i = -1.5 * kZone; i <= 1.5 * kZone; i += kZone / 50) {
+        const double expected = full * std::clamp(i / kZone, -1.0, 1.0);
+        // i along phase A: the others carry half of it, reversed
+        const modulator_out_t out = step(c, 0, kLink, i);
+        EXPECT_NEAR(out.on[0] - c.counts / 2, expected, kCompensation_counts) << i;
+        const double other = full * std::clamp(-0.5 * i / kZone, -1.0, 1.0);
+        EXPECT_NEAR(out.on[1] - c.counts / 2, other, kCompensation_counts) << i;
+        EXPECT_NEAR(out.on[2] - c.counts / 2, other, kCompensation_counts) << i;
+    }
+}
+
+TEST(Modulator, CompensationSwitchedOffIsNone)
+{
+    modulator_config_t c = compensating();
+    c.compensate = false;
+    const modulator_config_t none = plain();
+    for (int a = 0; a < 360; a += 5) {
+        const Complex i = std::polar(0.5, a * kDegree);
+        const Complex v = std::polar(0.2, 3 * a * kDegree);
+        const modulator_out_t out = step(c, v, kLink, i);
+        const modulator_out_t expected = step(none, v, kLink, i);
+        for (int x = 0; x < 3; ++x) {
+            ASSERT_EQ(out.on[x], expected.on[x]);
+        }
+    }
+}
+
+} // namespace

@@ -1,0 +1,222 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "tests/contract/bench.h"
+#include "tests/unit/math/samples.h"
+
+namespace
+{
+
+using bench::fixed;
+using bench::real;
+
+// Wide numbers, 2^-22, a few roundings per call; the loop's memory is some 100 calls.
+constexpr double kStep = 4 * 0x1p-22;
+constexpr double kTrajectory = 1e-4;
+// The feed-forward carries the ramp: what remains is the delay of one call.
+constexpr double kRampError = 0.02;
+
+// IPM-1000: 6 Hz, 0.01 kg m2, 3 pole pairs.
+constexpr double kBandwidth = 2 * bench::kPi * 6, kJ_kgm2 = 0.01, kPairs = 3, kPsi_Wb = 0.236;
+constexpr double kSlow_s = 1e-3, kSlope_rad_s2 = 200;
+
+double per_torque() // A per rad/s2 electrical
+{
+    return kJ_kgm2 / (1.5 * kPairs * kPairs * kPsi_Wb);
+}
+
+speed_control_config_t config()
+{
+    const double kp = kBandwidth * per_torque() * bench::kIpmBase.omega_rad_s / bench::kIpmBase.i_A;
+    const double ki = kp * kBandwidth / 4 * kSlow_s;
+    const double slope = kSlope_rad_s2 * kPairs;
+    return {{fixed(kp, 26), fixed(ki, 26), fixed(ki / kp, 31)},
+            fixed(slope * kSlow_s / bench::kIpmBase.omega_rad_s, 28),
+            fixed(slope * per_torque() / bench::kIpmBase.i_A, 28)};
+}
+
+// The law of the header in double precision.
+struct Law {
+    speed_control_config_t c;
+    double reference = 0, integral = 0;
+    bool limited = false;
+
+    double step(double target, double omega, double i_min, double i_max)
+    {
+        const double slope = real(c.slope);
+        const double move = std::clamp(target - reference, -slope, slope);
+        reference += move;
+        const double ramping = std::abs(move) > slope - 0x1p-30 ? std::copysign(real(c.i_per_slope), move) : 0;
+        const double e = reference - omega;
+        const double u = real(c.pi.kp, 26) * e + integral + ramping;
+        const double limited_u = std::clamp(u, i_min, i_max);
+        integral += real(c.pi.ki, 26) * e + real(c.pi.kb, 31) * (limited_u - u);
+        limited = limited_u != u;
+        return limited_u;
+    }
+};
+
+struct Shaft {
+    double omega = 0;
+
+    void run(double i_q, double load = 0) // per-unit currents, one call
+    {
+        omega += (i_q - load) * bench::kIpmBase.i_A / per_torque() * kSlow_s / bench::kIpmBase.omega_rad_s;
+    }
+};
+
+double step(speed_control_t &self, const speed_control_config_t &c, double target, double omega, double i_min,
+            double i_max, bool *limited = nullptr)
+{
+    bool held = false;
+    const pm_q_t i = speed_control_step(&self, &c, fixed(target, 28), fixed(omega, 28), fixed(i_min, 28),
+                                        fixed(i_max, 28), &held);
+    if (limited != nullptr) {
+        *limited = held;
+    }
+    return real(i);
+}
+
+TEST(SpeedControl, FollowsTheDoubleModel)
+{
+    const speed_control_config_t c = config();
+    speed_control_t self = {};
+    speed_control_reset(&self, 0, 0);
+    Law law = {c};
+    Shaft a, b;
+    samples::Random random;
+    int held = 0;
+    for (int k = 0; k < 6000; ++k) {
+        const double target = k < 2000 ? 0.5 : (k < 4000 ? -0.4 : 0.1);
+        const double load = k > 1000 && k < 3000 ? -0.25 : 0.25;
+        const double i_max = k > 3500 ? 0.2 : 0.4; // derated
+        const double i = step(self, c, target, a.omega, -0.4, i_max);
+        const double model = law.step(target, b.omega, -0.4, i_max);
+        held += law.limited ? 1 : 0;
+        a.run(i, load);
+        b.run(model, load);
+        ASSERT_NEAR(i, model, kTrajectory) << k;
+        ASSERT_NEAR(a.omega, b.omega, kTrajectory) << k;
+    }
+    EXPECT_GT(held, 100);
+}
+
+TEST(SpeedControl, ReferenceIsARamp)
+{
+    const speed_control_config_t c = config();
+    speed_control_t self = {};
+    speed_control_reset(&self, fixed(0.1, 28), 0);
+    const double slope = real(c.slope);
+    for (int k = 1; k <= 2000; ++k) {
+        step(self, c, -0.3, 0, -1, 1);
+        ASSERT_NEAR(real(self.reference), std::max(0.1 - k * slope, -0.3), k * 0x1p-28) << k;
+    }
+    EXPECT_EQ(self.reference, fixed(-0.3, 28));
+}
+
+TEST(SpeedControl, FeedForwardAcceleratesWithoutAnError)
+{
+    for (const double target : {0.5, -0.5}) {
+        const speed_control_config_t c = config();
+        speed_control_config_t without = c;
+        without.i_per_slope = 0;
+        double worst[2] = {0, 0};
+        for (const bool fed : {true, false}) {
+            speed_control_t self = {};
+            Shaft shaft;
+            for (int k = 0; k < 300; ++k) {
+                shaft.run(step(self, fed ? c : without, target, shaft.omega, -1, 1));
+                worst[fed ? 0 : 1] = std::max(worst[fed ? 0 : 1], std::abs(real(self.reference) - shaft.omega));
+            }
+        }
+        EXPECT_LE(worst[0], kRampError * worst[1] + 2 * real(c.slope));
+        // without it the proportional part needs the whole acceleration: i/kp, less what the integral gives
+        EXPECT_GE(worst[1], 0.5 * real(c.i_per_slope) / real(c.pi.kp, 26));
+    }
+}
+
+TEST(SpeedControl, OutputStaysWithinItsLimits)
+{
+    const speed_control_config_t c = config();
+    speed_control_t self = {};
+    samples::Random random;
+    for (int k = 0; k < 20000; ++k) {
+        const double i_min = random.within(-0.8, 0), i_max = random.within(0, 0.8);
+        bool limited;
+        const double i = step(self, c, random.within(-1, 1), random.within(-1.2, 1.2), i_min, i_max, &limited);
+        ASSERT_GE(i, i_min - 0x1p-22);
+        ASSERT_LE(i, i_max + 0x1p-22);
+        if (i > i_min + 0x1p-21 && i < i_max - 0x1p-21) {
+            ASSERT_FALSE(limited);
+        }
+    }
+}
+
+// Two poles at half the bandwidth: a step of the load is a hump without undershoot, and back.
+TEST(SpeedControl, LoadStepIsAHump)
+{
+    const speed_control_config_t c = config();
+    speed_control_t self = {};
+    Shaft shaft;
+    double lowest = 0, highest = 0;
+    const double load = 0.3;
+    for (int k = 0; k < 1500; ++k) {
+        shaft.run(step(self, c, 0, shaft.omega, -1, 1), load);
+        lowest = std::min(lowest, shaft.omega);
+        highest = std::max(highest, shaft.omega);
+    }
+    // (s + w/2)^2: dip a t e^(-w t/2) at t = 2/w
+    const double a = load * bench::kIpmBase.i_A / per_torque() / bench::kIpmBase.omega_rad_s;
+    EXPECT_NEAR(-lowest, a * 2 / kBandwidth / std::exp(1.0), 0.05 * -lowest);
+    EXPECT_NEAR(highest, 0, 0.01 * -lowest);
+    EXPECT_NEAR(shaft.omega, 0, 0.01 * -lowest);
+}
+
+// Against a current limit for long, then released: no overshoot beyond that of the model without a limit.
+TEST(SpeedControl, ComesBackFromTheLimit)
+{
+    const speed_control_config_t c = config();
+    speed_control_t self = {};
+    Shaft shaft;
+    double highest = 0;
+    bool held = false;
+    for (int k = 0; k < 4000; ++k) {
+        const double i_max = 0.1; // a third of what the ramp asks for
+        bool limited;
+        shaft.run(step(self, c, 0.3, shaft.omega, -0.1, i_max, &limited));
+        held = held || limited;
+        highest = std::max(highest, shaft.omega);
+    }
+    EXPECT_TRUE(held);
+    EXPECT_LE(highest, 0.3 * 1.05);
+    EXPECT_NEAR(shaft.omega, 0.3, 1e-3);
+    EXPECT_LE(std::abs(real(self.pi.integral, 22)), 0.1 + real(c.i_per_slope));
+}
+
+TEST(SpeedControl, ResetTakesOverWithoutABump)
+{
+    const speed_control_config_t c = config();
+    speed_control_t self = {};
+    speed_control_reset(&self, fixed(0.25, 28), fixed(0.13, 28));
+    EXPECT_NEAR(step(self, c, 0.25, 0.25, -1, 1), 0.13, kStep);
+    EXPECT_EQ(self.reference, fixed(0.25, 28));
+}
+
+TEST(SpeedControl, CornersDoNotOverflow)
+{
+    speed_control_config_t c = {{PM_GAIN(29.9), PM_GAIN(29.9), PM_UNIT_MAX}, PM_Q(1.0), PM_Q(4.0)};
+    for (int corner = 0; corner < 4; ++corner) {
+        speed_control_t self = {};
+        const double target = (corner & 1) != 0 ? 1.25 : -1.25;
+        const double omega = (corner & 2) != 0 ? 1.25 : -1.25;
+        for (int k = 0; k < 2000; ++k) {
+            const double i = step(self, c, target, omega, -1, 1);
+            ASSERT_LE(std::abs(i), 1.0);
+        }
+    }
+}
+
+} // namespace
