@@ -33,6 +33,8 @@ constexpr double kCrossWithout = 2.5;
 constexpr double kStep = 6 * 0x1p-22;
 // The same gathered over a closed loop, whose memory is L/R.
 constexpr double kTrajectory = 2e-5;
+// The limit is noticed by squares of wide numbers, 2^-12, three roundings.
+constexpr double kNoticed = 1.5 * 0x1p-12;
 // What d leaves to q: squares kept to 2^-24, and v_max cut to 2^-22 for d.
 constexpr double kRoom = 7 * 0x1p-24;
 
@@ -299,11 +301,31 @@ TEST(CurrentControl, OneStepIsTheLaw)
             ASSERT_NEAR(real(self.d.integral, 22), law.integral.real(), kStep) << n;
             ASSERT_NEAR(real(self.q.integral, 22), law.integral.imag(), q) << n;
             limited += out.limited ? 1 : 0;
-            if (std::abs(v) < v_max - 1e-4) {
+            if (std::norm(v) < v_max * v_max - kNoticed) {
                 ASSERT_FALSE(out.limited) << n;
             }
         }
         EXPECT_GT(limited, 5000);
+    }
+}
+
+// Just beyond the circle, in every direction and for every size: what passes unnoticed is the noticing's rounding.
+TEST(CurrentControl, CircleHoldsAtItsEdge)
+{
+    current_control_config_t c = config(kIpm);
+    for (const double v_max : {0.03, 0.1, 0.3, 0.7}) {
+        for (int a = 0; a < 360; a += 5) {
+            for (double beyond = 1e-4; beyond < 0.3; beyond *= 1.3) {
+                current_control_t self = {};
+                current_control_reset(&self, bench::dq(std::polar(v_max * (1 + beyond), a * bench::kDegree)));
+                const current_control_out_t out = step(self, c, 0, 0, 0, v_max);
+                ASSERT_LE(std::norm(bench::complex(out.v)), v_max * v_max + kNoticed) << v_max << ' ' << a;
+                if (beyond > 0.25) {
+                    ASSERT_TRUE(out.limited);
+                    ASSERT_LE(std::norm(bench::complex(out.v)), v_max * v_max + kRoom) << v_max << ' ' << a;
+                }
+            }
+        }
     }
 }
 
