@@ -118,7 +118,7 @@ def plot_error(axis, run, positioned):
 
 def plot_current(axis, run):
     t = run["t_s"]
-    for key, label, grey in (("ia_A", "phases", "#bbbbbb"), ("ib_A", None, "#cccccc"), ("ic_A", None, "#dddddd")):
+    for key, label, grey in (("ia_A", "phases", "#a6a6a6"), ("ib_A", None, "#bdbdbd"), ("ic_A", None, "#d4d4d4")):
         axis.plot(t, run[key], color=grey, linewidth=0.5, label=label, rasterized=True)
     axis.plot(t, run["iq_A"], color=GREEN, linewidth=1.0, label="$i_q$")
     axis.plot(t, run["id_A"], color=PURPLE, linewidth=1.0, label="$i_d$")

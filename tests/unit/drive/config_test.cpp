@@ -1,0 +1,452 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tests/contract/bench.h"
+#include "tests/unit/math/samples.h"
+
+namespace
+{
+
+using bench::kPi;
+using bench::real;
+
+// Rounding of pm_num_t is 1e-9 an operation; the rest is the format's half LSB.
+constexpr double kRelative = 1e-6;
+constexpr int kDraws = 100000;
+
+drive_params_t defaults()
+{
+    drive_params_t p;
+    drive_params_default(&p);
+    return p;
+}
+
+drive_config_t configure(const drive_params_t &p)
+{
+    drive_config_t c = {};
+    const drive_result_t r = drive_configure(&c, &p);
+    EXPECT_TRUE(r.ok) << r.reason;
+    return c;
+}
+
+double value(pm_num_t x)
+{
+    return std::ldexp(x.m, x.e);
+}
+
+TEST(Config, DefaultsAreAccepted)
+{
+    drive_config_t c = {};
+    const drive_params_t p = defaults();
+    const drive_result_t r = drive_configure(&c, &p);
+    EXPECT_TRUE(r.ok);
+    EXPECT_TRUE(c.injection);
+    EXPECT_FALSE(c.align_first);
+}
+
+TEST(Config, RefusesAndNamesWhatIsOutOfRange)
+{
+    for (int id = 0; id < DRIVE_PARAM_COUNT; ++id) {
+        const drive_param_info_t &info = drive_param_table[id];
+        for (const int32_t x : {info.min - 1, info.max + 1, INT32_MIN, INT32_MAX}) {
+            drive_params_t p = defaults();
+            drive_param_set(&p, static_cast<drive_param_id_t>(id), x);
+            drive_config_t c = {};
+            const drive_result_t r = drive_configure(&c, &p);
+            EXPECT_FALSE(r.ok) << info.name;
+            EXPECT_EQ(r.param, id) << info.name;
+            EXPECT_NE(std::string(r.reason), "") << info.name;
+        }
+    }
+}
+
+// SI values in the table's units.
+using Changes = std::vector<std::pair<drive_param_id_t, double>>;
+
+drive_params_t changed(const Changes &changes)
+{
+    drive_params_t p = defaults();
+    for (const auto &[id, si] : changes) {
+        drive_param_set(&p, id, static_cast<int32_t>(std::lround(si / std::pow(10, drive_param_table[id].exp10))));
+    }
+    return p;
+}
+
+// A pulse of 2775 periods for each ampere.
+Changes long_pulse(double i_pulse_A)
+{
+    return {{DRIVE_PARAM_v_dc_nominal, 29.2}, {DRIVE_PARAM_v_dc_min, 29},  {DRIVE_PARAM_v_injection, 10},
+            {DRIVE_PARAM_L_d, 0.9},           {DRIVE_PARAM_L_q, 1.0},      {DRIVE_PARAM_f_pwm, 60000},
+            {DRIVE_PARAM_i_noise, 0},         {DRIVE_PARAM_start_method, 1}, {DRIVE_PARAM_current_bandwidth, 10},
+            {DRIVE_PARAM_i_pulse, i_pulse_A}};
+}
+
+struct Cross {
+    const char *what;
+    Changes changes;
+    drive_param_id_t named;
+};
+
+const std::vector<Cross> kCrosses = {
+    {"L_q below L_d", {{DRIVE_PARAM_L_d, 80e-3}}, DRIVE_PARAM_L_q},
+    {"cross inductance of an active machine", {{DRIVE_PARAM_L_dqh_rated, -50e-3}}, DRIVE_PARAM_L_dqh_rated},
+    {"injection without saliency",
+     {{DRIVE_PARAM_L_d, 75e-3}, {DRIVE_PARAM_start_method, 1}},
+     DRIVE_PARAM_start_method},
+    {"align and injection without saliency",
+     {{DRIVE_PARAM_L_d, 75e-3}, {DRIVE_PARAM_start_method, 3}},
+     DRIVE_PARAM_start_method},
+    {"speed_high at speed_low", {{DRIVE_PARAM_speed_high, 21}}, DRIVE_PARAM_speed_high},
+    {"trip above the converter", {{DRIVE_PARAM_i_trip, 10.001}}, DRIVE_PARAM_i_trip},
+    {"trip at i_max", {{DRIVE_PARAM_i_trip, 5}}, DRIVE_PARAM_i_trip},
+    {"over-voltage above the converter", {{DRIVE_PARAM_v_dc_max, 451}}, DRIVE_PARAM_v_dc_max},
+    {"derating at over-voltage", {{DRIVE_PARAM_v_dc_derate, 400}}, DRIVE_PARAM_v_dc_derate},
+    {"derating at under-voltage",
+     {{DRIVE_PARAM_v_dc_min, 250}, {DRIVE_PARAM_v_dc_derate, 250}},
+     DRIVE_PARAM_v_dc_derate},
+    {"nominal below under-voltage",
+     {{DRIVE_PARAM_v_dc_nominal, 60}, {DRIVE_PARAM_v_injection, 10}},
+     DRIVE_PARAM_v_dc_nominal},
+    {"nominal above derating", {{DRIVE_PARAM_v_dc_nominal, 380}}, DRIVE_PARAM_v_dc_nominal},
+    {"under-voltage below the modulator's range", {{DRIVE_PARAM_v_dc_min, 28}}, DRIVE_PARAM_v_dc_min},
+    {"temperature derating at trip", {{DRIVE_PARAM_temp_derate, 110}}, DRIVE_PARAM_temp_derate},
+    {"over-speed at speed_max", {{DRIVE_PARAM_speed_trip, 150}}, DRIVE_PARAM_speed_trip},
+    {"open-loop current above i_max", {{DRIVE_PARAM_i_open_loop, 5.1}}, DRIVE_PARAM_i_open_loop},
+    {"pulses above the trip", {{DRIVE_PARAM_i_pulse, 9.1}}, DRIVE_PARAM_i_pulse},
+    {"carrier leaves no voltage", {{DRIVE_PARAM_v_injection, 150}}, DRIVE_PARAM_v_injection},
+    {"pulse without end", long_pulse(9), DRIVE_PARAM_i_pulse},
+};
+
+TEST(Config, RefusesWhatCannotBeTogether)
+{
+    for (const Cross &x : kCrosses) {
+        const drive_params_t p = changed(x.changes);
+        drive_config_t c = {};
+        const drive_result_t r = drive_configure(&c, &p);
+        EXPECT_FALSE(r.ok) << x.what;
+        if (!r.ok) {
+            EXPECT_EQ(std::string(drive_param_table[r.param].name), drive_param_table[x.named].name) << x.what;
+        }
+    }
+}
+
+TEST(Config, RefusesWhatDoesNotFitItsFormat)
+{
+    // kp = w_c L / (V/A) beyond 32 of Q26
+    const drive_params_t p = changed({{DRIVE_PARAM_current_bandwidth, 5000}, {DRIVE_PARAM_L_d, 0.1},
+                                      {DRIVE_PARAM_L_q, 0.3}, {DRIVE_PARAM_start_method, 2}});
+    drive_config_t c = {};
+    const drive_result_t r = drive_configure(&c, &p);
+    EXPECT_FALSE(r.ok);
+    EXPECT_EQ(r.param, DRIVE_PARAM_current_bandwidth);
+}
+
+// A number of the configuration against its formula in double precision.
+struct Check {
+    const char *name;
+    int32_t got;
+    int bits;
+    double expected;
+};
+
+// The defaults are IPM-1000 (METHODS.md 14 and its machine file), 10 kHz, 450 V, 10 A, 180 rad/s.
+std::vector<Check> ipm_1000(const drive_config_t &c)
+{
+    const double V = 450, I = 10, P = 3, W = 180 * P, T = 1e-4, slow = 1e-3;
+    const double R = 6, L_d = 43e-3, L_q = 75e-3, psi = 0.236, i_r = 4.0 / I, J = 0.01;
+    const double Z = V / I, Lb = V / W / I, Pb = V / W;
+    const double w_c = 2 * kPi * 500, w_s = 2 * kPi * 6, w_p = 2 * kPi * 25;
+    const double inertia = J / (1.5 * P * P * psi);
+    const double kp_s = w_s * inertia * W / I;
+    const double flux = 70 * T;
+    const double g0 = I / (flux * (L_q - L_d) / (L_d * L_q));
+    const double Ld = 42.55e-3, Lq = 57.32e-3, Ldq = -4.466e-3;
+    const double gr = std::min(I * (Ld * Lq - Ldq * Ldq) / (flux * (Lq - Ld + 2 * Ldq * Ldq / Lq)), 2.5 * g0);
+    const double full = Ldq / Lq, half = -0.0378;
+    const double per_period = 2.0 / 3 * 300 * T, exact = 4 * L_d / per_period;
+    return {
+        {"dead_counts", c.modulator.dead_counts, 0, 2e-6 * 10e3 * 8500},
+        {"drop", c.modulator.drop, 28, 1 / V},
+        {"zone_gain", c.modulator.zone_gain, 19, I / 0.03},
+        {"d.kp", c.current.d.kp, 26, w_c * L_d / Z},
+        {"d.ki", c.current.d.ki, 26, w_c * R * T / Z},
+        {"d.kb", c.current.d.kb, 31, R * T / L_d},
+        {"q.kp", c.current.q.kp, 26, w_c * L_q / Z},
+        {"q.ki", c.current.q.ki, 26, w_c * R * T / Z},
+        {"q.kb", c.current.q.kb, 31, R * T / L_q},
+        {"L_d", c.current.L_d, 28, L_d / Lb},
+        {"L_q", c.current.L_q, 28, L_q / Lb},
+        {"psi_m", c.current.psi_m, 28, psi / Pb},
+        {"speed kp", c.speed.pi.kp, 26, kp_s},
+        {"speed ki", c.speed.pi.ki, 26, kp_s * w_s * slow / 4},
+        {"speed kb", c.speed.pi.kb, 31, w_s * slow / 4},
+        {"slope", c.speed.slope, 28, 200 * P * slow / W},
+        {"i_per_slope", c.speed.i_per_slope, 28, 200 * P * inertia / I},
+        {"mtpa h", c.mtpa.h, 28, psi / (2 * (L_q - L_d)) / I},
+        {"fw k", c.field_weakening.k, 32, std::min(0.4, 2 * kPi * 20 * slow / (L_d / Lb))},
+        {"fw i_max", c.field_weakening.i_max, 28, 3 / I},
+        {"flux R", c.position.flux.R, 28, R / Z},
+        {"flux L_d", c.position.flux.L_d, 28, L_d / Lb},
+        {"flux L_q", c.position.flux.L_q, 28, L_q / Lb},
+        {"flux L_q2", c.position.flux.L_q2, 28, (70.835e-3 - L_q) / Lb / (i_r * i_r)},
+        {"flux psi_m", c.position.flux.psi_m, 28, psi / Pb},
+        {"flux t_s", c.position.flux.t_s, 32, T * W},
+        {"flux g", c.position.flux.g, 32, 0.5 * T * W},
+        {"flux k_adapt", c.position.flux.k_adapt, 32, 0.01},
+        {"flux k_seed", c.position.flux.k_seed, 32, 300 * T},
+        {"flux k_R", c.position.flux.k_R, 26, 300 / 8.0 / (W * i_r * i_r)},
+        {"flux R_min", c.position.flux.R_min, 28, 0.5 * R / Z},
+        {"flux R_max", c.position.flux.R_max, 28, 2 * R / Z},
+        {"flux omega_R", c.position.flux.omega_R, 28, 10.5 * P / W},
+        {"omega_low", c.position.omega_low, 28, 21 * P / W},
+        {"omega_high", c.position.omega_high, 28, 40 * P / W},
+        {"per_span", c.position.per_span, 20, W / (19 * P)},
+        {"pll_low kp", c.position.pll_low.kp, 32, 1.8 * w_p * T},
+        {"pll_low ki", c.position.pll_low.ki, 32, w_p * w_p * T / W},
+        {"pll_high kp", c.position.pll_high.kp, 32, 1.8 * w_p * T},
+        {"pll_high ki", c.position.pll_high.ki, 32, w_p * w_p * T / W},
+        {"k_theta", c.k_theta, 30, 16 * W * T / (2 * kPi)},
+        {"v_h", c.position.square.v_h, 28, 70 / V},
+        {"gain_0", c.position.square.gain_0, 20, g0},
+        {"gain_2", c.position.square.gain_2, 20, (gr - g0) / (i_r * i_r)},
+        {"lambda_1", c.position.square.lambda_1, 28, (4 * half - full) / i_r},
+        {"lambda_2", c.position.square.lambda_2, 28, 2 * (full - 2 * half) / (i_r * i_r)},
+        {"half_step", c.position.square.half_step, 32, T * W / 2},
+        {"h_d", c.position.square.h_d, 28, flux / L_d / I},
+        {"h_d_inverse", c.position.square.h_d_inverse, 20, I * L_d / flux},
+        {"pulse duty", c.pulses.duty, 28, exact / std::round(exact)},
+        {"i_zero", c.pulses.i_zero, 28, 5 * 5e-3 / I},
+        {"y_min", c.pulses.y_min, 28, 0.75 * (L_q - L_d) / L_q * 4 / I},
+        {"w_min", c.pulses.w_min, 28, 10 * 5e-3 / I},
+        {"open-loop i", c.open_loop.i, 28, 2 / I},
+        {"open-loop slope", c.open_loop.slope, 28, 50 * P * slow / W},
+        {"i_trip", c.protection.i_trip, 28, 9 / I},
+        {"v_dc_max", c.protection.v_dc_max, 28, 400 / V},
+        {"v_dc_min", c.protection.v_dc_min, 28, 60 / V},
+        {"v_dc_derate", c.protection.v_dc_derate, 28, 380 / V},
+        {"offset_max", c.protection.offset_max, 15, 0.3 / I},
+        {"omega_stall", c.protection.omega_stall, 28, 150 * P / W / 50},
+        {"i_max", c.i_max, 28, 5 / I},
+        {"i_d_light", c.i_d_light, 28, 0.2 / I},
+        {"omega_max", c.omega_max, 28, 150 * P / W},
+        {"v_linear", c.v_linear, 31, 0.98 / std::sqrt(3.0)},
+    };
+}
+
+TEST(Config, IsTheFormulasForIpm1000)
+{
+    const drive_config_t c = configure(defaults());
+    for (const Check &x : ipm_1000(c)) {
+        EXPECT_NEAR(real(x.got, x.bits), x.expected, kRelative * std::abs(x.expected) + std::ldexp(1.0, -x.bits))
+            << x.name;
+    }
+    EXPECT_NEAR(value(c.base.v), 450, 450 * kRelative);
+    EXPECT_NEAR(value(c.base.i), 10, 10 * kRelative);
+    EXPECT_NEAR(value(c.base.omega), 540, 540 * kRelative);
+    EXPECT_NEAR(value(c.base.psi), 450.0 / 540, kRelative);
+    EXPECT_NEAR(value(c.base.torque), 1.5 * 3 * 450.0 / 540 * 10, 40 * kRelative);
+    EXPECT_NEAR(value(c.base.t_s), 1e-4, 1e-4 * kRelative);
+    EXPECT_EQ(c.pulses.periods, std::lround(4 * 43e-3 / (2.0 / 3 * 300 * 1e-4)));
+    EXPECT_EQ(c.modulator.counts, 8500);
+    EXPECT_TRUE(c.modulator.compensate);
+    EXPECT_EQ(c.open_loop.align_ms, 300);
+    EXPECT_NEAR(c.open_loop.sweep * 0x1p-32, 0.5 / 300, 1e-6);
+    EXPECT_EQ(c.protection.stall_ms, 1000);
+    EXPECT_EQ(c.protection.lost_ms, 30);
+    EXPECT_EQ(c.protection.temp_derate_dC, 900);
+    EXPECT_EQ(c.protection.temp_trip_dC, 1100);
+}
+
+TEST(Config, SwitchesSwitch)
+{
+    EXPECT_EQ(configure(changed({{DRIVE_PARAM_mtpa, 0}})).mtpa.h, 0);
+    EXPECT_FALSE(configure(changed({{DRIVE_PARAM_dead_time_comp, 0}})).modulator.compensate);
+    EXPECT_EQ(configure(changed({{DRIVE_PARAM_saturation_comp, 0}})).position.flux.L_q2, 0);
+    EXPECT_EQ(configure(changed({{DRIVE_PARAM_resistance_adaptation, 0}})).position.flux.k_R, 0);
+    const drive_config_t c = configure(changed({{DRIVE_PARAM_cross_coupling_comp, 0}}));
+    EXPECT_EQ(c.position.square.lambda_1, 0);
+    EXPECT_EQ(c.position.square.lambda_2, 0);
+    EXPECT_EQ(configure(changed({{DRIVE_PARAM_i_fw_max, 0}})).field_weakening.i_max, 0);
+}
+
+TEST(Config, StartFollowsTheMachine)
+{
+    const auto start = [](const Changes &x) {
+        const drive_config_t c = configure(changed(x));
+        return std::make_pair(c.injection, c.align_first);
+    };
+    EXPECT_EQ(start({}), std::make_pair(true, false));
+    EXPECT_EQ(start({{DRIVE_PARAM_L_d, 74e-3}}), std::make_pair(false, true)); // no saliency
+    EXPECT_EQ(start({{DRIVE_PARAM_i_noise, 0.1}}), std::make_pair(false, true)); // not seen
+    EXPECT_EQ(start({{DRIVE_PARAM_start_method, 1}}), std::make_pair(true, false));
+    EXPECT_EQ(start({{DRIVE_PARAM_start_method, 2}}), std::make_pair(false, true));
+    EXPECT_EQ(start({{DRIVE_PARAM_start_method, 3}}), std::make_pair(true, true));
+}
+
+// Parameter sets drawn at random: a fourth over the whole ranges, the others around the defaults, so that many are accepted.
+class Draw
+{
+  public:
+    drive_params_t next()
+    {
+        drive_params_t p = defaults();
+        const bool wide = n_++ % 4 == 0;
+        const double share = random_.within(0.02, 0.5);
+        for (int id = 0; id < DRIVE_PARAM_COUNT; ++id) {
+            const drive_param_info_t &x = drive_param_table[id];
+            double v = x.def;
+            if (wide) {
+                if (random_.within(0, 1) < 0.3) { // logarithmic where the range has decades
+                    const double lo = std::max(1.0, static_cast<double>(x.min));
+                    v = x.max > 100 && x.min >= 0 ? lo * std::pow(x.max / lo, random_.within(0, 1))
+                                                  : random_.within(x.min, x.max);
+                }
+            } else if (random_.within(0, 1) < share) {
+                const double spread = random_.within(0, 1) < 0.2 ? 100 : 2;
+                v = x.def * std::pow(spread, random_.within(-1, 1));
+            }
+            if (x.max == 1 || x.max == 3) {
+                v = std::floor(random_.within(0, x.max + 1));
+            }
+            v = std::clamp(v, static_cast<double>(x.min), static_cast<double>(x.max));
+            drive_param_set(&p, static_cast<drive_param_id_t>(id), static_cast<int32_t>(v));
+        }
+        return p;
+    }
+
+  private:
+    samples::Random random_;
+    int n_ = 0;
+};
+
+// What must be above zero in any configuration that is accepted.
+std::vector<std::pair<const char *, int64_t>> must_be_positive(const drive_config_t &c)
+{
+    std::vector<std::pair<const char *, int64_t>> x = {
+        {"counts", c.modulator.counts},
+        {"zone_gain", c.modulator.zone_gain},
+        {"d.kp", c.current.d.kp},
+        {"d.ki", c.current.d.ki},
+        {"d.kb", c.current.d.kb},
+        {"q.kp", c.current.q.kp},
+        {"q.ki", c.current.q.ki},
+        {"q.kb", c.current.q.kb},
+        {"L_d", c.current.L_d},
+        {"L_q", c.current.L_q},
+        {"psi_m", c.current.psi_m},
+        {"speed kb", c.speed.pi.kb},
+        {"speed slope", c.speed.slope},
+        {"fw k", c.field_weakening.k},
+        {"flux R", c.position.flux.R},
+        {"flux t_s", c.position.flux.t_s},
+        {"flux g", c.position.flux.g},
+        {"flux k_seed", c.position.flux.k_seed},
+        {"pll_low kp", c.position.pll_low.kp},
+        {"pll_low ki", c.position.pll_low.ki},
+        {"pll_high kp", c.position.pll_high.kp},
+        {"pll_high ki", c.position.pll_high.ki},
+        {"k_theta", c.k_theta},
+        {"per_span", c.position.per_span},
+        {"open-loop i", c.open_loop.i},
+        {"open-loop slope", c.open_loop.slope},
+        {"open-loop sweep", c.open_loop.sweep},
+        {"i_max", c.i_max},
+        {"omega_max", c.omega_max},
+        {"omega_stall", c.protection.omega_stall},
+        {"i_trip", c.protection.i_trip},
+    };
+    if (c.injection) {
+        const pulsating_square_config_t &s = c.position.square;
+        x.push_back({"v_h", s.v_h});
+        x.push_back({"gain_0", s.gain_0});
+        x.push_back({"h_d", s.h_d});
+        x.push_back({"h_d_inverse", s.h_d_inverse});
+    }
+    if (!c.align_first) {
+        x.push_back({"pulse periods", c.pulses.periods});
+        x.push_back({"pulse duty", c.pulses.duty});
+        x.push_back({"y_min", c.pulses.y_min});
+    }
+    return x;
+}
+
+// Gain of the injection loop at a current: it must not turn round below the current limit.
+double square_gain(const drive_config_t &c, double i_q)
+{
+    return real(c.position.square.gain_0, 20) + real(c.position.square.gain_2, 20) * i_q * i_q;
+}
+
+struct Survey {
+    int accepted = 0, injecting = 0;
+    std::map<std::string, int> bad, known;
+};
+
+Survey survey(int draws)
+{
+    Draw draw;
+    Survey s;
+    for (int n = 0; n < draws; ++n) {
+        const drive_params_t p = draw.next();
+        drive_config_t c = {};
+        if (!drive_configure(&c, &p).ok) {
+            continue;
+        }
+        ++s.accepted;
+        for (const auto &[name, x] : must_be_positive(c)) {
+            s.bad[name] += x <= 0 ? 1 : 0;
+        }
+        s.known["speed kp"] += c.speed.pi.kp <= 0 ? 1 : 0;
+        s.known["speed ki"] += c.speed.pi.ki <= 0 ? 1 : 0;
+        if (c.injection) {
+            ++s.injecting;
+            const double i_rated = p.i_rated / static_cast<double>(p.i_full_scale);
+            s.known["injection gain at i_rated"] += square_gain(c, i_rated) <= 0 ? 1 : 0;
+        }
+    }
+    return s;
+}
+
+TEST(Config, RandomSetsAreRefusedOrMakeSense)
+{
+    const Survey s = survey(kDraws);
+    EXPECT_GT(s.accepted, kDraws / 20);
+    EXPECT_GT(s.injecting, kDraws / 50);
+    for (const auto &[name, count] : s.bad) {
+        EXPECT_EQ(count, 0) << name << " of " << s.accepted;
+    }
+}
+
+// Accepted with a gain of zero or below: reported.
+TEST(Config, DISABLED_RandomSetsHaveNoDeadGain)
+{
+    const Survey s = survey(kDraws);
+    for (const auto &[name, count] : s.known) {
+        EXPECT_EQ(count, 0) << name << " of " << s.accepted;
+    }
+}
+
+// The saliency is gone, or turned round, at rated current: positive feedback of the injection loop.
+TEST(Config, DISABLED_RefusesInjectionWhoseSaliencyTurnsRound)
+{
+    const drive_params_t p = changed({{DRIVE_PARAM_L_qh_rated, 35e-3}, {DRIVE_PARAM_L_dqh_rated, 0}});
+    drive_config_t c = {};
+    const drive_result_t r = drive_configure(&c, &p);
+    if (r.ok) {
+        EXPECT_FALSE(c.injection) << "gain at i_rated " << square_gain(c, 0.4);
+    }
+}
+
+// 8 times 9713 periods and 50 do not fit 16 bits.
+TEST(Config, DISABLED_TimeoutOfALongPulseFits)
+{
+    const drive_config_t c = configure(changed(long_pulse(3.5)));
+    EXPECT_EQ(c.pulses.periods, 9713);
+    EXPECT_GE(c.pulses.timeout, 2 * c.pulses.periods);
+}
+
+} // namespace
