@@ -32,7 +32,7 @@ void pulsating_square_demodulate(pulsating_square_t *self, const pulsating_squar
     const pm_q_t i_q = in->i_dq.q;
     const pm_q_t turn = pm_frac(in->omega, config->half_step);
     const pm_q_t lambda = pm_mul(i_q, config->lambda_1 + pm_mul(config->lambda_2, pm_abs(i_q))) + turn;
-    const int32_t gain = config->gain_0 + pm_mul(config->gain_2, pm_mul(i_q, i_q));
+    const int32_t gain = config->gain_0 + pm_shl(pm_mul(config->gain_2, pm_mul(i_q, i_q)), 4);
     out->vector = h;
     out->eps = pm_small_gain(pm_small(h.q + pm_mul(lambda, h.d)), gain);
     out->misfit = pm_small_gain(pm_small(h.d - config->h_d), config->h_d_inverse);

@@ -22,7 +22,8 @@
 typedef struct {
     pm_q_t v_h;
     pm_q_t lambda_1, lambda_2; /* a, b */
-    int32_t gain_0, gain_2;    /* rad per unit of current, and its change with i_q^2, Q20 */
+    int32_t gain_0;            /* rad per unit of current, Q20 */
+    int32_t gain_2;            /* its change with i_q^2, Q16 */
     pm_frac_t half_step;       /* T_s w_base / 2: rotation over half a period, per unit of speed */
     pm_q_t h_d;                /* expected h_d without load */
     int32_t h_d_inverse;       /* Q20 */

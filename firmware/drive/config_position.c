@@ -77,7 +77,7 @@ static void make_square(maker_t *m, pulsating_square_config_t *c)
 
     c->v_h = per_unit(m, DRIVE_PARAM_v_injection, m->base.v);
     c->gain_0 = fixed(m, gain_0, SMALL_BITS, DRIVE_PARAM_v_injection);
-    c->gain_2 = fixed(m, pm_num_div(pm_num_sub(gain_r, gain_0), square(i_rated)), SMALL_BITS,
+    c->gain_2 = fixed(m, pm_num_div(pm_num_sub(gain_r, gain_0), square(i_rated)), SMALL_BITS - 4,
                       DRIVE_PARAM_v_injection);
     c->lambda_1 = 0;
     c->lambda_2 = 0;
@@ -157,7 +157,9 @@ void make_pulses(maker_t *m, initial_pulses_config_t *c)
     const pm_num_t duty = pm_num_div(exact, pm_num(whole));
     c->duty = fixed(m, least(duty, pm_num(1)), Q_BITS, DRIVE_PARAM_i_pulse);
     const pm_num_t noise = pm_num_div(si(m, DRIVE_PARAM_i_noise), m->base.i);
+    /* five times the noise, and no less than four steps of a 12-bit converter */
     c->i_zero = fixed(m, pm_num_mul(pm_num(5), noise), Q_BITS, DRIVE_PARAM_i_noise);
+    c->i_zero = pm_max(c->i_zero, PM_Q(8.0 / 4096.0));
     /* y of the unsaturated machine is 3 i_pulse (L_q - L_d) / L_q */
     const pm_num_t share = pm_num_div(pm_num_sub(L_q, L_d), L_q);
     const pm_num_t i_pulse = pm_num_div(si(m, DRIVE_PARAM_i_pulse), m->base.i);

@@ -10,6 +10,8 @@
 /* The position counts as lost when the mean error signal reaches 0.3 rad or the model is off by 0.5. */
 #define PER_EPS_LOST    PM_Q(1.0 / 0.3)
 #define PER_MISFIT_LOST PM_Q(1.0 / 0.5)
+/* Noise of a single error signal: 3 ms. */
+#define K_NOISE PM_FRAC(0.3)
 /* The weight follows the speed through 5 ms, so that noise of the speed does not move it. */
 #define K_SPEED PM_FRAC(0.2)
 
@@ -74,18 +76,21 @@ static pm_frac_t between(pm_frac_t low, pm_frac_t high, pm_q_t weight)
     return low + pm_mul(high - low, weight);
 }
 
-/* Means of magnitudes: a source that has slipped shows errors of either sign. While both lead, both must
- * agree. */
+static pm_q_t magnitude_after(pm_q_t *filter, pm_q_t x)
+{
+    return pm_abs(pm_lp1(filter, x, K_NOISE));
+}
+
+/* Means of magnitudes: a source that has slipped shows errors of either sign, slower than the noise that is
+ * filtered before. Whichever leads, both must agree. */
 static void set_quality(position_t *self)
 {
-    pm_q_t eps = 0;
-    pm_q_t misfit = 0;
-    if (self->weight > 0) {
-        eps = pm_abs(self->flux_out.eps);
-        misfit = pm_abs(self->flux_out.misfit);
-    }
+    const pm_q_t square = magnitude_after(&self->square_eps, self->square_out.eps);
+    /* also while the flux is tied: an EMF that the position does not explain */
+    pm_q_t eps = magnitude_after(&self->flux_eps, self->flux_out.eps);
+    pm_q_t misfit = self->weight > 0 ? pm_abs(self->flux_out.misfit) : 0;
     if (self->weight < PM_ONE) {
-        eps = pm_max(eps, pm_abs(self->square_out.eps));
+        eps = pm_max(eps, square);
         misfit = pm_max(misfit, pm_abs(self->square_out.misfit));
     }
     (void)pm_lp1(&self->eps_mean, eps, K_MEAN);

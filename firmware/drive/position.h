@@ -29,10 +29,11 @@ typedef struct {
     active_flux_t flux;
     pulsating_square_t square;
     obs_out_t flux_out, square_out;
-    pm_q_t weight;     /* 0: injection, 1: flux observer */
-    bool inject;       /* carrier on */
-    pm_q_t omega_mean; /* filtered for the weight */
-    pm_q_t eps_mean;   /* filtered for the quality */
+    pm_q_t weight;               /* 0: injection, 1: flux observer */
+    bool inject;                 /* carrier on */
+    pm_q_t omega_mean;           /* filtered for the weight */
+    pm_q_t flux_eps, square_eps; /* without noise, for the quality */
+    pm_q_t eps_mean;
     pm_q_t misfit_mean;
     pm_q_t quality;
 } position_t;

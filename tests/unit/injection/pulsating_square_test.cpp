@@ -55,7 +55,7 @@ pulsating_square_config_t config(const L &l, double i_q_A)
     c.v_h = fixed(kCarrier_V / kBase.v_V, 28);
     c.gain_0 = fixed(gain_0, 20);
     if (i_q != 0) {
-        c.gain_2 = fixed((kBase.i_A / slope_A(l) - gain_0) / (i_q * i_q), 20);
+        c.gain_2 = fixed((kBase.i_A / slope_A(l) - gain_0) / (i_q * i_q), 16);
         c.lambda_1 = fixed(0.7 * l.L_dq_H / l.L_q_H / i_q, 28); // a share in each term
         c.lambda_2 = fixed(0.3 * l.L_dq_H / l.L_q_H / (i_q * std::abs(i_q)), 28);
     }

@@ -1,0 +1,92 @@
+// The drive by itself: converter codes in, no motor. What it sees is what a test says.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "tests/contract/bench.h"
+
+namespace direct
+{
+
+inline uint16_t current_code(double i_pu)
+{
+    return static_cast<uint16_t>(std::lround(32768 * (1 + i_pu)));
+}
+
+inline uint16_t voltage_code(double v_V)
+{
+    return static_cast<uint16_t>(std::lround(v_V / 450 * 65536));
+}
+
+inline drive_params_t params(int32_t start_method = 0)
+{
+    drive_params_t p;
+    drive_params_default(&p);
+    p.start_method = start_method;
+    return p;
+}
+
+struct Drive {
+    drive_t d = {};
+    drive_in_t in = {};
+    drive_out_t out = {};
+    drive_slow_in_t slow = {250};
+    drive_command_t command = {};
+
+    explicit Drive(const drive_params_t &p = params())
+    {
+        drive_init(&d, &p);
+        for (uint16_t &leg : in.i_leg) {
+            leg = current_code(0);
+        }
+        in.v_dc = voltage_code(300);
+    }
+
+    void step()
+    {
+        drive_step(&d, &in, &out);
+    }
+
+    void run_ms(int ms)
+    {
+        for (int k = 0; k < ms; ++k) {
+            for (int n = 0; n < 10; ++n) {
+                step();
+            }
+            drive_slow(&d, &slow);
+        }
+    }
+
+    void enable(bool on, drive_mode_t mode = DRIVE_MODE_SPEED)
+    {
+        command.enable = on;
+        command.mode = mode;
+        drive_command(&d, &command);
+    }
+
+    drive_state_t state() const
+    {
+        return drive_status(&d)->state;
+    }
+
+    drive_fault_t fault() const
+    {
+        return drive_status(&d)->fault;
+    }
+
+    bool driven() const
+    {
+        return out.driven[0] || out.driven[1] || out.driven[2];
+    }
+
+    // Current mode needs no motor: calibration and align, then it runs.
+    void start_current_mode()
+    {
+        command.current_mA = 1000;
+        enable(true, DRIVE_MODE_CURRENT);
+        run_ms(110 + 310 + 10);
+    }
+};
+
+} // namespace direct

@@ -1,0 +1,176 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/unit/drive/direct.h"
+
+namespace
+{
+
+using bench::Complex;
+using bench::kDegree;
+using bench::real;
+using direct::Drive;
+
+constexpr double kAngle_deg = 0.01;
+// pm_atan2() 0.0018 degree, frames 3 LSB, integrals 2^-22.
+constexpr double kVector = 1e-4;
+
+// IPM-1000's defaults: 2 A, 300 ms, 50 rad/s2, 10 A and 540 rad/s.
+constexpr double kCurrent = 0.2, kSlope = 50 * 3 * 1e-3 / 540;
+constexpr int kAlign_ms = 300;
+
+Drive started()
+{
+    Drive x(direct::params(2));
+    x.d.command.mode = DRIVE_MODE_SPEED;
+    x.d.state = DRIVE_FINDING;
+    open_loop_start(&x.d);
+    return x;
+}
+
+void slow(Drive &x, int ms)
+{
+    for (int k = 0; k < ms; ++k) {
+        ++x.d.state_ms;
+        open_loop_slow(&x.d);
+    }
+}
+
+TEST(OpenLoop, AlignSweepsAQuarterTurnIntoPlace)
+{
+    Drive x = started();
+    EXPECT_EQ(x.d.theta_open, PM_TURN(0.75));
+    double last = -90;
+    for (int ms = 1; ms < kAlign_ms; ++ms) {
+        slow(x, 1);
+        const double angle = bench::rad(x.d.theta_open) / kDegree;
+        EXPECT_NEAR(angle, std::min(0.0, -90 + 180.0 * ms / kAlign_ms), kAngle_deg + 1e-3 * ms) << ms;
+        EXPECT_GE(angle, last) << ms;
+        last = angle;
+        EXPECT_EQ(x.d.omega_open, 0);
+    }
+    EXPECT_EQ(x.d.theta_open, 0U); // exactly, and stays
+}
+
+TEST(OpenLoop, CurrentRampsToItsValue)
+{
+    Drive x = started();
+    for (int ms = 1; ms < 200; ++ms) {
+        slow(x, 1);
+        EXPECT_NEAR(real(x.d.i_ref.d), std::min(kCurrent, kCurrent * ms / 50), 1e-6) << ms;
+        EXPECT_EQ(x.d.i_ref.q, 0);
+    }
+}
+
+TEST(OpenLoop, SpeedRampsAfterTheAlign)
+{
+    for (const double target : {0.3, -0.3}) {
+        Drive x = started();
+        x.d.omega_target = bench::fixed(target, 28);
+        slow(x, kAlign_ms - 1);
+        EXPECT_EQ(x.d.omega_open, 0);
+        for (int ms = 1; ms < 1500; ++ms) {
+            slow(x, 1);
+            ASSERT_NEAR(real(x.d.omega_open), std::copysign(std::min(ms * kSlope, 0.3), target), 1e-5) << ms;
+        }
+    }
+}
+
+TEST(OpenLoop, CurrentModeTakesTheCurrentAskedForUpToTheLimit)
+{
+    for (const double asked : {0.05, -0.1, 2.0}) {
+        Drive x = started();
+        x.d.command.mode = DRIVE_MODE_CURRENT;
+        x.d.i_target = bench::fixed(asked, 28);
+        slow(x, 1000);
+        EXPECT_NEAR(real(x.d.i_ref.d), std::min(std::abs(asked), 0.5), 1e-6) << asked;
+    }
+}
+
+TEST(OpenLoop, StoppingLeadsToStandstill)
+{
+    Drive x = started();
+    x.d.omega_target = PM_Q(0.2);
+    slow(x, 1000);
+    EXPECT_GT(x.d.omega_open, PM_Q(0.15));
+    x.d.state = DRIVE_STOPPING;
+    slow(x, 1000);
+    EXPECT_EQ(x.d.omega_open, 0);
+}
+
+// In the frame of the phases.
+Complex current_vector(const Drive &x)
+{
+    const bool open = x.d.stage == STAGE_OPEN_LOOP;
+    return bench::complex(x.d.i_ref) * std::polar(1.0, bench::rad(open ? x.d.theta_open : x.d.position.pll.theta));
+}
+
+// The observer agrees, the rotor lags the vector by a load angle: the vectors of current and voltage must not jump.
+TEST(OpenLoop, HandOverKeepsCurrentAndVoltage)
+{
+    for (const double lag_deg : {0.0, 35.0, -60.0}) {
+        Drive x = started();
+        x.d.omega_target = PM_Q(0.5);
+        slow(x, kAlign_ms + 1500);
+        ASSERT_EQ(x.d.stage, STAGE_OPEN_LOOP); // nothing has agreed so far
+        x.d.position.quality = PM_ONE;
+        x.d.position.pll.omega = x.d.omega_open;
+        x.d.position.pll.theta = x.d.theta_open - bench::turns(lag_deg * kDegree);
+        x.d.u = bench::dq({-0.05, 0.12});
+        const Complex u = Complex{-0.05, 0.12} * std::polar(1.0, bench::rad(x.d.theta_open));
+        const Complex i = current_vector(x);
+        int ms = 0;
+        for (; x.d.stage == STAGE_OPEN_LOOP && ms < 100; ++ms) {
+            x.d.position.pll.omega = x.d.omega_open;
+            slow(x, 1);
+        }
+        ASSERT_EQ(x.d.stage, STAGE_VECTOR);
+        EXPECT_NEAR(ms, 21, 1); // agreed for 20 ms
+        EXPECT_NEAR(std::abs(current_vector(x) - i), 0, kVector) << lag_deg;
+        const Complex integral = {real(x.d.current.d.integral, 22), real(x.d.current.q.integral, 22)};
+        const Complex seeded = integral * std::polar(1.0, bench::rad(x.d.position.pll.theta));
+        EXPECT_NEAR(std::abs(seeded - u), 0, kVector) << lag_deg;
+        EXPECT_EQ(x.d.speed.reference, x.d.position.pll.omega);
+        EXPECT_NEAR(real(x.d.speed.pi.integral, 22), real(x.d.i_ref.q), kVector);
+    }
+}
+
+TEST(OpenLoop, NoHandOverWithoutAgreement)
+{
+    for (const int what : {0, 1, 2}) {
+        Drive x = started();
+        x.d.omega_target = what == 2 ? PM_Q(0.2) : PM_Q(0.5); // below omega_high
+        slow(x, kAlign_ms);
+        for (int ms = 0; ms < 2000; ++ms) {
+            x.d.position.quality = what == 0 ? PM_Q(0.4) : PM_ONE;
+            x.d.position.pll.omega = what == 1 ? x.d.omega_open / 2 : x.d.omega_open;
+            slow(x, 1);
+            ASSERT_EQ(x.d.stage, STAGE_OPEN_LOOP) << what;
+        }
+    }
+}
+
+// Back below omega_low: the imposed angle starts where the current is.
+TEST(OpenLoop, ResumeKeepsCurrentAndVoltage)
+{
+    for (const Complex i : {Complex{-0.05, 0.2}, Complex{0.1, -0.15}, Complex{0, 0.01}}) {
+        Drive x = started();
+        x.d.stage = STAGE_VECTOR;
+        x.d.position.pll.theta = PM_TURN(0.9);
+        x.d.position.pll.omega = PM_Q(0.05);
+        x.d.status.i = bench::dq(i);
+        x.d.u = bench::dq({-0.03, 0.08});
+        open_loop_resume(&x.d);
+        EXPECT_EQ(x.d.stage, STAGE_OPEN_LOOP);
+        EXPECT_EQ(x.d.omega_open, PM_Q(0.05));
+        const double rotor = 0.9 * 2 * bench::kPi, frame = bench::rad(x.d.theta_open);
+        EXPECT_NEAR(std::abs(real(x.d.i_open) * std::polar(1.0, frame) - i * std::polar(1.0, rotor)), 0, kVector);
+        const Complex integral = {real(x.d.current.d.integral, 22), real(x.d.current.q.integral, 22)};
+        const Complex u = Complex{-0.03, 0.08};
+        EXPECT_NEAR(std::abs(integral * std::polar(1.0, frame) - u * std::polar(1.0, rotor)), 0, kVector);
+    }
+}
+
+} // namespace

@@ -1,0 +1,232 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/contract/bench.h"
+
+namespace
+{
+
+using bench::Complex;
+using bench::fixed;
+using bench::kDegree;
+using bench::real;
+using bench::Rotation;
+
+// The weight follows a speed filtered over 5 ms; 100 calls later nothing of that is left.
+constexpr int kSettle = 100;
+constexpr double kWeight = 1e-4; // the span is Q20
+// With an exact machine at constant speed (active_flux_test.cpp: 0.2).
+constexpr double kIdeal_deg = 0.3;
+// Lost is lost: an observer that is told nonsense must not be believed for longer than this (t_lost adds 30 ms).
+constexpr int kLost_ms = 60;
+
+constexpr double kLow = 0.12, kHigh = 0.24;
+
+pm_pll_config_t loop(double hertz)
+{
+    const double w = 2 * bench::kPi * hertz, t = bench::kIpmBase.period_s, base = bench::kIpmBase.omega_rad_s;
+    return {fixed(1.8 * w * t, 32), fixed(w * w * t / base, 32), fixed(16 * base * t / (2 * bench::kPi), 30),
+            PM_Q(1.25)};
+}
+
+position_config_t config(bool injection = true)
+{
+    const double L_d = 43e-3, L_q = 75e-3, flux = 70 * bench::kIpmBase.period_s, i = bench::kIpmBase.i_A;
+    position_config_t c = {};
+    c.flux = bench::flux_config(bench::kIpmLinear, bench::kIpmBase);
+    c.square.v_h = fixed(70 / 450.0, 28);
+    c.square.gain_0 = fixed(i * L_d * L_q / (flux * (L_q - L_d)), 20);
+    c.square.half_step = fixed(bench::kIpmBase.period_s * bench::kIpmBase.omega_rad_s / 2, 32);
+    c.square.h_d = fixed(flux / L_d / i, 28);
+    c.square.h_d_inverse = fixed(i * L_d / flux, 20);
+    c.pll_low = loop(20);
+    c.pll_high = loop(40);
+    c.omega_low = fixed(kLow, 28);
+    c.omega_high = fixed(kHigh, 28);
+    c.per_span = fixed(1 / (kHigh - kLow), 20);
+    c.injection = injection;
+    return c;
+}
+
+position_t started(const position_config_t &c)
+{
+    position_t self;
+    position_reset(&self, &c, 0, {0, 0});
+    return self;
+}
+
+void hold(position_t &self, const position_config_t &c, double omega, int calls = kSettle)
+{
+    for (int k = 0; k < calls; ++k) {
+        self.pll.omega = fixed(omega, 28);
+        position_slow(&self, &c, {0, 0});
+    }
+}
+
+TEST(Position, WeightIsTheSpeedBetweenItsLimits)
+{
+    const position_config_t c = config();
+    for (double omega = -0.4; omega <= 0.4; omega += 0.02) {
+        position_t self = started(c);
+        hold(self, c, omega);
+        const double expected = std::clamp((std::abs(omega) - kLow) / (kHigh - kLow), 0.0, 1.0);
+        EXPECT_NEAR(real(self.weight), expected, kWeight) << omega;
+        EXPECT_GE(self.weight, 0);
+        EXPECT_LE(self.weight, PM_ONE);
+        EXPECT_NEAR(self.gains.kp, c.pll_low.kp + expected * (c.pll_high.kp - c.pll_low.kp), 1e-3 * c.pll_high.kp);
+        EXPECT_NEAR(self.gains.ki, c.pll_low.ki + expected * (c.pll_high.ki - c.pll_low.ki), 1e-3 * c.pll_high.ki);
+    }
+}
+
+TEST(Position, CarrierHasHysteresis)
+{
+    const position_config_t c = config();
+    position_t self = started(c);
+    EXPECT_TRUE(self.inject);
+    hold(self, c, 1.05 * kHigh); // above, but not by enough
+    EXPECT_TRUE(self.inject);
+    hold(self, c, 1.2 * kHigh);
+    EXPECT_FALSE(self.inject);
+    hold(self, c, 1.05 * kHigh); // and not back at once
+    EXPECT_FALSE(self.inject);
+    hold(self, c, -0.95 * kHigh); // either direction
+    EXPECT_TRUE(self.inject);
+    hold(self, c, -1.2 * kHigh);
+    EXPECT_FALSE(self.inject);
+}
+
+TEST(Position, WithoutInjectionTheFluxLeadsAlways)
+{
+    const position_config_t c = config(false);
+    position_t self = started(c);
+    for (const double omega : {0.0, 0.05, 0.5, 0.0}) {
+        hold(self, c, omega);
+        EXPECT_FALSE(self.inject);
+        EXPECT_EQ(self.weight, PM_ONE);
+    }
+}
+
+TEST(Position, ResetStandsAtTheAngleGiven)
+{
+    const position_config_t c = config();
+    position_t self;
+    position_reset(&self, &c, PM_TURN(0.3), {0, 0});
+    EXPECT_EQ(self.pll.theta, PM_TURN(0.3));
+    EXPECT_EQ(self.pll.omega, 0);
+    EXPECT_EQ(self.weight, 0);
+    EXPECT_EQ(self.quality, PM_ONE);
+    EXPECT_TRUE(self.inject);
+}
+
+// A machine at a speed where the flux leads.
+class Running
+{
+  public:
+    explicit Running(double omega) : rotation(bench::kIpmLinear, bench::kIpmBase, omega, {0, 3})
+    {
+        position_reset(&self, &c_, 0, {0, 0});
+        self.pll.omega = fixed(omega, 28);
+        self.omega_mean = self.pll.omega;
+        self.inject = false;
+        self.weight = PM_ONE;
+        self.gains = c_.pll_high;
+        const obs_in_t in = rotation.seen(0, rotation.omega_rad_s);
+        active_flux_reset(&self.flux, &c_.flux, &in);
+    }
+
+    void run_ms(int ms, const pm_pll_t *imposed = nullptr)
+    {
+        for (int k = 0; k < 10 * ms; ++k) {
+            rotation.advance();
+            const obs_in_t in = rotation.seen(rotation.theta_rad, rotation.omega_rad_s);
+            position_step(&self, &c_, in.v, in.i, imposed, &out);
+            if (k % 10 == 9) {
+                position_slow(&self, &c_, out.i);
+            }
+        }
+    }
+
+    double error_deg() const
+    {
+        return bench::wrapped(rotation.theta_rad - bench::rad(self.pll.theta)) / kDegree;
+    }
+
+    Rotation rotation;
+    position_t self = {};
+    position_out_t out = {};
+
+  private:
+    position_config_t c_ = config();
+};
+
+TEST(Position, FollowsTheMachine)
+{
+    for (const double omega : {0.4, -0.4, 1.0}) {
+        Running r(omega);
+        r.run_ms(1000);
+        EXPECT_NEAR(r.error_deg(), 0, kIdeal_deg) << omega;
+        EXPECT_NEAR(real(r.self.pll.omega), omega, 1e-3) << omega;
+        EXPECT_GT(real(r.self.quality), 0.95) << omega;
+        // the current that it hands on is that of the rotor frame
+        EXPECT_NEAR(real(r.out.i.q), 0.3, 0.005) << omega;
+        EXPECT_NEAR(real(r.out.i.d), 0, 0.005) << omega;
+    }
+}
+
+TEST(Position, QualityFallsWhenTheMachineIsNotWhereItWas)
+{
+    Running r(0.5);
+    r.run_ms(300);
+    ASSERT_GT(real(r.self.quality), 0.95);
+    r.rotation.omega_rad_s = -r.rotation.omega_rad_s; // the rotor runs away backwards
+    int ms = 0;
+    while (r.self.quality > 0 && ms < 500) {
+        r.run_ms(1);
+        ++ms;
+    }
+    EXPECT_LE(ms, kLost_ms);
+}
+
+TEST(Position, QualityFallsWithoutAVoltageOrACurrentThatFits)
+{
+    const position_config_t c = config();
+    Running r(0.5);
+    r.run_ms(300);
+    // the link is gone: the same speed is believed, no voltage, no current
+    int ms = 0;
+    for (; r.self.quality > 0 && ms < 500; ++ms) {
+        for (int k = 0; k < 10; ++k) {
+            position_step(&r.self, &c, {0, 0}, {0, 0}, nullptr, &r.out);
+        }
+        position_slow(&r.self, &c, r.out.i);
+    }
+    EXPECT_LE(ms, 3 * kLost_ms);
+}
+
+TEST(Position, QualityFallsWhenTheCarrierIsGone)
+{
+    const position_config_t c = config();
+    position_t self = started(c);
+    int ms = 0;
+    for (; self.quality > 0 && ms < 500; ++ms) {
+        for (int k = 0; k < 10; ++k) {
+            position_out_t out;
+            position_step(&self, &c, {0, 0}, {0, 0}, nullptr, &out);
+        }
+        position_slow(&self, &c, {0, 0});
+    }
+    EXPECT_LE(ms, kLost_ms);
+}
+
+TEST(Position, AnImposedAngleIsTaken)
+{
+    Running r(0.1);
+    const pm_pll_t imposed = {PM_TURN(0.4), fixed(0.1, 28)};
+    r.run_ms(1, &imposed);
+    EXPECT_EQ(r.self.pll.theta, imposed.theta);
+    EXPECT_EQ(r.self.pll.omega, imposed.omega);
+}
+
+} // namespace
