@@ -190,7 +190,8 @@ class Rotation
     }
 
     // Measured with an error that does not turn, seen from a position that the caller believes in.
-    obs_in_t seen(double theta_hat_rad, double omega_hat_rad_s, Complex v_error_V = 0, Complex i_error_A = 0) const
+    obs_in_t seen(double theta_hat_rad, double omega_hat_rad_s, Complex v_error_V = 0,
+                  Complex i_error_A = 0) const
     {
         const Complex i = (i_A_ + i_error_A) / b_.i_A;
         obs_in_t in = {};

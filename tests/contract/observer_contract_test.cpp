@@ -1,5 +1,5 @@
-// What every position source owes drive/position.c, whatever its method. A new source is an adapter and a line of
-// the table at the end of the adapters.
+// What every position source owes drive/position.c, whatever its method. A new source is an adapter and a
+// line of the table at the end of the adapters.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -29,8 +29,8 @@ using bench::real;
 constexpr double kMirror = 5e-5;
 // The direction of an angle is rounded to 2^-31 at every angle anew; through the same gain.
 constexpr double kTurned = 5e-5;
-// Seeded at the truth. The run starts with a step of the sampled voltage and a mean current half a period old, of
-// which 0.013 are left.
+// Seeded at the truth. The run starts with a step of the sampled voltage and a mean current half a period
+// old, of which 0.013 are left.
 constexpr double kSeeded_rad = 0.02;
 // eps is exact for small errors.
 constexpr double kSlope = 0.05;
@@ -152,7 +152,8 @@ class Drive
         *out = source_.step(in);
         const double frame = theta_ - error_ + 1.5 * omega_ * kBase.period_s;
         const double carrier = real(source_.carrier()) * kBase.v_V;
-        commanded_ = v_dq_ * std::polar(1.0, theta_ + 1.5 * omega_ * kBase.period_s) + carrier * std::polar(1.0, frame);
+        commanded_ = v_dq_ * std::polar(1.0, theta_ + 1.5 * omega_ * kBase.period_s) +
+                     carrier * std::polar(1.0, frame);
         return in;
     }
 
@@ -307,7 +308,8 @@ TEST_P(ObserverContract, MirroredInputGivesMirroredOutput)
     EXPECT_GT(largest, 0.05); // there was something to mirror
 }
 
-// A source knows no absolute angle: the whole world turned gives the same, also where the angle passes 0 or 2 pi.
+// A source knows no absolute angle: the whole world turned gives the same, also where the angle passes 0 or 2
+// pi.
 TEST_P(ObserverContract, TurnedInputGivesTheSame)
 {
     const std::vector<obs_in_t> in = Drive::record(GetParam(), 0.15);
@@ -367,8 +369,8 @@ void expect_limits(const obs_out_t &out)
     ASSERT_LE(std::abs(real(out.misfit)), 1.0);
 }
 
-// Every field at the ends of what converters and the loop can give: a vector of +-1 per phase is 4/3 long, the link's
-// hexagon 2/3, the speed ends at 1.25. The period after, the other end.
+// Every field at the ends of what converters and the loop can give: a vector of +-1 per phase is 4/3 long,
+// the link's hexagon 2/3, the speed ends at 1.25. The period after, the other end.
 TEST_P(ObserverContract, CornersOfTheConvertersAreHarmless)
 {
     samples::Random random;
@@ -391,8 +393,8 @@ TEST_P(ObserverContract, CornersOfTheConvertersAreHarmless)
     }
 }
 
-// A voltage that stays, at standstill, with nothing to hold the source: what a locked rotor with a lost position does
-// until it is noticed (t_lost, up to 1 s).
+// A voltage that stays, at standstill, with nothing to hold the source: what a locked rotor with a lost
+// position does until it is noticed (t_lost, up to 1 s).
 TEST_P(ObserverContract, DISABLED_ConstantExtremesForASecondAreHarmless)
 {
     const std::unique_ptr<Source> source = GetParam().make();
@@ -414,7 +416,8 @@ TEST_P(ObserverContract, DISABLED_AllInputsAtTheEndsOf32Bits)
         const std::unique_ptr<Source> source = GetParam().make();
         obs_in_t in[4];
         for (obs_in_t &x : in) {
-            int32_t *const field[] = {&x.v.alpha, &x.v.beta, &x.i.alpha, &x.i.beta, &x.omega, &x.i_dq.d, &x.i_dq.q};
+            int32_t *const field[] = {&x.v.alpha, &x.v.beta, &x.i.alpha, &x.i.beta,
+                                      &x.omega,   &x.i_dq.d, &x.i_dq.q};
             for (int32_t *f : field) {
                 *f = random.word() < 0 ? INT32_MIN : INT32_MAX;
             }

@@ -25,8 +25,8 @@ constexpr double kFastPwm_Hz = 60e3; // here the delay is small enough for METHO
 constexpr double kOvershoot = 0.10;
 // The recursion leaves out the winding's resistance against the speed of the step.
 constexpr double kRecursion = 0.05;
-// Cross-axis deviation at base speed, share of the step. The decoupling uses the current of k for a voltage that
-// acts at k+1.5, so a part remains. Measured 10 % (d) and 3 % (q); three times that without.
+// Cross-axis deviation at base speed, share of the step. The decoupling uses the current of k for a voltage
+// that acts at k+1.5, so a part remains. Measured 10 % (d) and 3 % (q); three times that without.
 constexpr double kCross = 0.12;
 constexpr double kCrossWithout = 2.5;
 // One period in wide numbers: 2^-23 per product and cut of the feed-forward, 5 of them.
@@ -108,7 +108,8 @@ class Winding
     {
         const double t = d_.base.period_s;
         queue_.push_back(v_dq_pu * d_.base.v_V * std::polar(1.0, theta_ + 1.5 * omega_ * t));
-        const Complex v = queue_.size() > 1 ? queue_.front() : kJ * omega_ * d_.machine.psi_m_Wb; // at no current
+        const Complex v =
+            queue_.size() > 1 ? queue_.front() : kJ * omega_ * d_.machine.psi_m_Wb; // at no current
         if (queue_.size() > 1) {
             queue_.pop_front();
         }
@@ -149,8 +150,8 @@ current_control_out_t step(current_control_t &self, const current_control_config
     return out;
 }
 
-std::vector<Complex> respond(const Design &d, const current_control_config_t &c, double omega, Complex ref, int periods,
-                             double v_max = 3.0)
+std::vector<Complex> respond(const Design &d, const current_control_config_t &c, double omega, Complex ref,
+                             int periods, double v_max = 3.0)
 {
     Winding winding(d, omega);
     current_control_t self = {};
@@ -309,7 +310,8 @@ TEST(CurrentControl, OneStepIsTheLaw)
     }
 }
 
-// Just beyond the circle, in every direction and for every size: what passes unnoticed is the noticing's rounding.
+// Just beyond the circle, in every direction and for every size: what passes unnoticed is the noticing's
+// rounding.
 TEST(CurrentControl, CircleHoldsAtItsEdge)
 {
     current_control_config_t c = config(kIpm);
@@ -405,8 +407,8 @@ TEST(CurrentControl, CornersDoNotOverflow)
         for (const double v_max : {0.0, 0.05, 0.56, 1.0}) {
             current_control_t self = {};
             for (int k = 0; k < 2000; ++k) {
-                const current_control_out_t out =
-                    step(self, c, {sign(0) * 4 / 3, sign(1) * 4 / 3}, {sign(2), sign(3)}, sign(4) * 1.25, v_max);
+                const current_control_out_t out = step(self, c, {sign(0) * 4 / 3, sign(1) * 4 / 3},
+                                                       {sign(2), sign(3)}, sign(4) * 1.25, v_max);
                 ASSERT_LE(std::norm(bench::complex(out.v)), v_max * v_max + kRoom) << corner << ' ' << v_max;
             }
         }

@@ -63,7 +63,8 @@ struct Legs {
 
 Legs phases(Complex v)
 {
-    return {{v.real(), -0.5 * v.real() + std::sqrt(0.75) * v.imag(), -0.5 * v.real() - std::sqrt(0.75) * v.imag()}};
+    return {{v.real(), -0.5 * v.real() + std::sqrt(0.75) * v.imag(),
+             -0.5 * v.real() - std::sqrt(0.75) * v.imag()}};
 }
 
 // Duties of the textbook: each phase about the middle of the largest and the smallest.
@@ -124,7 +125,8 @@ TEST(Modulator, FundamentalIsTheCommandBelowTheLimit)
         const int n = 360;
         for (int k = 0; k < n; ++k) {
             const double angle = k * 2 * bench::kPi / n;
-            sum += realised(step(c, std::polar(amplitude, angle), kLink), c.counts, kLink) * std::polar(1.0, -angle);
+            sum += realised(step(c, std::polar(amplitude, angle), kLink), c.counts, kLink) *
+                   std::polar(1.0, -angle);
         }
         EXPECT_NEAR(std::abs(sum) / n, amplitude, kFundamental * amplitude) << share;
         EXPECT_NEAR(std::arg(sum) / kDegree, 0, 0.05) << share;
@@ -154,7 +156,8 @@ TEST(Modulator, LinearUpToTheCorners)
 {
     const modulator_config_t c = plain();
     for (int k = 0; k < 6; ++k) {
-        const modulator_out_t out = step(c, std::polar(2.0 / 3 * kLink * (1 - 1e-6), k * 60 * kDegree), kLink);
+        const modulator_out_t out =
+            step(c, std::polar(2.0 / 3 * kLink * (1 - 1e-6), k * 60 * kDegree), kLink);
         EXPECT_FALSE(out.limited);
         EXPECT_NEAR(std::abs(realised(out, c.counts, kLink)), 2.0 / 3 * kLink, 1.5 * kLink / c.counts);
     }

@@ -42,7 +42,8 @@ TEST(Mtpa, IsTheFormula)
         const double h = real(c.h);
         for (double i_q = -2; i_q <= 2; i_q += 0.01) {
             const double expected = h - std::hypot(h, i_q);
-            EXPECT_NEAR(real(mtpa_i_d(&c, fixed(i_q, 28))), expected, kRelative * std::hypot(h, i_q) + kLsb) << i_q;
+            EXPECT_NEAR(real(mtpa_i_d(&c, fixed(i_q, 28))), expected, kRelative * std::hypot(h, i_q) + kLsb)
+                << i_q;
         }
     }
 }

@@ -49,7 +49,8 @@ struct Law {
         const double slope = real(c.slope);
         const double move = std::clamp(target - reference, -slope, slope);
         reference += move;
-        const double ramping = std::abs(move) > slope - 0x1p-30 ? std::copysign(real(c.i_per_slope), move) : 0;
+        const double ramping =
+            std::abs(move) > slope - 0x1p-30 ? std::copysign(real(c.i_per_slope), move) : 0;
         const double e = reference - omega;
         const double u = real(c.pi.kp, 26) * e + integral + ramping;
         const double limited_u = std::clamp(u, i_min, i_max);
@@ -129,7 +130,8 @@ TEST(SpeedControl, FeedForwardAcceleratesWithoutAnError)
             Shaft shaft;
             for (int k = 0; k < 300; ++k) {
                 shaft.run(step(self, fed ? c : without, target, shaft.omega, -1, 1));
-                worst[fed ? 0 : 1] = std::max(worst[fed ? 0 : 1], std::abs(real(self.reference) - shaft.omega));
+                worst[fed ? 0 : 1] =
+                    std::max(worst[fed ? 0 : 1], std::abs(real(self.reference) - shaft.omega));
             }
         }
         EXPECT_LE(worst[0], kRampError * worst[1] + 2 * real(c.slope));
@@ -146,7 +148,8 @@ TEST(SpeedControl, OutputStaysWithinItsLimits)
     for (int k = 0; k < 20000; ++k) {
         const double i_min = random.within(-0.8, 0), i_max = random.within(0, 0.8);
         bool limited;
-        const double i = step(self, c, random.within(-1, 1), random.within(-1.2, 1.2), i_min, i_max, &limited);
+        const double i =
+            step(self, c, random.within(-1, 1), random.within(-1.2, 1.2), i_min, i_max, &limited);
         ASSERT_GE(i, i_min - 0x1p-22);
         ASSERT_LE(i, i_max + 0x1p-22);
         if (i > i_min + 0x1p-21 && i < i_max - 0x1p-21) {

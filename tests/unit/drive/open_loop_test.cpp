@@ -104,10 +104,12 @@ TEST(OpenLoop, StoppingLeadsToStandstill)
 Complex current_vector(const Drive &x)
 {
     const bool open = x.d.stage == STAGE_OPEN_LOOP;
-    return bench::complex(x.d.i_ref) * std::polar(1.0, bench::rad(open ? x.d.theta_open : x.d.position.pll.theta));
+    return bench::complex(x.d.i_ref) *
+           std::polar(1.0, bench::rad(open ? x.d.theta_open : x.d.position.pll.theta));
 }
 
-// The observer agrees, the rotor lags the vector by a load angle: the vectors of current and voltage must not jump.
+// The observer agrees, the rotor lags the vector by a load angle: the vectors of current and voltage must not
+// jump.
 TEST(OpenLoop, HandOverKeepsCurrentAndVoltage)
 {
     for (const double lag_deg : {0.0, 35.0, -60.0}) {
@@ -166,7 +168,8 @@ TEST(OpenLoop, ResumeKeepsCurrentAndVoltage)
         EXPECT_EQ(x.d.stage, STAGE_OPEN_LOOP);
         EXPECT_EQ(x.d.omega_open, PM_Q(0.05));
         const double rotor = 0.9 * 2 * bench::kPi, frame = bench::rad(x.d.theta_open);
-        EXPECT_NEAR(std::abs(real(x.d.i_open) * std::polar(1.0, frame) - i * std::polar(1.0, rotor)), 0, kVector);
+        EXPECT_NEAR(std::abs(real(x.d.i_open) * std::polar(1.0, frame) - i * std::polar(1.0, rotor)), 0,
+                    kVector);
         const Complex integral = {real(x.d.current.d.integral, 22), real(x.d.current.q.integral, 22)};
         const Complex u = Complex{-0.03, 0.08};
         EXPECT_NEAR(std::abs(integral * std::polar(1.0, frame) - u * std::polar(1.0, rotor)), 0, kVector);

@@ -30,7 +30,7 @@ TEST(Parameters, TableIsComplete)
 TEST(Parameters, NamesAndMembersAreTheSame)
 {
     drive_params_t p = {};
-#define PM_PARAM(id, unit_, exponent, least, standard, most, text)                                             \
+#define PM_PARAM(id, unit_, exponent, least, standard, most, text)                                           \
     drive_param_set(&p, DRIVE_PARAM_##id, 1234);                                                             \
     EXPECT_EQ(p.id, 1234) << #id;                                                                            \
     EXPECT_EQ(std::string(drive_param_table[DRIVE_PARAM_##id].name), #id);                                   \

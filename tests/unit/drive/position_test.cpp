@@ -19,7 +19,8 @@ constexpr int kSettle = 100;
 constexpr double kWeight = 1e-4; // the span is Q20
 // With an exact machine at constant speed (active_flux_test.cpp: 0.2).
 constexpr double kIdeal_deg = 0.3;
-// Lost is lost: an observer that is told nonsense must not be believed for longer than this (t_lost adds 30 ms).
+// Lost is lost: an observer that is told nonsense must not be believed for longer than this (t_lost adds 30
+// ms).
 constexpr int kLost_ms = 60;
 
 constexpr double kLow = 0.12, kHigh = 0.24;
@@ -75,8 +76,10 @@ TEST(Position, WeightIsTheSpeedBetweenItsLimits)
         EXPECT_NEAR(real(self.weight), expected, kWeight) << omega;
         EXPECT_GE(self.weight, 0);
         EXPECT_LE(self.weight, PM_ONE);
-        EXPECT_NEAR(self.gains.kp, c.pll_low.kp + expected * (c.pll_high.kp - c.pll_low.kp), 1e-3 * c.pll_high.kp);
-        EXPECT_NEAR(self.gains.ki, c.pll_low.ki + expected * (c.pll_high.ki - c.pll_low.ki), 1e-3 * c.pll_high.ki);
+        EXPECT_NEAR(self.gains.kp, c.pll_low.kp + expected * (c.pll_high.kp - c.pll_low.kp),
+                    1e-3 * c.pll_high.kp);
+        EXPECT_NEAR(self.gains.ki, c.pll_low.ki + expected * (c.pll_high.ki - c.pll_low.ki),
+                    1e-3 * c.pll_high.ki);
     }
 }
 

@@ -20,8 +20,8 @@ struct Cause {
     int within_steps; // periods until the bridge is off
 };
 
-// Those that come from the measurement of one period are off in that period; slow ones in the period after their
-// millisecond, after the time they must last.
+// Those that come from the measurement of one period are off in that period; slow ones in the period after
+// their millisecond, after the time they must last.
 const std::vector<Cause> kCauses = {
     {DRIVE_FAULT_OVER_CURRENT, [](Drive &x) { x.in.i_leg[0] = current_code(0.91); }, 1},
     {DRIVE_FAULT_OVER_CURRENT, [](Drive &x) { x.in.i_leg[1] = current_code(-0.91); }, 1},

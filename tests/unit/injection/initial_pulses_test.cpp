@@ -60,7 +60,8 @@ Rig spm()
     return r;
 }
 
-// initial_pulses.h and DESIGN.md: i_pulse along d by whole periods; limits against noise and a fourth of 2 theta.
+// initial_pulses.h and DESIGN.md: i_pulse along d by whole periods; limits against noise and a fourth of 2
+// theta.
 initial_pulses_config_t config(const Rig &r)
 {
     const double per_period = 2.0 / 3 * r.plant.dclink.v_source_V * r.base.period_s;
@@ -99,7 +100,8 @@ Result find(const Rig &r, const initial_pulses_config_t &c, double theta_rad, ui
     plant_config_t config = r.plant;
     config.sensor.seed = seed;
     const char *error = nullptr;
-    const std::unique_ptr<plant_t, void (*)(plant_t *)> plant(plant_create(&config, theta_rad, &error), &plant_destroy);
+    const std::unique_ptr<plant_t, void (*)(plant_t *)> plant(plant_create(&config, theta_rad, &error),
+                                                              &plant_destroy);
     EXPECT_EQ(error, nullptr);
     initial_pulses_t self;
     initial_pulses_reset(&self);
@@ -111,7 +113,8 @@ Result find(const Rig &r, const initial_pulses_config_t &c, double theta_rad, ui
         result.state = initial_pulses_step(&self, &c, current(adc), &out);
         plant_pwm_t pwm = {};
         for (int leg = 0; leg < 3; ++leg) {
-            pwm.compare[leg][0] = static_cast<uint32_t>(std::lround(real(out.duty[leg]) * config.inverter.timer_counts));
+            pwm.compare[leg][0] =
+                static_cast<uint32_t>(std::lround(real(out.duty[leg]) * config.inverter.timer_counts));
             pwm.compare[leg][1] = pwm.compare[leg][0];
             pwm.driven[leg] = out.driven;
         }

@@ -76,7 +76,8 @@ pulsating_square_config_t without_cross(pulsating_square_config_t c)
 class Carrier
 {
   public:
-    Carrier(const pulsating_square_config_t &c, const L &l, double error_rad, double omega_pu = 0, double i_q_A = 0)
+    Carrier(const pulsating_square_config_t &c, const L &l, double error_rad, double omega_pu = 0,
+            double i_q_A = 0)
         : c_(c), l_(l), error_(error_rad), omega_(omega_pu * kBase.omega_rad_s), i_q_A_(i_q_A)
     {
         pulsating_square_reset(&self, measured());
@@ -95,8 +96,8 @@ class Carrier
         obs_out_t out;
         pulsating_square_demodulate(&self, &c_, &in, &out);
         const pm_dq_t v = pulsating_square_output(&self, &c_);
-        const Complex commanded = bench::complex(v) * kBase.v_V *
-                                  std::polar(1.0, theta_hat + 1.5 * omega_ * kBase.period_s);
+        const Complex commanded =
+            bench::complex(v) * kBase.v_V * std::polar(1.0, theta_hat + 1.5 * omega_ * kBase.period_s);
         run(applying_);
         applying_ = commanded;
         return out;
@@ -146,7 +147,8 @@ class Carrier
     Complex i_carrier_A_ = 0, applying_ = 0;
 };
 
-double eps(const pulsating_square_config_t &c, const L &l, double error_rad, double omega = 0, double i_q_A = 0)
+double eps(const pulsating_square_config_t &c, const L &l, double error_rad, double omega = 0,
+           double i_q_A = 0)
 {
     return real(Carrier(c, l, error_rad, omega, i_q_A).settled().eps);
 }
@@ -197,7 +199,7 @@ TEST(PulsatingSquare, UncompensatedZeroIsWhereCrossCouplingPutsIt)
         const double theta_m = std::atan2(-l.L_dq_H, (l.L_q_H - l.L_d_H) / 2); // METHODS.md 0.1
         const double expected = -theta_m / 2 / kDegree;
         EXPECT_GT(std::abs(expected), 3); // the effect is there
-        EXPECT_EQ(expected < 0, i_q > 0); // motoring: the estimate leads
+        EXPECT_EQ(expected<0, i_q> 0);    // motoring: the estimate leads
         EXPECT_NEAR(zero_deg(without_cross(config(l, i_q)), l, 0, i_q), expected, kZero_deg) << i_q;
     }
 }
@@ -217,7 +219,8 @@ TEST(PulsatingSquare, SpeedMovesNoAngle)
     }
 }
 
-// A fundamental that turns changes from sample to sample, but by the same step: the second difference drops it.
+// A fundamental that turns changes from sample to sample, but by the same step: the second difference drops
+// it.
 TEST(PulsatingSquare, FundamentalCurrentDropsOut)
 {
     const pulsating_square_config_t c = config(kUnloaded, 0);
@@ -242,8 +245,11 @@ TEST(PulsatingSquare, EverySampleHasTheRightSignFromTheFirst)
                 continue;
             }
             ASSERT_NEAR(real(out.eps), 0.5 * std::sin(2 * error), kSignal) << k;
-            ASSERT_NEAR(real(out.vector.d) * kBase.i_A, 0.5 * kCarrier_V * kBase.period_s *
-                        ((1 / 43e-3 + 1 / 75e-3) + (1 / 43e-3 - 1 / 75e-3) * std::cos(2 * error)), 1e-5) << k;
+            ASSERT_NEAR(real(out.vector.d) * kBase.i_A,
+                        0.5 * kCarrier_V * kBase.period_s *
+                            ((1 / 43e-3 + 1 / 75e-3) + (1 / 43e-3 - 1 / 75e-3) * std::cos(2 * error)),
+                        1e-5)
+                << k;
         }
         EXPECT_EQ(quiet, 4);
     }

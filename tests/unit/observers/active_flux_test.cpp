@@ -52,8 +52,9 @@ constexpr Complex kRatedIpm_A = {-1.75, 4.0};
 Fixture ipm_saturated()
 {
     const double L_q_rated = bench::kIpm1000.flux_Wb(kRatedIpm_A).imag() / kRatedIpm_A.imag();
-    return {bench::kIpm1000, bench::kIpmBase,
-            bench::flux_config(bench::kIpm1000, bench::kIpmBase, 43e-3, 75e-3, L_q_rated, kRatedIpm_A.imag())};
+    return {
+        bench::kIpm1000, bench::kIpmBase,
+        bench::flux_config(bench::kIpm1000, bench::kIpmBase, 43e-3, 75e-3, L_q_rated, kRatedIpm_A.imag())};
 }
 
 // The observer leads: its error signal moves the position.
@@ -172,7 +173,8 @@ TEST(ActiveFlux, AWrongInductanceActsAsDerived)
                 f.config.L_q = static_cast<pm_q_t>(f.config.L_q * factor);
                 const double expected = formula_deg(f, 0.5, i, 0, (1 - factor) * f.machine.L_q0_H);
                 Closed closed(f, Rotation(f.machine, f.base, 0.5, i));
-                EXPECT_NEAR(closed.settled_deg(), expected, kFormula * std::abs(expected)) << factor << ' ' << i;
+                EXPECT_NEAR(closed.settled_deg(), expected, kFormula * std::abs(expected))
+                    << factor << ' ' << i;
             }
         }
     }
@@ -213,7 +215,8 @@ Ripple ripple(const Fixture &f, double omega, Complex v_error_V, Complex i_error
     active_flux_t state;
     active_flux_reset(&state, &f.config, &first);
     state.k_seed = 0; // it leads
-    const int turn = static_cast<int>(std::lround(2 * bench::kPi / std::abs(rotation.omega_rad_s) / f.base.period_s));
+    const int turn =
+        static_cast<int>(std::lround(2 * bench::kPi / std::abs(rotation.omega_rad_s) / f.base.period_s));
     Ripple r = {0, 0, 0};
     for (int k = 0; k < settle + turns * turn; ++k) {
         rotation.advance();
@@ -240,7 +243,8 @@ TEST(ActiveFlux, AnOffsetBecomesTheRippleDerived)
             const double speed = std::abs(omega) * f.base.omega_rad_s;
             const double per_volt = std::sqrt(1 + 4 / (g * g)) / speed / f.machine.psi_m_Wb;
             const Ripple v = ripple(f, omega, {0.5, 0.3}, 0, 40000);
-            EXPECT_NEAR(v.eps, per_volt * std::abs(Complex{0.5, 0.3}), kClosedForm * v.eps) << g << ' ' << omega;
+            EXPECT_NEAR(v.eps, per_volt * std::abs(Complex{0.5, 0.3}), kClosedForm * v.eps)
+                << g << ' ' << omega;
             EXPECT_NEAR(v.mean_eps, 0, 0.02 * v.eps) << g << ' ' << omega;
             const Ripple i = ripple(f, omega, 0, {0.1, 0}, 40000);
             EXPECT_NEAR(i.eps, per_volt * 0.1 * f.machine.R_ohm, kClosedForm * i.eps) << g << ' ' << omega;
@@ -264,7 +268,9 @@ TEST(ActiveFlux, AWrongFluxDecaysAtTheRateDerived)
             const double rate = g * std::abs(rotation.omega_rad_s) / 2;
             const double swing = std::abs(rotation.omega_rad_s) * std::sqrt(1 - g * g / 4);
             // over whole half periods of the oscillation the envelope is seen without its phase
-            const auto half = [&](int n) { return static_cast<int>(std::lround(n * bench::kPi / swing / f.base.period_s)); };
+            const auto half = [&](int n) {
+                return static_cast<int>(std::lround(n * bench::kPi / swing / f.base.period_s));
+            };
             double before = 0, after = 0;
             for (int k = 1; k <= half(5); ++k) {
                 rotation.advance();
