@@ -25,6 +25,11 @@ static void apply(const initial_pulses_t *self, const initial_pulses_config_t *c
     out->driven = true;
 }
 
+static bool is_zero(const initial_pulses_config_t *config, pm_ab_t i)
+{
+    return pm_abs(i.alpha) < config->i_zero && pm_abs(i.beta) < config->i_zero;
+}
+
 static void take(initial_pulses_t *self, pm_ab_t i)
 {
     pm_angle_t angle = axis[self->pulse / 2U];
@@ -64,6 +69,9 @@ pm_procedure_t initial_pulses_step(initial_pulses_t *self, const initial_pulses_
         if (self->timer <= config->periods) {
             apply(self, config, out);
         } else if (self->timer > config->periods + 1U) {
+            if (is_zero(config, i)) {
+                return PM_FAILED_TIMEOUT; /* nothing connected */
+            }
             take(self, i);
             self->decaying = true;
             self->timer = 0;
@@ -71,8 +79,7 @@ pm_procedure_t initial_pulses_step(initial_pulses_t *self, const initial_pulses_
         }
         return PM_RUNNING;
     }
-    const bool zero = pm_abs(i.alpha) < config->i_zero && pm_abs(i.beta) < config->i_zero;
-    self->quiet = zero ? self->quiet + 1U : 0U;
+    self->quiet = is_zero(config, i) ? self->quiet + 1U : 0U;
     if (self->quiet < QUIET) {
         return self->timer > config->timeout ? PM_FAILED_TIMEOUT : PM_RUNNING;
     }

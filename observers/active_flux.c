@@ -37,20 +37,23 @@ void active_flux_step(active_flux_t *self, const active_flux_config_t *config, c
 {
     const pm_ab_t i_mean = {.alpha = (in->i.alpha + self->i.alpha) >> 1,
                             .beta = (in->i.beta + self->i.beta) >> 1};
-    self->psi.alpha += pm_frac(in->v.alpha - pm_mul(self->R, i_mean.alpha), config->t_s);
-    self->psi.beta += pm_frac(in->v.beta - pm_mul(self->R, i_mean.beta), config->t_s);
+    /* saturating: with the position lost, a voltage at standstill drives the flux up until the fault */
+    self->psi.alpha =
+        pm_add_sat(self->psi.alpha, pm_frac(in->v.alpha - pm_mul(self->R, i_mean.alpha), config->t_s));
+    self->psi.beta =
+        pm_add_sat(self->psi.beta, pm_frac(in->v.beta - pm_mul(self->R, i_mean.beta), config->t_s));
     self->i = in->i;
 
     const pm_dq_t psi = pm_park(self->psi, in->dir);
     const pm_q_t L_q = inductance_q(config, in->i_dq.q);
     const pm_dq_t active = {.d = psi.d - pm_mul(L_q, in->i_dq.d), .q = psi.q - pm_mul(L_q, in->i_dq.q)};
-    const pm_q_t error_d = self->psi_ref - active.d;
+    const pm_q_t error_d = pm_sub_sat(self->psi_ref, active.d);
 
     const pm_frac_t k_d = pm_shl(pm_mulh(pm_abs(in->omega), config->g), 32 - PM_Q_BITS) + self->k_seed;
     const pm_ab_t correction = pm_park_inverse(
         (pm_dq_t){.d = pm_frac(error_d, k_d), .q = -pm_frac(active.q, self->k_seed)}, in->dir);
-    self->psi.alpha += correction.alpha;
-    self->psi.beta += correction.beta;
+    self->psi.alpha = pm_add_sat(self->psi.alpha, correction.alpha);
+    self->psi.beta = pm_add_sat(self->psi.beta, correction.beta);
 
     out->vector = active;
     out->eps = pm_gain_unit(active.q, self->inverse);

@@ -2,9 +2,10 @@
  *
  * PI per axis with kp = w_c L, ki = w_c R T_s, decoupling -w L_q i_q and w (L_d i_d + psi), a circular
  * voltage limit in which the d-axis has priority (flux before torque), and back-calculation: each integral
- * follows the limited voltage. Step response 10-90 %: 0.35/f_c; overshoot <= 10 % with the 1.5-period delay
- * and f_c <= f_pwm/20. Uses the current at k; the voltage belongs to the frame at the middle of [k+1, k+2).
- * Tests: tests/unit/control/current_control_test.cpp. */
+ * follows the limited voltage. Step response 10-90 %: 0.35/f_c with little delay, 0.16/f_c at f_c = f_pwm/20;
+ * overshoot <= 10 % up to there. The limit is noticed to 2^-12 in the square of the voltage. Uses the current
+ * at k; the voltage belongs to the frame at the middle of [k+1, k+2). Tests:
+ * tests/unit/control/current_control_test.cpp. */
 #ifndef CONTROL_CURRENT_CONTROL_H
 #define CONTROL_CURRENT_CONTROL_H
 

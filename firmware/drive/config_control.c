@@ -19,8 +19,8 @@ static pm_pi_config_t make_current_pi(maker_t *m, drive_param_id_t L)
     const pm_num_t kp = pm_num_div(pm_num_mul(bandwidth, si(m, L)), m->impedance);
     const pm_num_t ki = pm_num_div(mul3(bandwidth, si(m, DRIVE_PARAM_R_s), m->base.t_s), m->impedance);
     return (pm_pi_config_t){
-        .kp = fixed(m, kp, GAIN_BITS, DRIVE_PARAM_current_bandwidth),
-        .ki = fixed(m, ki, GAIN_BITS, DRIVE_PARAM_current_bandwidth),
+        .kp = gain(m, kp, GAIN_BITS, DRIVE_PARAM_current_bandwidth),
+        .ki = gain(m, ki, GAIN_BITS, DRIVE_PARAM_current_bandwidth),
         .kb = fixed(m, pm_num_div(ki, kp), UNIT_BITS, DRIVE_PARAM_R_s),
     };
 }
@@ -45,8 +45,8 @@ void make_speed(maker_t *m, speed_control_config_t *c)
     const pm_num_t t_slow = pm_num_ratio(1, SLOW_HZ);
     const pm_num_t ki = pm_num_mul(mul3(kp, bandwidth, t_slow), pm_num_ratio(1, 4));
     const pm_num_t slope = pm_num_mul(si(m, DRIVE_PARAM_acceleration), pole_pairs(m)); /* rad/s2 electrical */
-    c->pi.kp = fixed(m, kp, GAIN_BITS, DRIVE_PARAM_speed_bandwidth);
-    c->pi.ki = fixed(m, ki, GAIN_BITS, DRIVE_PARAM_speed_bandwidth);
+    c->pi.kp = gain(m, kp, GAIN_BITS, DRIVE_PARAM_speed_bandwidth);
+    c->pi.ki = gain(m, ki, GAIN_BITS, DRIVE_PARAM_speed_bandwidth);
     c->pi.kb = fixed(m, pm_num_div(ki, kp), UNIT_BITS, DRIVE_PARAM_speed_bandwidth);
     c->slope =
         fixed(m, pm_num_div(pm_num_mul(slope, t_slow), m->base.omega), Q_BITS, DRIVE_PARAM_acceleration);

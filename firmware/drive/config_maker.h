@@ -44,6 +44,16 @@ static inline int32_t fixed(maker_t *m, pm_num_t x, int bits, drive_param_id_t b
     return out;
 }
 
+/* A gain that must not round to nothing. */
+static inline int32_t gain(maker_t *m, pm_num_t x, int bits, drive_param_id_t blame)
+{
+    const int32_t out = fixed(m, x, bits, blame);
+    if (out <= 0) {
+        refuse(m, blame, "gives a gain of zero with these bases");
+    }
+    return out;
+}
+
 static inline pm_num_t mul3(pm_num_t a, pm_num_t b, pm_num_t c)
 {
     return pm_num_mul(pm_num_mul(a, b), c);

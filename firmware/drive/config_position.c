@@ -8,8 +8,8 @@ static pm_pll_config_t make_pll(maker_t *m, drive_param_id_t bandwidth)
     const pm_num_t ki = pm_num_div(pm_num_mul(square(w_n), m->base.t_s), m->base.omega);
     const pm_num_t turns = pm_num_div(pm_num_mul(m->base.omega, m->base.t_s), PM_NUM_TWO_PI);
     return (pm_pll_config_t){
-        .kp = fixed(m, kp, FRAC_BITS, bandwidth),
-        .ki = fixed(m, ki, FRAC_BITS, bandwidth),
+        .kp = gain(m, kp, FRAC_BITS, bandwidth),
+        .ki = gain(m, ki, FRAC_BITS, bandwidth),
         .k_theta = fixed(m, pm_num_mul(turns, pm_num(16)), 30, DRIVE_PARAM_speed_trip),
         .omega_limit = PM_Q(1.25),
     };
@@ -63,11 +63,30 @@ static pm_num_t carrier_slope(const maker_t *m, inductances_t L)
     return pm_num_div(pm_num_mul(flux, pm_num_add(pm_num_sub(L.L_q, L.L_d), cross)), D);
 }
 
+static inductances_t at_zero(const maker_t *m)
+{
+    return (inductances_t){si(m, DRIVE_PARAM_L_d), si(m, DRIVE_PARAM_L_q), pm_num(0)};
+}
+
+static inductances_t at_rated(const maker_t *m)
+{
+    return (inductances_t){si(m, DRIVE_PARAM_L_dh_rated), si(m, DRIVE_PARAM_L_qh_rated),
+                           si(m, DRIVE_PARAM_L_dqh_rated)};
+}
+
+static bool positive(pm_num_t x)
+{
+    return pm_num_cmp(x, pm_num(0)) > 0;
+}
+
 static void make_square(maker_t *m, pulsating_square_config_t *c)
 {
-    const inductances_t zero = {si(m, DRIVE_PARAM_L_d), si(m, DRIVE_PARAM_L_q), pm_num(0)};
-    const inductances_t rated = {si(m, DRIVE_PARAM_L_dh_rated), si(m, DRIVE_PARAM_L_qh_rated),
-                                 si(m, DRIVE_PARAM_L_dqh_rated)};
+    const inductances_t zero = at_zero(m);
+    const inductances_t rated = at_rated(m);
+    if (!positive(carrier_slope(m, zero)) || !positive(carrier_slope(m, rated))) {
+        refuse(m, DRIVE_PARAM_L_qh_rated, "leaves no saliency for injection at rated current");
+        return;
+    }
     const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
     const pm_num_t gain_0 = pm_num_div(m->base.i, carrier_slope(m, zero));
     const pm_num_t gain_r =
@@ -105,7 +124,8 @@ static void check_carrier(maker_t *m)
     }
 }
 
-/* The carrier must be seen: eight times the noise of a sample at 45 degrees of error, and 5 % of saliency. */
+/* The carrier's answer at 45 degrees of error must be four times the noise of a sample, the saliency 5 %, and
+ * some of it must be left at rated current. */
 bool salient(const maker_t *m)
 {
     const pm_num_t L_d = si(m, DRIVE_PARAM_L_d);
@@ -114,7 +134,8 @@ bool salient(const maker_t *m)
     const pm_num_t dL = pm_num_sub(L_q, L_d);
     const pm_num_t signal = pm_num_div(pm_num_mul(flux, dL), pm_num_mul(pm_num(2), pm_num_mul(L_d, L_q)));
     const pm_num_t noise = pm_num_mul(pm_num(4), si(m, DRIVE_PARAM_i_noise));
-    return pm_num_cmp(signal, noise) > 0 && pm_num_cmp(dL, pm_num_mul(L_q, pm_num_ratio(1, 20))) > 0;
+    return pm_num_cmp(signal, noise) > 0 && pm_num_cmp(dL, pm_num_mul(L_q, pm_num_ratio(1, 20))) > 0 &&
+           positive(carrier_slope(m, at_rated(m)));
 }
 
 void make_position(maker_t *m, position_config_t *c, bool injection)

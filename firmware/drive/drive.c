@@ -29,7 +29,10 @@ void drive_command(drive_t *drive, const drive_command_t *command)
 
 bool drive_clear_fault(drive_t *drive)
 {
-    if (drive->fault == DRIVE_FAULT_PARAMETERS || drive->command.enable || drive->hw_fault) {
+    if (drive->fault == DRIVE_FAULT_NONE) {
+        return true;
+    }
+    if (drive->fault == DRIVE_FAULT_PARAMETERS || drive->command.enable || protection_cause_present(drive)) {
         return false;
     }
     drive->fault = DRIVE_FAULT_NONE;

@@ -12,6 +12,8 @@ void drive_trip(drive_t *drive, drive_fault_t fault);
 void protection_step(drive_t *drive, const drive_in_t *in); /* each period: currents, DC link, break input */
 void protection_slow(drive_t *drive); /* 1 kHz: temperature, speed, position, stall, sum */
 
+bool protection_cause_present(const drive_t *drive); /* of the faults that show with the bridge off */
+
 /* Limits of the q-axis current after derating, for the present direction of rotation. */
 void protection_current_limits(drive_t *drive, pm_q_t *i_min, pm_q_t *i_max);
 

@@ -58,7 +58,9 @@ struct drive {
     pm_q_t i_target;
 
     uint16_t state_ms; /* since the state or stage was entered */
-    uint16_t stall_ms, lost_ms, sum_ms, still_ms;
+    uint16_t stall_ms, lost_ms, sum_ms;
+    uint16_t still_ms; /* standstill while stopping */
+    uint16_t agree_ms; /* observer and imposed angle turn alike */
     int32_t temperature_dC;
 };
 

@@ -13,7 +13,7 @@ void open_loop_start(drive_t *drive)
 {
     drive->stage = STAGE_OPEN_LOOP;
     drive->state_ms = 0;
-    drive->still_ms = 0;
+    drive->agree_ms = 0;
     drive->theta_open = SWEEP_FROM;
     drive->omega_open = 0;
     drive->i_open = 0;
@@ -31,7 +31,7 @@ void open_loop_resume(drive_t *drive)
     drive->omega_open = drive->position.pll.omega;
     drive->i_open = pm_hypot(i.d, i.q);
     current_control_reset(&drive->current, u);
-    drive->still_ms = 0;
+    drive->agree_ms = 0;
     drive->stage = STAGE_OPEN_LOOP;
 }
 
@@ -83,8 +83,8 @@ void open_loop_slow(drive_t *drive)
     const bool agree = pm_abs(omega) >= c->position.omega_high &&
                        pm_abs(drive->position.pll.omega - omega) < pm_abs(omega) / 4 &&
                        drive->position.quality > PM_Q(0.5);
-    drive->still_ms = agree ? (uint16_t)(drive->still_ms + 1U) : 0U;
-    if (!current_mode && drive->still_ms > AGREE_MS) {
+    drive->agree_ms = agree ? (uint16_t)(drive->agree_ms + 1U) : 0U;
+    if (!current_mode && drive->agree_ms > AGREE_MS) {
         hand_over(drive);
     }
 }

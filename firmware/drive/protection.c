@@ -43,6 +43,13 @@ void protection_step(drive_t *drive, const drive_in_t *in)
     }
 }
 
+bool protection_cause_present(const drive_t *drive)
+{
+    const protection_config_t *c = &drive->config.protection;
+    return drive->hw_fault || drive->temperature_dC >= c->temp_trip_dC ||
+           !pm_within(drive->status.v_dc, c->v_dc_min, c->v_dc_max);
+}
+
 /* Counts while a condition holds; true when it has held for longer than `limit` ms. */
 static bool lasts(uint16_t *timer, bool condition, uint16_t limit)
 {

@@ -240,14 +240,15 @@ TEST(Modulator, CompensationIsLinearInItsZone)
 {
     const modulator_config_t c = compensating();
     const double full = lost_counts(c, kLink);
+    const int32_t centre = c.counts / 2;
     for (double i = -1.5 * kZone; i <= 1.5 * kZone; i += kZone / 50) {
         const double expected = full * std::clamp(i / kZone, -1.0, 1.0);
         // i along phase A: the others carry half of it, reversed
         const modulator_out_t out = step(c, 0, kLink, i);
-        EXPECT_NEAR(out.on[0] - c.counts / 2, expected, kCompensation_counts) << i;
+        EXPECT_NEAR(out.on[0] - centre, expected, kCompensation_counts) << i;
         const double other = full * std::clamp(-0.5 * i / kZone, -1.0, 1.0);
-        EXPECT_NEAR(out.on[1] - c.counts / 2, other, kCompensation_counts) << i;
-        EXPECT_NEAR(out.on[2] - c.counts / 2, other, kCompensation_counts) << i;
+        EXPECT_NEAR(out.on[1] - centre, other, kCompensation_counts) << i;
+        EXPECT_NEAR(out.on[2] - centre, other, kCompensation_counts) << i;
     }
 }
 

@@ -419,7 +419,7 @@ TEST(Config, RandomSetsAreRefusedOrMakeSense)
 }
 
 // Accepted with a gain of zero or below: reported.
-TEST(Config, DISABLED_RandomSetsHaveNoDeadGain)
+TEST(Config, RandomSetsHaveNoDeadGain)
 {
     const Survey s = survey(kDraws);
     for (const auto &[name, count] : s.known) {
@@ -428,7 +428,7 @@ TEST(Config, DISABLED_RandomSetsHaveNoDeadGain)
 }
 
 // The saliency is gone, or turned round, at rated current: positive feedback of the injection loop.
-TEST(Config, DISABLED_RefusesInjectionWhoseSaliencyTurnsRound)
+TEST(Config, RefusesInjectionWhoseSaliencyTurnsRound)
 {
     for (const double L_qh : {20e-3, 42.55e-3}) {
         const drive_params_t p = changed({{DRIVE_PARAM_L_qh_rated, L_qh}, {DRIVE_PARAM_L_dqh_rated, 0}});

@@ -239,7 +239,7 @@ TEST(Drive, RunningAwayIsOverSpeed)
 
 // Standing still on an imposed angle, a stop must end: open_loop_slow() and stop() count in the same
 // still_ms.
-TEST(Drive, DISABLED_StopEndsOnAnImposedAngle)
+TEST(Drive, StopEndsOnAnImposedAngle)
 {
     Drive x;
     x.start_current_mode();
@@ -251,7 +251,7 @@ TEST(Drive, DISABLED_StopEndsOnAnImposedAngle)
 }
 
 // Without a fault there is nothing to clear, and a machine that is being stopped must go on being stopped.
-TEST(Drive, DISABLED_ClearWithoutAFaultChangesNothing)
+TEST(Drive, ClearWithoutAFaultChangesNothing)
 {
     Closed x;
     x.command(true, 60);

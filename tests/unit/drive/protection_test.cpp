@@ -181,7 +181,7 @@ TEST(Protection, ClearsOnlyWhenDisabledAndTheBreakIsReleased)
 }
 
 // drive.h: "false: the cause is still there".
-TEST(Protection, DISABLED_ClearIsRefusedWhileTheCauseIsThere)
+TEST(Protection, ClearIsRefusedWhileTheCauseIsThere)
 {
     for (const drive_fault_t fault :
          {DRIVE_FAULT_OVER_VOLTAGE, DRIVE_FAULT_UNDER_VOLTAGE, DRIVE_FAULT_OVER_TEMPERATURE}) {

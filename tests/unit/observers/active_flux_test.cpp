@@ -471,6 +471,31 @@ TEST(ActiveFlux, TiedFluxKeepsToThePosition)
     EXPECT_NEAR(real(out.vector.q) * f.base.psi_Wb(), 1.0 / 300, kClosedForm / 300);
 }
 
+// A position 0.1 rad behind: tied, the flux is drawn to it within 1/300 s; leading, it stays with the rotor.
+TEST(ActiveFlux, OnlyTheTiedFluxBelievesThePosition)
+{
+    const Fixture f = ipm_linear();
+    for (const pm_q_t weight : {0, PM_ONE / 2, PM_ONE}) {
+        Rotation rotation(f.machine, f.base, 0.03, {0, 0});
+        obs_in_t in = rotation.seen(0, rotation.omega_rad_s);
+        active_flux_t state;
+        active_flux_reset(&state, &f.config, &in);
+        obs_out_t out = {};
+        out.vector.d = state.psi_ref;
+        active_flux_slow(&state, &f.config, &in, &out, weight);
+        for (int k = 0; k < 20 * kSlow; ++k) {
+            rotation.advance();
+            in = rotation.seen(rotation.theta_rad - 0.1, rotation.omega_rad_s);
+            active_flux_step(&state, &f.config, &in, &out);
+        }
+        if (weight == 0) {
+            EXPECT_LT(real(out.eps), 0.02); // what is left is omega / k_q of the turning
+        } else {
+            EXPECT_GT(real(out.eps), 0.09) << weight;
+        }
+    }
+}
+
 TEST(ActiveFlux, AmplitudeIsFollowedWithinItsBandOnly)
 {
     Fixture f = ipm_linear();
