@@ -12,7 +12,7 @@
  * While the flux is tied, its distance from the current model shows an error of the resistance, k_q psi_a,q =
  * (R - R^) i_q, and R follows it; it is kept when the observer leads. An R set 50 % too high would otherwise
  * make the observer unstable under load below a third of rated speed (docs/decisions/004-resistance.md).
- * L_q(i_q) = L_q + L_q2 i_q^2: at 4 A on IPM-1000 a constant L_q costs 4 degrees.
+ * L_q(i_q) = L_q + L_q2 i_q^2: a constant L_q costs IPM-1000 2.4 degrees at rated load.
  *
  * Called each period; result belongs to k. Range: |psi| < 4, |i| < 2. misfit: distance of the amplitude from
  * psi_ref, relative. Tests: tests/unit/observers/active_flux_test.cpp, tests/scenario. */

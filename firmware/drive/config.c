@@ -11,17 +11,18 @@ static void make_base(maker_t *m)
     b->psi = pm_num_div(b->v, b->omega);
     b->torque = mul3(pm_num_mul(pm_num_ratio(3, 2), pole_pairs(m)), b->psi, b->i);
     b->t_s = pm_num_div(pm_num(1), si(m, DRIVE_PARAM_f_pwm));
+    m->slow_divider = ((uint32_t)m->params->f_pwm + 500U) / 1000U; /* f_pwm >= 4000 */
+    m->t_slow = pm_num_mul(pm_num((int32_t)m->slow_divider), b->t_s);
     m->impedance = pm_num_div(b->v, b->i);
     m->inductance = pm_num_div(b->psi, b->i);
 }
 
 static void make_open_loop(maker_t *m, open_loop_config_t *c)
 {
-    const pm_num_t t_slow = pm_num_ratio(1, SLOW_HZ);
     const pm_num_t slope = pm_num_mul(si(m, DRIVE_PARAM_open_loop_acceleration), pole_pairs(m));
     c->i = per_unit(m, DRIVE_PARAM_i_open_loop, m->base.i);
     c->i_slope = c->i / 50 + 1;
-    c->slope = fixed(m, pm_num_div(pm_num_mul(slope, t_slow), m->base.omega), Q_BITS,
+    c->slope = fixed(m, pm_num_div(pm_num_mul(slope, m->t_slow), m->base.omega), Q_BITS,
                      DRIVE_PARAM_open_loop_acceleration);
     c->align_ms = (uint16_t)m->params->t_align;
     c->sweep = PM_TURN(0.5) / (uint32_t)m->params->t_align;
@@ -100,6 +101,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     make_base(&m);
     config->base = m.base;
     config->pole_pairs = pole_pairs(&m);
+    config->slow_divider = m.slow_divider;
     config->injection = params->start_method % 2 == 1 || (params->start_method == 0 && salient(&m));
     config->align_first = !config->injection || params->start_method == 3;
     make_modulator(&m, &config->modulator);

@@ -56,9 +56,10 @@ typedef struct {
     open_loop_config_t open_loop;
     protection_config_t protection;
     pm_num_t pole_pairs;
-    bool injection;   /* injection leads at low speed; else open-loop start */
-    bool align_first; /* the initial position comes from aligning, not from pulses */
-    int32_t k_theta;  /* pm_omega_to_angle() */
+    uint32_t slow_divider; /* periods per drive_slow(): the nearest to 1 ms */
+    bool injection;        /* injection leads at low speed; else open-loop start */
+    bool align_first;      /* the initial position comes from aligning, not from pulses */
+    int32_t k_theta;       /* pm_omega_to_angle() */
     pm_q_t i_max;
     pm_q_t i_d_light;
     pm_q_t omega_max;

@@ -42,14 +42,13 @@ void make_speed(maker_t *m, speed_control_config_t *c)
     const pm_num_t inertia = pm_num_div(si(m, DRIVE_PARAM_J), k_t); /* A per rad/s2 electrical */
     const pm_num_t unit = pm_num_div(m->base.omega, m->base.i);
     const pm_num_t kp = mul3(bandwidth, inertia, unit);
-    const pm_num_t t_slow = pm_num_ratio(1, SLOW_HZ);
-    const pm_num_t ki = pm_num_mul(mul3(kp, bandwidth, t_slow), pm_num_ratio(1, 4));
+    const pm_num_t ki = pm_num_mul(mul3(kp, bandwidth, m->t_slow), pm_num_ratio(1, 4));
     const pm_num_t slope = pm_num_mul(si(m, DRIVE_PARAM_acceleration), pole_pairs(m)); /* rad/s2 electrical */
     c->pi.kp = gain(m, kp, GAIN_BITS, DRIVE_PARAM_speed_bandwidth);
     c->pi.ki = gain(m, ki, GAIN_BITS, DRIVE_PARAM_speed_bandwidth);
     c->pi.kb = fixed(m, pm_num_div(ki, kp), UNIT_BITS, DRIVE_PARAM_speed_bandwidth);
     c->slope =
-        fixed(m, pm_num_div(pm_num_mul(slope, t_slow), m->base.omega), Q_BITS, DRIVE_PARAM_acceleration);
+        fixed(m, pm_num_div(pm_num_mul(slope, m->t_slow), m->base.omega), Q_BITS, DRIVE_PARAM_acceleration);
     c->i_per_slope =
         fixed(m, pm_num_div(pm_num_mul(slope, inertia), m->base.i), Q_BITS, DRIVE_PARAM_acceleration);
 }
@@ -58,7 +57,7 @@ void make_flux_weakening(maker_t *m, field_weakening_config_t *c)
 {
     /* loop of 20 Hz where the voltage is omega L_d i_d at base speed */
     const pm_num_t L_d = pm_num_div(si(m, DRIVE_PARAM_L_d), m->inductance);
-    const pm_num_t k = pm_num_div(pm_num_mul(PM_NUM_TWO_PI, pm_num_ratio(20, SLOW_HZ)), L_d);
+    const pm_num_t k = pm_num_div(mul3(PM_NUM_TWO_PI, pm_num(20), m->t_slow), L_d);
     c->k = fixed(m, least(k, pm_num_ratio(2, 5)), FRAC_BITS, DRIVE_PARAM_L_d);
     c->i_max = per_unit(m, DRIVE_PARAM_i_fw_max, m->base.i);
 }

@@ -13,12 +13,12 @@
 #define UNIT_BITS  31
 #define SMALL_BITS 20
 
-#define SLOW_HZ 1000
-
 typedef struct {
     const drive_params_t *params;
     drive_base_t base;
     pm_num_t impedance, inductance; /* bases */
+    uint32_t slow_divider;          /* periods per slow step: the nearest to 1 ms ... */
+    pm_num_t t_slow;                /* ... and what that is, s */
     drive_result_t result;
 } maker_t;
 

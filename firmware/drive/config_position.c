@@ -50,8 +50,7 @@ typedef struct {
     pm_num_t L_d, L_q, L_dq;
 } inductances_t;
 
-/* The loop gain follows the saturating saliency, but not further than this: beyond, it would amplify noise.
- */
+/* The loop gain follows the saturating saliency, but no further than this: it would only amplify noise. */
 #define GAIN_RISE pm_num_ratio(5, 2)
 
 /* d eps-free signal / d angle: V_h T_s [(L_q - L_d) + 2 L_dq^2 / L_q] / D, a current per radian. */

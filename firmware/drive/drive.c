@@ -6,7 +6,6 @@
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
 
-#define OFFSET_PERIODS_LOG2 10
 /* The modulator's smallest link voltage; below, the bridge is off anyway. */
 #define V_DC_LEAST PM_Q(0.0625)
 
@@ -67,16 +66,16 @@ static void measure(drive_t *drive, const drive_in_t *in)
 
 static void calibrate(calibration_t *self, const drive_in_t *in)
 {
-    if (self->count >= 1U << OFFSET_PERIODS_LOG2) {
+    if (self->count >= 1U << DRIVE_OFFSET_PERIODS_LOG2) {
         return;
     }
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
         self->sum[x] += in->i_leg[x];
     }
     self->count++;
-    if (self->count == 1U << OFFSET_PERIODS_LOG2) {
+    if (self->count == 1U << DRIVE_OFFSET_PERIODS_LOG2) {
         for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-            self->offset[x] = self->sum[x] >> OFFSET_PERIODS_LOG2;
+            self->offset[x] = self->sum[x] >> DRIVE_OFFSET_PERIODS_LOG2;
         }
     }
 }

@@ -1,18 +1,17 @@
 /* The drive: from converter codes to timer counts, once per PWM period.
  *
- * drive_step() runs in the ADC interrupt, drive_slow() at 1 kHz, everything else in thread context. DESIGN.md
- * section 3. No function blocks or allocates. The bridge is off (out->driven all false) unless the state says
- * on.
+ * drive_step() runs in the ADC interrupt. drive_slow() runs at 1 kHz and must not be interrupted by it: call
+ * it from the same interrupt every config.slow_divider periods, or with that interrupt masked. The rest is
+ * for thread context. No function blocks or allocates. The bridge is off unless the state says on.
  *
- *   drive_init(d, params)        configuration from SI parameters; refuses bad ones and names the first
- *   drive_step(d, in, out)       one control period
- *   drive_slow(d, in)            state machine, speed control, derating
- *   drive_command(d, cmd)        what the user wants; may be called at any time from thread context
- *   drive_clear_fault(d)         only when off; a fault never clears or restarts by itself
+ *   drive_init(d, params)   configuration from SI parameters; refuses bad ones and names the first
+ *   drive_step(d, in, out)  one control period; cost: tests/target/drive
+ *   drive_slow(d, in)       state machine, speed control, derating
+ *   drive_command(d, cmd)   what the user wants; at any time from thread context, with the interrupt masked
+ *   drive_clear_fault(d)    only when disabled; a fault never clears or restarts by itself
  *
  * Timing: in is sampled at t_k, the centre of the all-low zero vector; out takes effect at t_k+1 and holds
- * until t_k+2. out->sample_delay is reserved for methods that shift the instant. Tests: tests/unit/drive,
- * tests/scenario. Cost: docs/decisions and tests/target. */
+ * until t_k+2. Tests: tests/unit/drive, tests/scenario. */
 #ifndef DRIVE_DRIVE_H
 #define DRIVE_DRIVE_H
 
@@ -33,8 +32,8 @@ typedef struct {
 } drive_in_t;
 
 typedef struct {
-    uint16_t compare[DRIVE_LEGS]
-                    [2];     /* timer counts of the rising- and falling-edge half: on-time / half period */
+    /* timer counts of the rising- and falling-edge half of the carrier: on-time of that half */
+    uint16_t compare[DRIVE_LEGS][2];
     bool driven[DRIVE_LEGS]; /* false: both switches off */
     bool trip;               /* a fault: the port opens the bridge now, not at the update event */
 } drive_out_t;

@@ -43,8 +43,8 @@ static void begin_finding(drive_t *drive)
 static void finish_calibration(drive_t *drive)
 {
     const calibration_t *c = &drive->calibration;
-    if (c->offset[0] == 0 && c->offset[1] == 0 && c->offset[2] == 0) {
-        return; /* still summing: no converter idles at code zero */
+    if (c->count < 1U << DRIVE_OFFSET_PERIODS_LOG2) {
+        return;
     }
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
         if (pm_abs(c->offset[x] - 32768) > drive->config.protection.offset_max) {

@@ -13,7 +13,9 @@ typedef enum {
     STAGE_VECTOR,    /* field-oriented control at the estimated angle */
 } drive_stage_t;
 
-/* Offsets of the current channels. */
+#define DRIVE_OFFSET_PERIODS_LOG2 10
+
+/* Offsets of the current channels: means of 2^10 periods. */
 typedef struct {
     int32_t offset[DRIVE_LEGS]; /* code at zero current */
     int32_t sum[DRIVE_LEGS];

@@ -1,4 +1,4 @@
-/* Fault codes and the record of the first one. A fault is latched; the bridge is off before it is recorded.
+/* Fault codes and the record of the first fault. A fault is latched; the step that finds it drives nothing.
  */
 #ifndef DRIVE_FAULT_H
 #define DRIVE_FAULT_H

@@ -3,12 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-static uint32_t slow_divider(int32_t f_pwm_Hz)
-{
-    const int32_t divider = (f_pwm_Hz + 500) / 1000;
-    return divider > 0 ? (uint32_t)divider : 1U;
-}
-
 /* The comparators of a board look at the currents themselves, not at the converter's codes. */
 static bool comparators_trip(const sim_loop_t *loop)
 {
@@ -30,8 +24,9 @@ drive_result_t sim_loop_init(sim_loop_t *loop, plant_t *plant, const drive_param
     memset(loop, 0, sizeof *loop);
     loop->plant = plant;
     loop->temperature_dC = 250;
-    loop->slow_divider = slow_divider(params->f_pwm);
-    return drive_init(&loop->drive, params);
+    const drive_result_t result = drive_init(&loop->drive, params);
+    loop->slow_divider = result.ok ? loop->drive.config.slow_divider : 1U;
+    return result;
 }
 
 void sim_loop_step(sim_loop_t *loop)
