@@ -68,7 +68,9 @@ def main():
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--times", action="store_true", help="print how long each file took")
     parser.add_argument("--all", action="store_true", help="also the files that were clean and have not changed")
-    parser.add_argument("files", nargs="*", type=Path, help="only these (default: all)")
+    parser.add_argument("--tests", action="store_true",
+                        help="also tests/, which take most of the time and are read by two compilers with sanitizers")
+    parser.add_argument("files", nargs="*", type=Path, help="only these (default: all but tests)")
     options = parser.parse_args()
 
     commands = read_commands(options.build)
@@ -78,7 +80,8 @@ def main():
     memory = options.build / "tidy_clean.json"
     clean = set(json.loads(memory.read_text())) if memory.exists() else set()
 
-    files = [file.resolve() for file in options.files] or sorted(commands)
+    sources = sorted(file for file in commands if options.tests or not file.is_relative_to(ROOT / "tests"))
+    files = [file.resolve() for file in options.files] or sources
     prints = {file: fingerprint(version + configuration, command, [*dependencies[obj], file])
               for file, (obj, command) in commands.items() if obj in dependencies}
     todo = [file for file in files if options.all or prints.get(file) not in clean]
