@@ -48,7 +48,7 @@ static pm_procedure_t conclude(initial_pulses_t *self, const initial_pulses_conf
     if (pm_hypot(self->y.alpha, self->y.beta) < config->y_min) {
         return PM_FAILED_SALIENCY;
     }
-    self->theta = pm_atan2(self->y.beta, self->y.alpha) >> 1;
+    self->theta = pm_atan2(self->y.beta, self->y.alpha) / 2U;
     const pm_q_t along = pm_park(self->w, pm_dir(self->theta)).d;
     if (pm_abs(along) < config->w_min) {
         return PM_FAILED_POLARITY;

@@ -16,7 +16,7 @@ void pulsating_square_demodulate(pulsating_square_t *self, const pulsating_squar
 {
     const pm_ab_t change = {.alpha = in->i.alpha - self->i.alpha, .beta = in->i.beta - self->i.beta};
     const pm_dq_t delta = pm_park(change, in->dir);
-    pm_dq_t h = {.d = (delta.d - self->delta.d) >> 1, .q = (delta.q - self->delta.q) >> 1};
+    pm_dq_t h = {.d = pm_half(delta.d - self->delta.d), .q = pm_half(delta.q - self->delta.q)};
     self->i = in->i;
     self->delta = delta;
     if (self->warm > 0) {

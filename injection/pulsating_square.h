@@ -44,7 +44,7 @@ pm_dq_t pulsating_square_output(pulsating_square_t *self, const pulsating_square
 /* Current at k without the carrier; call before pulsating_square_demodulate(). */
 static inline pm_ab_t pulsating_square_fundamental(const pulsating_square_t *self, pm_ab_t i)
 {
-    return (pm_ab_t){.alpha = (i.alpha + self->i.alpha) >> 1, .beta = (i.beta + self->i.beta) >> 1};
+    return (pm_ab_t){.alpha = pm_mean(i.alpha, self->i.alpha), .beta = pm_mean(i.beta, self->i.beta)};
 }
 
 #endif

@@ -8,7 +8,7 @@
 static void set_reference(active_flux_t *self, pm_q_t psi)
 {
     self->psi_ref = psi;
-    self->inverse = pm_div(PM_ONE >> 2, psi); /* Q28 of a quarter is Q26 */
+    self->inverse = pm_div(PM_ONE / 4, psi); /* Q28 of a quarter is Q26 */
 }
 
 static inline pm_q_t inductance_q(const active_flux_config_t *config, pm_q_t i_q)
@@ -35,8 +35,8 @@ void active_flux_reset(active_flux_t *self, const active_flux_config_t *config, 
 void active_flux_step(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in,
                       obs_out_t *out)
 {
-    const pm_ab_t i_mean = {.alpha = (in->i.alpha + self->i.alpha) >> 1,
-                            .beta = (in->i.beta + self->i.beta) >> 1};
+    const pm_ab_t i_mean = {.alpha = pm_mean(in->i.alpha, self->i.alpha),
+                            .beta = pm_mean(in->i.beta, self->i.beta)};
     /* saturating: with the position lost, a voltage at standstill drives the flux up until the fault */
     self->psi.alpha =
         pm_add_sat(self->psi.alpha, pm_frac(in->v.alpha - pm_mul(self->R, i_mean.alpha), config->t_s));

@@ -2,8 +2,6 @@
 
 #include "firmware/math/root.h"
 
-#define ZONE_BITS 15
-
 /* Scales v to the hexagon: the span of its phases becomes the link voltage. */
 static pm_abc_t shorten(pm_abc_t u, pm_q_t span, pm_q_t v_dc, modulator_out_t *out)
 {
@@ -11,11 +9,6 @@ static pm_abc_t shorten(pm_abc_t u, pm_q_t span, pm_q_t v_dc, modulator_out_t *o
     out->v = (pm_ab_t){.alpha = pm_unit(out->v.alpha, ratio), .beta = pm_unit(out->v.beta, ratio)};
     out->limited = true;
     return (pm_abc_t){.a = pm_unit(u.a, ratio), .b = pm_unit(u.b, ratio), .c = pm_unit(u.c, ratio)};
-}
-
-static inline int32_t compensation(pm_q_t i, int32_t zone_gain, int32_t lost)
-{
-    return (pm_sat(pm_mulh(i, zone_gain), ZONE_BITS) * lost) >> ZONE_BITS;
 }
 
 void modulator_step(const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc, pm_ab_t i, modulator_out_t *out)
@@ -33,8 +26,8 @@ void modulator_step(const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc, pm
     }
 
     const int32_t per_volt = pm_counts_per_unit(config->counts, v_dc);
-    const int32_t centre = config->counts >> 1;
-    const pm_q_t zero = (top + bottom) >> 1;
+    const int32_t centre = pm_half(config->counts);
+    const pm_q_t zero = pm_mean(top, bottom);
     int32_t a = centre + pm_mulh(u.a - zero, per_volt);
     int32_t b = centre + pm_mulh(u.b - zero, per_volt);
     int32_t c = centre + pm_mulh(u.c - zero, per_volt);
@@ -42,9 +35,9 @@ void modulator_step(const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc, pm
     if (config->compensate) {
         const pm_abc_t leg = pm_clarke_inverse(i);
         const int32_t lost = config->dead_counts + pm_mulh(config->drop, per_volt);
-        a += compensation(leg.a, config->zone_gain, lost);
-        b += compensation(leg.b, config->zone_gain, lost);
-        c += compensation(leg.c, config->zone_gain, lost);
+        a += pm_zone(leg.a, config->zone_gain, lost);
+        b += pm_zone(leg.b, config->zone_gain, lost);
+        c += pm_zone(leg.c, config->zone_gain, lost);
     }
     out->on[0] = a;
     out->on[1] = b;

@@ -66,16 +66,16 @@ static void measure(drive_t *drive, const drive_in_t *in)
 
 static void calibrate(calibration_t *self, const drive_in_t *in)
 {
-    if (self->count >= 1U << DRIVE_OFFSET_PERIODS_LOG2) {
+    if (self->count >= DRIVE_OFFSET_PERIODS) {
         return;
     }
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
         self->sum[x] += in->i_leg[x];
     }
     self->count++;
-    if (self->count == 1U << DRIVE_OFFSET_PERIODS_LOG2) {
+    if (self->count == DRIVE_OFFSET_PERIODS) {
         for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-            self->offset[x] = self->sum[x] >> DRIVE_OFFSET_PERIODS_LOG2;
+            self->offset[x] = self->sum[x] / (int32_t)DRIVE_OFFSET_PERIODS;
         }
     }
 }
@@ -119,7 +119,7 @@ static void control(drive_t *drive, pm_angle_t theta, pm_q_t omega, pm_dq_t i, d
     const bool inject = drive->position.inject && drive->stage == STAGE_VECTOR;
     pm_q_t v_max = pm_unit(drive->status.v_dc, c->v_linear);
     if (inject) { /* a sagging link must not leave nothing to control with */
-        v_max = pm_max(v_max - c->position.square.v_h, v_max >> 2);
+        v_max = pm_max(v_max - c->position.square.v_h, pm_half(pm_half(v_max)));
     }
     current_control_out_t u;
     current_control_step(&drive->current, &c->current, i, drive->i_ref, omega, v_max, &u);
@@ -127,7 +127,7 @@ static void control(drive_t *drive, pm_angle_t theta, pm_q_t omega, pm_dq_t i, d
     drive->status.i = i;
 
     const int32_t turn = pm_omega_to_angle(omega, c->k_theta);
-    const pm_dir_t ahead = pm_dir(theta + (pm_angle_t)turn + (pm_angle_t)(turn >> 1));
+    const pm_dir_t ahead = pm_dir(theta + (pm_angle_t)turn + (pm_angle_t)pm_half(turn));
     if (inject) {
         u.v.d += pulsating_square_output(&drive->position.square, &c->position.square).d;
     }

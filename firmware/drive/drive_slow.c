@@ -43,7 +43,7 @@ static void begin_finding(drive_t *drive)
 static void finish_calibration(drive_t *drive)
 {
     const calibration_t *c = &drive->calibration;
-    if (c->count < 1U << DRIVE_OFFSET_PERIODS_LOG2) {
+    if (c->count < DRIVE_OFFSET_PERIODS) {
         return;
     }
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {

@@ -13,9 +13,9 @@ typedef enum {
     STAGE_VECTOR,    /* field-oriented control at the estimated angle */
 } drive_stage_t;
 
-#define DRIVE_OFFSET_PERIODS_LOG2 10
+#define DRIVE_OFFSET_PERIODS 1024U
 
-/* Offsets of the current channels: means of 2^10 periods. */
+/* Offsets of the current channels: means of so many periods. */
 typedef struct {
     int32_t offset[DRIVE_LEGS]; /* code at zero current */
     int32_t sum[DRIVE_LEGS];

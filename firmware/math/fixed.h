@@ -179,6 +179,24 @@ static inline pm_q_t pm_narrow_sat(pm_wide_t x)
     return pm_narrow(pm_sat(x, 31 - (PM_Q_BITS - PM_WIDE_BITS)));
 }
 
+static inline int32_t pm_half(int32_t x) /* rounds down */
+{
+    return x >> 1;
+}
+
+/* (a + b) / 2, rounded down; |a + b| within 32 bits. */
+static inline int32_t pm_mean(int32_t a, int32_t b)
+{
+    return pm_half(a + b);
+}
+
+/* -height ... height, linear while |x| < edge: gain = 2^19 / edge (pm_mulh(edge, gain) = 2^15); |height| <
+ * 2^16. */
+static inline int32_t pm_zone(pm_q_t x, int32_t gain, int32_t height)
+{
+    return (pm_sat(pm_mulh(x, gain), 15) * height) >> 15;
+}
+
 /* A small signal: Q32, +-0.5, saturating; for carrier currents, whose gains exceed pm_gain(). */
 static inline int32_t pm_small(pm_q_t x)
 {

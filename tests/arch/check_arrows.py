@@ -3,7 +3,8 @@
   app -> drive -> {control, observers, injection, bldc} -> math      can -> params      app -> can, hal
 
 An arrow may be followed more than one step. Also refused: floating point in the firmware, system headers the
-target's control code has no business with, and including a .c file. Usage: check_arrows.py [ROOT]
+target's control code has no business with, shifts outside firmware/math, and including a .c file.
+Usage: check_arrows.py [ROOT]
 """
 import re
 import sys
@@ -49,11 +50,14 @@ FREE = {"tools", "tests"}  # may see everything: they put the parts together
 ONE_STEP = {"hal": {"drive"}, "hal_sim": {"drive"}}
 
 FIRMWARE = ("math", "control", "drive", "params", "can", "app", "observers", "injection", "bldc")
+SHIFTLESS = ("control", "drive", "observers", "injection", "bldc")  # the arithmetic of formats is in math
 # Headers that bring types and constants, and string.h, which a compiler may call anyway.
 FIRMWARE_SYSTEM = {"stdint.h", "stdbool.h", "stddef.h", "limits.h", "string.h", "arm_acle.h"}
 
 INCLUDE = re.compile(r'\s*#\s*include\s*([<"])([^>"]+)[>"]')
 FLOATING = re.compile(r"\b(float|double|_Complex)\b")
+SHIFT = re.compile(r"<<|>>")
+FLAG = re.compile(r"\s*[A-Z0-9_]+ = 1U? << \d+,?\s*$")  # one bit of an enumeration
 NOT_CODE = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'', re.DOTALL)
 
 
@@ -124,6 +128,8 @@ def check_file(root, file):
         floating = FLOATING.search(bare) if module in FIRMWARE else None
         if floating:
             found.append((number, f"firmware has no floating point: {floating.group()}"))
+        if module in SHIFTLESS and SHIFT.search(bare) and not FLAG.match(bare):
+            found.append((number, "shifts belong into firmware/math"))
     return found
 
 

@@ -74,6 +74,11 @@ class Arrows(unittest.TestCase):
         self.refused("observers/x.c", "// float\nstatic float f;\n", 2, "float")
         self.refused("injection/x.c", 'const char *s = "double"; /* double\n */ double d;\n', 2, "double")
 
+    def test_shifts(self):
+        self.refused("observers/x.c", "/* << */\nint f(int x) { return x >> 1; }\n", 2, "shifts")
+        self.assertEqual(messages_for({"firmware/drive/x.h": "enum {\n    LIMIT_A = 1 << 0,\n    LIMIT_B = 1 << 1,\n};\n"}), [])
+        self.assertEqual(messages_for({"firmware/math/x.c": "int f(int x) { return x >> 1; }\n"}), [])
+
     def test_unknown_folder(self):
         self.refused("firmware/other/x.c", "\n", 1, "no module")
 
