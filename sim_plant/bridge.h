@@ -1,71 +1,74 @@
-/* Three-leg bridge: which rail each motor terminal is tied to, and through what (METHODS.md 0.2 E6, E10).
+/* The legs: which rail each motor terminal is tied to, and through what (METHODS.md 0.2 E6, E7, E10).
  *
  * A leg is tied to a rail by a closed switch (either direction of current, drop v_switch against it), or by
- * a diode (one direction, drop v_diode), or it floats: no current, and its terminal takes the voltage that
- * keeps it so, which must lie between the rails widened by a diode drop. All paths have r_on in series.
+ * a diode (one direction, drop v_diode); all paths have r_on in series. With neither it floats: without
+ * output capacitance it has no current, and its terminal takes the voltage that keeps it so (floating.h);
+ * with capacitance its current charges that, and the terminal swings until a diode catches it. A leg may also
+ * be a given voltage source. A terminal that has come off its leg has no diodes either.
  *
  * A switch drop reverses over +-zone_A with continuous slope instead of jumping, so that a current
  * creeping through zero under a closed switch makes no train of events. zone_A is a 2000th of the
- * converter's full scale, the step of 12 bits.
- *
- * The star point is not connected, so only differences of leg voltages act, and a motor with two floating
- * legs carries no current at all. Tests: bridge_test.cpp. */
+ * converter's full scale, the step of 12 bits. Tests: bridge_test.cpp. */
 #ifndef PLANT_BRIDGE_H
 #define PLANT_BRIDGE_H
 
-#include "sim_plant/frame.h"
 #include "sim_plant/gates.h"
-#include "sim_plant/machine.h"
+#include "sim_plant/winding.h"
 
-typedef enum { LEG_FLOATING, LEG_LOW, LEG_HIGH, LEG_DIODE_LOW, LEG_DIODE_HIGH } leg_t;
+typedef enum {
+    LEG_FLOATING,
+    LEG_SWINGING, /* floating, with output capacitance */
+    LEG_LOW,
+    LEG_HIGH,
+    LEG_BOTH,
+    LEG_DIODE_LOW,
+    LEG_DIODE_HIGH,
+    LEG_SOURCE
+} leg_t;
 
 typedef struct {
     double v_switch_V;
     double v_diode_V;
     double r_on_ohm;
+    double c_leg_F, inv_c_leg_1_F;
     double zone_A;
     double switched_1_A; /* 1 / zone_A */
+    int legs;
     leg_t leg[PLANT_LEGS];
+    bool off_wire[PLANT_LEGS];
+    double v_source_V[PLANT_LEGS];
     /* what follows from leg[] */
-    int floating;
-    int diodes;
-    ab_t rail;                       /* (2/3) sum of the axes tied to the upper rail */
-    ab_t diode_drop_V;               /* sum of the constant drops */
+    int floating, swinging, diodes;
+    double rail[2];                  /* of a three-phase star: share of the upper rail, */
+    double source_V[2];              /* of given sources */
+    double diode_V[2];               /* and of diode drops, with their sign */
+    double r_series_ohm;             /* of every leg: r_on, or none with sources */
+    double upper[PLANT_LEGS];        /* 1: tied to the upper rail */
     double inv_zone_1_A[PLANT_LEGS]; /* 0: no switch closed */
+    double g_through_S;              /* of legs with both switches closed */
 } bridge_t;
 
-/* Electrical state of the motor as the bridge sees it. */
-typedef struct {
-    ab_t psi_Wb, i_A;
-    rotor_t rotor;
-    double omega_e_rad_s;
-    double v_dc_V;
-} motor_port_t;
+void bridge_init(bridge_t *bridge, const plant_config_t *config, int legs);
 
-void bridge_init(bridge_t *bridge, const plant_config_t *config);
+/* Brings up to date what follows from leg[]. */
+void bridge_summarise(bridge_t *bridge, const winding_t *winding);
 
-/* After a change of gates: closed switches take their legs; a leg whose switches have opened passes to the
- * diode that its current needs, or floats. */
-void bridge_switch(bridge_t *bridge, const gates_t *gates, ab_t i_A);
+/* Leg k after a change of its gate; i_A is its current. */
+leg_t bridge_commutated(const bridge_t *bridge, int k, gate_t gate, double i_A);
 
-/* Legs without gate re-assigned after a jump of current (rotor slip, parameter change). */
-void bridge_reassign(bridge_t *bridge, ab_t i_A);
+/* A leg without gate anew after a jump of its current. */
+leg_t bridge_released(const bridge_t *bridge, double i_A);
 
-/* Diodes whose current has passed zero cease. */
-void bridge_stop_diodes(bridge_t *bridge, ab_t i_A);
+/* Reverse current of a diode leg beyond what counts as none, in units of full scale; above zero: it stops. */
+double bridge_reverse(const bridge_t *bridge, int k, double i_A);
 
-/* Floating legs beyond a rail start to conduct; expects the current of floating legs to be zero. */
-void bridge_start_diodes(bridge_t *bridge, const machine_t *machine, const motor_port_t *port);
+/* How far a terminal is beyond the nearer diode's threshold, V. */
+double bridge_beyond_V(const bridge_t *bridge, double v_dc_V, double v_leg_V);
 
-/* Above zero once one of the two would change something. */
-double bridge_excess(const bridge_t *bridge, const machine_t *machine, const motor_port_t *port);
-
-/* Voltage of floating leg k against the negative rail. Nothing fixes the potential of three floating legs;
- * their highest and lowest are then taken to lie evenly between the rails. */
-double bridge_floating_V(const bridge_t *bridge, const machine_t *machine, const motor_port_t *port, int k);
-
-/* Voltage of any leg against the negative rail. */
-double bridge_leg_V(const bridge_t *bridge, const machine_t *machine, const motor_port_t *port, int k);
+static inline bool bridge_is_diode(const bridge_t *bridge, int k)
+{
+    return bridge->leg[k] == LEG_DIODE_LOW || bridge->leg[k] == LEG_DIODE_HIGH;
+}
 
 /* Drop of a closed switch at a current x in units of the zone, in units of v_switch. */
 static inline double bridge_switch_share(double x)
@@ -75,21 +78,17 @@ static inline double bridge_switch_share(double x)
     return x * (1.5 - 0.5 * x * x);
 }
 
-/* All drops but r_on, as a voltage of the motor. */
-static inline ab_t bridge_drop_V(const bridge_t *b, ab_t i_A)
+/* Voltage of a leg that is tied to something, against the negative rail. */
+static inline double bridge_tied_V(const bridge_t *b, int k, double i_A, double v_dc_V)
 {
-    if (b->v_switch_V == 0.0) {
-        return b->diode_drop_V;
+    if (b->leg[k] == LEG_SOURCE) {
+        return b->v_source_V[k];
     }
-    abc_t i = frame_to_abc(i_A);
-    abc_t share;
-    for (int k = 0; k < PLANT_LEGS; k++) {
-        share.x[k] = bridge_switch_share(i.x[k] * b->inv_zone_1_A[k]);
+    double drop_V = b->r_on_ohm * i_A + b->v_switch_V * bridge_switch_share(i_A * b->inv_zone_1_A[k]);
+    if (bridge_is_diode(b, k)) {
+        drop_V += b->leg[k] == LEG_DIODE_LOW ? b->v_diode_V : -b->v_diode_V;
     }
-    ab_t v = frame_from_abc(share);
-    v.alpha = b->diode_drop_V.alpha + b->v_switch_V * v.alpha;
-    v.beta = b->diode_drop_V.beta + b->v_switch_V * v.beta;
-    return v;
+    return b->upper[k] * v_dc_V - drop_V;
 }
 
 #endif

@@ -1,19 +1,20 @@
 /* Machine, bridge, link and rotor as one system of differential equations between two gate changes.
  *
- * State: stator flux in the stationary frame (the terminal voltage integrates straight into it), rotor
- * angle, speed, link voltage; currents and torque follow from it algebraically. Six integrals ride along
- * for the mean voltage and the energy balance.
+ * State: the windings' (machine.h; for a plain machine the stator flux in the stationary frame, into which
+ * the terminal voltage integrates straight), rotor angle and speed, link voltage, voltages of swinging
+ * terminals, second mass. Currents and torque follow from it algebraically. Integrals for the mean voltage
+ * and the energy balance ride along.
  *
- * circuit_advance() uses the Bogacki-Shampine 3(2) pair with error control; a step is as long as the
- * segment if the error allows it and the rotor turns by less than FRAME_TURN_MAX_RAD. Inside a segment it
- * finds the instants at which a diode stops or starts, or friction sticks or breaks away, to the margins
- * stated in bridge.c, and goes on from there; it asserts that this does not turn into chatter.
+ * circuit_advance() uses the Bogacki-Shampine 3(2) pair with error control, or Heun's method where that is
+ * exact enough; a step is as long as the segment if the error allows it and the rotor turns by less than
+ * FRAME_TURN_MAX_RAD. Inside a segment it finds the instants at which a diode stops or starts, friction
+ * sticks or breaks away, or the chopper acts, to the margins stated in bridge.c, and goes on from there; it
+ * asserts that this does not turn into chatter.
  *
- * The flux of a motor with floating legs is projected onto zero leg current after every step, so that the
- * error of integration does not leak into a current that cannot flow.
+ * The windings of floating legs are projected onto zero leg current after every step, so that the error of
+ * integration does not leak into a current that cannot flow.
  *
- * Cost: three evaluations (about 50 multiplications each) a step. Tests: circuit_test.cpp, advance_test.cpp.
- */
+ * Tests: circuit_test.cpp, advance_test.cpp. */
 #ifndef PLANT_CIRCUIT_H
 #define PLANT_CIRCUIT_H
 
@@ -21,31 +22,37 @@
 #include "sim_plant/dclink.h"
 #include "sim_plant/machine.h"
 #include "sim_plant/mechanics.h"
+#include "sim_plant/probe.h"
 
-/* Elements of the state vector, and the integrals since the start that do not act back. */
+/* Elements of the state vector. The INT_ do not act back: integrals since the start. What a plain machine has
+ * lies in one piece; with swinging terminals it has three more before; the others have all. */
 enum {
-    PSI_ALPHA, /* Wb */
-    PSI_BETA,
-    THETA_E, /* rad, unwrapped */
+    V_LEG_LAST,           /* swinging terminals, V, the first leg last */
+    THETA_E = PLANT_LEGS, /* rad, unwrapped */
     OMEGA_MECH,
     V_DC,
-    STATES,
-    INT_I_ALPHA = STATES, /* A s */
-    INT_I_BETA,
-    INT_I2,   /* |i_alphabeta|^2, A^2 s */
-    INT_DROP, /* loss in the constant drops, J */
-    INT_IN,   /* from the link into the legs, J */
-    INT_MECH, /* torque times speed, J */
+    INT_V_ALPHA, /* terminal voltage of the first set, V s */
+    INT_V_BETA,
+    INT_IN,     /* from link or sources into the legs, J */
+    INT_COPPER, /* loss in the windings and eddy circuits, J */
+    INT_DEVICE, /* in switches and diodes, J */
+    INT_MECH,   /* torque times speed, J */
+    U,          /* active coordinates of the windings, */
+    U_ALPHA = U,
+    U_BETA,
+    EDDY = U + ACTIVE, /* and their eddy circuits */
+    OMEGA_LOAD = EDDY + 2 * PLANT_SETS,
+    TWIST, /* rad */
     ELEMENTS
 };
+#define V_LEG(k) (PLANT_LEGS - 1 - (k))
 
 /* A point of the trajectory with what follows from it. */
 typedef struct {
     double x[ELEMENTS];
     rotor_t rotor;
-    ab_t i_A;
-    dq_t psi_dq_Wb;
-    dq_t i_dq_A;
+    double i_A[ACTIVE];
+    double psi_theta_Wb[2]; /* of the magnet's harmonics in a plain machine */
     double torque_Nm;
 } point_t;
 
@@ -54,25 +61,69 @@ typedef struct {
     bridge_t bridge;
     dclink_t link;
     mechanics_t mech;
+    probe_t probe;
     point_t now;
-    double e_copper_J, e_on_J; /* ohmic, up to the last change of resistance */
+    double t_s;
+    double period_start_s;
+    double low_since_s[PLANT_LEGS];  /* when switch or diode of the negative rail began to conduct */
+    double jump_in_J, jump_device_J; /* of charge that moves in no time */
     double inv_tolerance;
-    double inv_psi_scale_1_Wb;
+    double inv_u_scale;
+    double inv_i_scale_1_A;
     double inv_v_scale_1_V;
-    double step_s; /* what the error control would allow next */
+    double step_s;                     /* what the error control would allow next */
+    double calm, calm_s, calm_swing_s; /* what Heun's method may take, without and with swinging terminals */
 } circuit_t;
 
 void circuit_init(circuit_t *circuit, const plant_config_t *config, double theta_e_rad);
 
-/* Currents and torque anew after a jump of angle or parameters at unchanged flux. */
-void circuit_refresh(circuit_t *circuit);
+/* A jump of the rotor, or of the machine's parameters; the windings' state stays, so currents jump but for
+ * those of floating legs. */
+void circuit_turn(circuit_t *circuit, double angle_e_rad);
+void circuit_set_machine(circuit_t *circuit, const plant_config_t *config, double winding_degC,
+                         double magnet_degC);
 
-/* Exact cos and sin of the angle: sheds the rounding of many small turns. */
+/* Once a period: exact cos and sin of the angle sheds the rounding of many small turns, and the speed says
+ * how long brief steps may be. */
 void circuit_align(circuit_t *circuit);
 
-void circuit_switch(circuit_t *circuit, const gates_t *gates);
+/* Brings conduction, friction and chopper into the state that belongs to the present point: after any change
+ * of load, speed or source. */
+void circuit_settle(circuit_t *circuit);
+
+/* The gates of the legs in the mask have changed. */
+void circuit_switch(circuit_t *circuit, const gates_t *gates, unsigned legs);
+/* Whether that change, within_s ahead, would not show: legs pass between a diode and the switch across it,
+ * with the same drop, and their currents cannot come near zero until then. */
+bool circuit_ignores(const circuit_t *circuit, const gates_t *gates, unsigned legs, double within_s);
+void circuit_wire(circuit_t *circuit, int leg, bool off);
+void circuit_short(circuit_t *circuit, int leg_a, int leg_b, double R_ohm);
+void circuit_sources(circuit_t *circuit, const double v_leg_V[]);
 void circuit_advance(circuit_t *circuit, double duration_s);
 
-motor_port_t circuit_port(const circuit_t *circuit, const point_t *point);
+static inline double circuit_leg_A(const circuit_t *c, const point_t *p, int k)
+{
+    const winding_t *w = &c->machine.winding;
+    double i_A = 0.0;
+    for (int a = 0; a < w->active; a++) {
+        i_A += w->axis[k][a] * p->i_A[a];
+    }
+    return i_A;
+}
+
+typedef struct {
+    double v_leg_V[PLANT_LEGS];
+    double v_neutral_V[PLANT_SETS];
+    double v_zero_V[PLANT_SETS];
+    double i_dc_A;
+} circuit_nodes_t;
+
+/* Voltages of all nodes, by the node equations where a terminal is tied to nothing (E11). */
+void circuit_nodes(const circuit_t *circuit, const point_t *point, circuit_nodes_t *nodes);
+
+/* Magnetic energy, and that of the output capacitances. */
+double circuit_field_J(const circuit_t *circuit);
+
+machine_state_t circuit_machine_state(const point_t *point);
 
 #endif

@@ -1,12 +1,14 @@
 #include "sim_plant/gates.h"
 
-void gates_init(gates_t *gates, const plant_inverter_t *inverter)
+void gates_init(gates_t *gates, const plant_inverter_t *inverter, int legs)
 {
     *gates = (gates_t){
         .period_s = 1.0 / inverter->f_pwm_Hz,
-        .dead_time_s = inverter->dead_time_s,
+        .closing_s = inverter->dead_time_s + inverter->turn_on_s,
+        .turn_off_s = inverter->turn_off_s,
         .coincident_s = 1e-9 / inverter->f_pwm_Hz,
         .timer_counts = inverter->timer_counts,
+        .legs = legs,
     };
 }
 
@@ -18,64 +20,112 @@ static double duty(const gates_t *gates, uint32_t compare)
 void gates_load(gates_t *gates, const plant_pwm_t *pwm)
 {
     double half_s = 0.5 * gates->period_s;
-    for (int k = 0; k < PLANT_LEGS; k++) {
+    gates->edge_s -= gates->period_s;
+    for (int k = 0; k < gates->legs; k++) {
         gates->leg[k].driven = pwm->driven[k];
         gates->leg[k].rise_s = (1.0 - duty(gates, pwm->compare[k][0])) * half_s;
         gates->leg[k].fall_s = (1.0 + duty(gates, pwm->compare[k][1])) * half_s;
-        gates->leg[k].ready_s -= gates->period_s;
+        gates->leg[k].on_s -= gates->period_s;
+        gates->leg[k].off_s -= gates->period_s;
     }
 }
 
 void gates_off(gates_t *gates)
 {
-    for (int k = 0; k < PLANT_LEGS; k++) {
+    for (int k = 0; k < gates->legs; k++) {
         gates->leg[k].driven = false;
         gates->leg[k].command = GATE_OFF;
         gates->leg[k].gate = GATE_OFF;
+        gates->leg[k].opening = false;
     }
 }
 
-bool gates_update(gates_t *gates, double t_s)
+static gate_t command_at(const gates_t *gates, int k, double late_s)
 {
-    bool changed = false;
+    if (!gates->leg[k].driven) {
+        return GATE_OFF;
+    }
+    return late_s >= gates->leg[k].rise_s && late_s < gates->leg[k].fall_s ? GATE_HIGH : GATE_LOW;
+}
+
+static bool update_leg(gates_t *gates, int k, double t_s)
+{
     double late_s = t_s + gates->coincident_s;
-    for (int k = 0; k < PLANT_LEGS; k++) {
-        gate_t command = GATE_OFF;
-        if (gates->leg[k].driven) {
-            command = late_s >= gates->leg[k].rise_s && late_s < gates->leg[k].fall_s ? GATE_HIGH : GATE_LOW;
-        }
-        if (command != gates->leg[k].command) {
-            changed |= gates->leg[k].gate != GATE_OFF;
-            gates->leg[k].command = command;
-            gates->leg[k].gate = GATE_OFF;
-            gates->leg[k].ready_s = t_s + gates->dead_time_s;
-        }
-        if (gates->leg[k].gate != command && late_s >= gates->leg[k].ready_s) {
-            gates->leg[k].gate = command;
-            changed = true;
+    gate_t before = gates->leg[k].gate;
+    gate_t command = command_at(gates, k, late_s);
+    if (command != gates->leg[k].command) {
+        gates->leg[k].command = command;
+        gates->leg[k].on_s = t_s + gates->closing_s;
+        if (before != GATE_OFF && !gates->leg[k].opening) {
+            gates->leg[k].opening = true;
+            gates->leg[k].off_s = t_s + gates->turn_off_s;
         }
     }
+    if (gates->leg[k].opening && late_s >= gates->leg[k].off_s) {
+        gates->leg[k].opening = false;
+        gates->leg[k].gate = GATE_OFF;
+    }
+    if (!gates->leg[k].opening && gates->leg[k].gate != command && late_s >= gates->leg[k].on_s) {
+        gates->leg[k].gate = command;
+    }
+    return gates->leg[k].gate != before;
+}
+
+unsigned gates_update(gates_t *gates, double t_s)
+{
+    unsigned changed = 0u;
+    for (int k = 0; k < gates->legs; k++) {
+        changed |= update_leg(gates, k, t_s) ? 1u << k : 0u;
+    }
+    if (changed != 0u) {
+        gates->edge_s = t_s;
+    }
     return changed;
+}
+
+gate_t gates_conducting(const gates_t *gates, int k)
+{
+    gate_t gate = gates->leg[k].gate;
+    bool upper = gate == GATE_HIGH;
+    bool lower = gate == GATE_LOW;
+    switch (gates->leg[k].fault) {
+    case PLANT_UPPER_OPEN:
+        upper = false;
+        break;
+    case PLANT_LOWER_OPEN:
+        lower = false;
+        break;
+    case PLANT_UPPER_SHORT:
+        upper = true;
+        break;
+    case PLANT_LOWER_SHORT:
+        lower = true;
+        break;
+    case PLANT_HEALTHY:
+    case PLANT_WIRE_OPEN:
+        break;
+    }
+    return upper ? (lower ? GATE_BOTH : GATE_HIGH) : (lower ? GATE_LOW : GATE_OFF);
 }
 
 double gates_next_s(const gates_t *gates, double t_s)
 {
     double next_s = gates->period_s;
     double after_s = t_s + gates->coincident_s;
-    for (int k = 0; k < PLANT_LEGS; k++) {
-        if (!gates->leg[k].driven) {
-            continue;
-        }
+    for (int k = 0; k < gates->legs; k++) {
         double rise_s = gates->leg[k].rise_s;
         double fall_s = gates->leg[k].fall_s;
-        if (rise_s > after_s && rise_s < next_s) {
+        if (gates->leg[k].driven && rise_s > after_s && rise_s < next_s) {
             next_s = rise_s;
         }
-        if (fall_s > after_s && fall_s < next_s) {
+        if (gates->leg[k].driven && fall_s > after_s && fall_s < next_s) {
             next_s = fall_s;
         }
-        if (gates->leg[k].gate != gates->leg[k].command && gates->leg[k].ready_s < next_s) {
-            next_s = gates->leg[k].ready_s;
+        if (gates->leg[k].opening && gates->leg[k].off_s < next_s) {
+            next_s = gates->leg[k].off_s;
+        }
+        if (gates->leg[k].gate != gates->leg[k].command && gates->leg[k].on_s < next_s) {
+            next_s = gates->leg[k].on_s;
         }
     }
     return next_s;

@@ -1,37 +1,44 @@
-/* Timer and gate drivers: compare values in, the state of six switches out (METHODS.md 0.2 E6, E9).
+/* Timer and gate drivers: compare values in, the state of the switches out (METHODS.md 0.2 E6, E9).
  *
  * Centre-aligned carrier, period [0, T): the command of leg X is high from (1 - d0) T/2 to (1 + d1) T/2
  * with d = compare / timer_counts of each half. Compare values beyond timer_counts count as
  * timer_counts. Full duty on both sides of a period boundary joins without an edge.
  *
- * A command edge opens the conducting switch at once; the other closes dead_time_s later. An edge within
- * the dead time starts it anew, so a pulse shorter than the dead time never reaches its switch, as in a
- * timer with a dead-time generator. A leg that becomes driven also waits one dead time.
+ * A command edge opens the conducting switch turn_off_s later; the other closes dead_time_s + turn_on_s after
+ * the edge. An edge before that starts it anew, so a pulse shorter than the dead time never reaches its
+ * switch, as in a timer with a dead-time generator. A leg that becomes driven also waits.
  *
- * Edges closer than 1e-9 T are one event. Times are relative to the start of the period.
- * Tests: gates_test.cpp. */
+ * A faulty switch stays as it is whatever its gate says. Edges closer than 1e-9 T are one event. Times are
+ * relative to the start of the period. Tests: gates_test.cpp. */
 #ifndef PLANT_GATES_H
 #define PLANT_GATES_H
 
 #include "sim_plant/plant.h"
 
-typedef enum { GATE_OFF, GATE_LOW, GATE_HIGH } gate_t; /* which switch of a leg conducts */
+/* which switches of a leg conduct; both only with a short-circuited one */
+typedef enum { GATE_OFF, GATE_LOW, GATE_HIGH, GATE_BOTH } gate_t;
 
 typedef struct {
     double period_s;
-    double dead_time_s;
+    double closing_s; /* dead time and turn-on delay */
+    double turn_off_s;
     double coincident_s;
     uint32_t timer_counts;
+    int legs;
+    double edge_s; /* the last change of any gate */
     struct {
         bool driven;
         double rise_s, fall_s; /* command edges of this period */
         gate_t command;        /* before dead time */
-        double ready_s;        /* end of the dead time, when gate != command */
-        gate_t gate;
+        gate_t gate;           /* of healthy switches */
+        bool opening;          /* the conducting switch opens at off_s */
+        double off_s;
+        double on_s; /* the commanded one closes, when gate != command */
+        plant_leg_fault_t fault;
     } leg[PLANT_LEGS];
 } gates_t;
 
-void gates_init(gates_t *gates, const plant_inverter_t *inverter);
+void gates_init(gates_t *gates, const plant_inverter_t *inverter, int legs);
 
 /* Start of a period with the given PWM. */
 void gates_load(gates_t *gates, const plant_pwm_t *pwm);
@@ -39,8 +46,11 @@ void gates_load(gates_t *gates, const plant_pwm_t *pwm);
 /* All switches open, now. */
 void gates_off(gates_t *gates);
 
-/* Brings the gates to time t; true when one of them changed. */
-bool gates_update(gates_t *gates, double t_s);
+/* Brings the gates to time t; the legs of which one has changed, bit k for leg k. */
+unsigned gates_update(gates_t *gates, double t_s);
+
+/* What conducts in leg k, with its fault. */
+gate_t gates_conducting(const gates_t *gates, int k);
 
 /* The next instant after t at which gates_update() has something to do; T when nothing is left. */
 double gates_next_s(const gates_t *gates, double t_s);

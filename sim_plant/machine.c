@@ -1,22 +1,258 @@
-#include "sim_plant/machine.h"
+#include "sim_plant/machine_rates.h"
 
-void machine_set(machine_t *machine, const plant_machine_t *parameters)
+#include <math.h>
+#include <string.h>
+
+#define PI             3.14159265358979323846
+#define REFERENCE_DEGC 25.0
+#define ANGLES         97 /* a prime: no harmonic looks constant on it */
+
+static double inverse_or_zero(double x)
 {
-    double psi_m = parameters->psi_m_Wb;
-    machine->R_s_ohm = parameters->R_s_ohm;
-    machine->gamma_d_1_H = 1.0 / parameters->L_d0_H;
-    machine->gamma_q_1_H = 1.0 / parameters->L_q0_H;
-    machine->c_A_Wb5 = parameters->c_A_Wb5;
-    machine->i_f_A = psi_m / parameters->L_d0_H + parameters->c_A_Wb5 * psi_m * psi_m * psi_m * psi_m * psi_m;
-    machine->psi_m_Wb = psi_m;
-    machine->torque_gain = 1.5 * parameters->pole_pairs;
-    machine->pole_pairs = parameters->pole_pairs;
+    return x > 0.0 ? 1.0 / x : 0.0;
 }
 
-double machine_energy_J(const machine_t *machine, dq_t psi_Wb)
+static void set_core(machine_t *machine, const plant_machine_t *p, double psi_m_Wb)
 {
-    double psi2 = psi_Wb.d * psi_Wb.d + psi_Wb.q * psi_Wb.q;
-    return 1.5 * (0.5 * psi_Wb.d * psi_Wb.d * machine->gamma_d_1_H +
-                  0.5 * psi_Wb.q * psi_Wb.q * machine->gamma_q_1_H +
-                  machine->c_A_Wb5 * psi2 * psi2 * psi2 / 6.0 - machine->i_f_A * psi_Wb.d);
+    double psi2 = psi_m_Wb * psi_m_Wb;
+    machine->gamma_d_1_H = inverse_or_zero(p->L_d0_H);
+    machine->gamma_q_1_H = inverse_or_zero(p->L_q0_H);
+    machine->c_A_Wb5 = p->c_A_Wb5;
+    machine->i_f_A = psi_m_Wb * (machine->gamma_d_1_H + p->c_A_Wb5 * psi2 * psi2);
+    machine->psi_m_Wb = psi_m_Wb;
+}
+
+/* Whether nothing links the cores' currents but the cores: then their flux integrates the voltage straight.
+ */
+static bool is_loose(machine_t *machine)
+{
+    const winding_t *w = &machine->winding;
+    bool loose = machine->map == NULL && machine->gamma_eddy_d_1_H == 0.0 &&
+                 machine->gamma_eddy_q_1_H == 0.0 && w->cogging_terms == 0;
+    loose = loose && !w->turning;
+    for (int a = 0; a < w->active; a++) {
+        for (int b = 0; b < w->active; b++) {
+            bool own = a == b && a >= 2 * w->sets;
+            loose = loose && (own || w->L_constant_H[a][b] == 0.0);
+        }
+        machine->loose_gamma_1_H[a] = inverse_or_zero(w->L_constant_H[a][a]);
+    }
+    return loose;
+}
+
+/* The trace of a positive matrix bounds its eigenvalues. */
+static void set_bounds(machine_t *m)
+{
+    machine_state_t s = {.rotor = {1.0, 0.0}};
+    machine_point_t p;
+    double Y[ACTIVE][ACTIVE];
+    double R_ohm = 0.0;
+    for (int set = 0; set < m->winding.sets; set++) {
+        machine_idle(m, &s, set);
+    }
+    machine_evaluate(m, &s, &p);
+    machine_admittance(m, &s, &p, Y);
+    m->gamma_sum_1_H = 0.0;
+    for (int a = 0; a < m->winding.active; a++) {
+        m->gamma_sum_1_H += Y[a][a];
+        R_ohm = fmax(R_ohm, m->R_eddy_ohm + m->winding.R_ohm[a][a]);
+    }
+    m->fastest_1_s = m->gamma_sum_1_H * R_ohm;
+}
+
+void machine_set_branch(machine_t *machine, const double axis[PLANT_LEGS], double R_ohm)
+{
+    winding_branch(&machine->winding, axis, R_ohm);
+    machine->loose = is_loose(machine);
+    set_bounds(machine);
+}
+
+/* The fundamental: mean over angle of what a table has without current. */
+static double map_magnet_Wb(const map_table_t *map)
+{
+    double sum_Wb = 0.0;
+    for (int n = 0; n < ANGLES; n++) {
+        map_point_t at;
+        map_table_eval(map, (dq_t){0.0, 0.0}, 2.0 * PI * n / ANGLES, &at);
+        sum_Wb += at.psi_Wb.d;
+    }
+    return sum_Wb / ANGLES;
+}
+
+void machine_set(machine_t *machine, const plant_config_t *config, double winding_degC, double magnet_degC)
+{
+    const plant_machine_t *p = &config->machine;
+    const plant_winding_t *w = &config->winding;
+    double warm = 1.0 + w->alpha_R_1_K * (winding_degC - REFERENCE_DEGC);
+    double magnet = 1.0 + w->alpha_psi_1_K * (magnet_degC - REFERENCE_DEGC);
+    double psi_m_Wb = magnet * p->psi_m_Wb;
+    double psi_core_Wb = psi_m_Wb;
+    *machine = (machine_t){.map = config->map};
+    if (machine->map != NULL) {
+        psi_core_Wb = map_magnet_Wb(machine->map);
+        psi_m_Wb = magnet * psi_core_Wb;
+        machine->psi_m_Wb = psi_m_Wb;
+    } else {
+        set_core(machine, p, psi_m_Wb);
+    }
+    machine->R_s_ohm = warm * p->R_s_ohm;
+    machine->torque_gain = 1.5 * p->pole_pairs;
+    machine->pole_pairs = p->pole_pairs;
+    machine->gamma_eddy_d_1_H = inverse_or_zero(w->L_eddy_d_H);
+    machine->gamma_eddy_q_1_H = inverse_or_zero(w->L_eddy_q_H);
+    machine->R_eddy_ohm = w->R_eddy_ohm;
+    winding_init(&machine->winding, w, machine->R_s_ohm, psi_m_Wb, psi_core_Wb, magnet);
+    machine->biased = machine->map != NULL || machine->gamma_eddy_d_1_H + machine->gamma_eddy_q_1_H > 0.0;
+    machine->loose = is_loose(machine);
+    machine->plain = machine->loose && machine->winding.active == 2 && machine->winding.even;
+    set_bounds(machine);
+}
+
+void machine_evaluate(const machine_t *m, const machine_state_t *s, machine_point_t *p)
+{
+    machine_evaluate_n(m, s, machine_shape(m), true, p);
+}
+
+void machine_drop_V(const machine_t *m, const double i_A[ACTIVE], double v_V[ACTIVE])
+{
+    machine_drop_n(m, i_A, v_V, m->winding.active);
+}
+
+void machine_admittance(const machine_t *m, const machine_state_t *s, const machine_point_t *p,
+                        double admittance_1_H[ACTIVE][ACTIVE])
+{
+    int n = m->winding.active;
+    for (int column = 0; column < n; column++) {
+        double L[ACTIVE][ACTIVE];
+        double x[ACTIVE] = {0.0};
+        x[column] = 1.0;
+        inductance_matrix(s, p, machine_shape(m), L);
+        machine_eliminate(n, L, x);
+        for (int row = 0; row < n; row++) {
+            admittance_1_H[row][column] = x[row];
+        }
+    }
+}
+
+void machine_rates(const machine_t *m, const machine_state_t *s, const machine_point_t *p,
+                   double omega_e_rad_s, const double v_V[ACTIVE], machine_rate_t *rate)
+{
+    machine_rates_n(m, s, p, omega_e_rad_s, v_V, machine_shape(m), rate);
+}
+
+void machine_kick(const machine_t *m, machine_state_t *s, const machine_point_t *p,
+                  const double kick_Wb[ACTIVE])
+{
+    const winding_t *w = &m->winding;
+    double L[ACTIVE][ACTIVE];
+    double x[ACTIVE];
+    memcpy(x, kick_Wb, sizeof x);
+    inductance_matrix(s, p, machine_shape(m), L);
+    machine_eliminate(w->active, L, x);
+    for (int set = 0; set < w->sets; set++) {
+        const core_t *core = &p->core[set];
+        dq_t a = times(core->L_H, frame_to_dq(of_set(x, set), s->rotor));
+        s->eddy_A[2 * set] += m->gamma_eddy_d_1_H * a.d;
+        s->eddy_A[2 * set + 1] += m->gamma_eddy_q_1_H * a.q;
+        ab_t moved = frame_to_ab(m->map != NULL ? times(core->gamma_1_H, a) : a, s->rotor);
+        s->u[2 * set] += moved.alpha;
+        s->u[2 * set + 1] += moved.beta;
+    }
+    for (int a = 2 * w->sets; a < w->active; a++) {
+        s->u[a] += x[a];
+    }
+}
+
+void machine_idle(const machine_t *m, machine_state_t *s, int set)
+{
+    dq_t i = {-s->eddy_A[2 * set], -s->eddy_A[2 * set + 1]};
+    dq_t u = i;
+    if (m->map == NULL) {
+        u = (dq_t){m->psi_m_Wb, 0.0};
+        for (int step = 0; step < 8 && (i.d != 0.0 || i.q != 0.0); step++) {
+            dq_t now = machine_current_A(m, u);
+            dq_t move = times(inverse(machine_tangent_1_H(m, u)), (dq_t){i.d - now.d, i.q - now.q});
+            u.d += move.d;
+            u.q += move.q;
+        }
+    }
+    ab_t stationary = frame_to_ab(u, s->rotor);
+    s->u[2 * set] = stationary.alpha;
+    s->u[2 * set + 1] = stationary.beta;
+    if (m->winding.zero >= 0) {
+        s->u[m->winding.zero] = 0.0;
+    }
+}
+
+dq_t machine_flux_Wb(const machine_t *m, const machine_state_t *s, const machine_point_t *p)
+{
+    const winding_t *w = &m->winding;
+    ab_t added = {p->series.psi[0], p->series.psi[1]};
+    for (int a = 0; a < w->active; a++) {
+        added.alpha += p->series.L[0][a] * p->i_A[a];
+        added.beta += p->series.L[1][a] * p->i_A[a];
+    }
+    dq_t psi = frame_to_dq(added, s->rotor);
+    return (dq_t){p->core[0].psi_Wb.d + psi.d, p->core[0].psi_Wb.q + psi.q};
+}
+
+static double core_energy_J(const machine_t *m, const machine_state_t *s, const core_t *core)
+{
+    dq_t psi = core->psi_Wb;
+    if (m->map != NULL) {
+        map_point_t at;
+        map_table_eval(m->map, core->i_A, s->theta_e_rad, &at);
+        return 1.5 * (psi.d * core->i_A.d + psi.q * core->i_A.q) - at.coenergy_J;
+    }
+    double psi2 = psi.d * psi.d + psi.q * psi.q;
+    return 1.5 * (0.5 * psi.d * psi.d * m->gamma_d_1_H + 0.5 * psi.q * psi.q * m->gamma_q_1_H +
+                  m->c_A_Wb5 * psi2 * psi2 * psi2 / 6.0 - m->i_f_A * psi.d);
+}
+
+double machine_energy_J(const machine_t *m, const machine_state_t *s, const machine_point_t *p)
+{
+    const winding_t *w = &m->winding;
+    double energy_J = winding_cogging_J(w, s->rotor) / m->pole_pairs;
+    for (int set = 0; set < w->sets; set++) {
+        energy_J += core_energy_J(m, s, &p->core[set]);
+        for (int axis = 0; axis < 2; axis++) {
+            double gamma_1_H = axis == 0 ? m->gamma_eddy_d_1_H : m->gamma_eddy_q_1_H;
+            double i_A = s->eddy_A[2 * set + axis];
+            energy_J += gamma_1_H > 0.0 ? 0.75 * i_A * i_A / gamma_1_H : 0.0;
+        }
+    }
+    for (int a = 0; a < w->active; a++) {
+        for (int b = 0; b < w->active; b++) {
+            energy_J += 0.5 * w->weight[a] * p->i_A[a] * p->series.L[a][b] * p->i_A[b];
+        }
+    }
+    return energy_J;
+}
+
+/* At no current and a grid of angles, the tangent inductance is positive definite. */
+bool machine_is_sound(const machine_t *m)
+{
+    for (int n = 0; n < ANGLES; n++) {
+        double theta = 2.0 * PI * n / ANGLES;
+        machine_state_t s = {.rotor = {cos(theta), sin(theta)}, .theta_e_rad = theta};
+        machine_point_t p;
+        double L[ACTIVE][ACTIVE];
+        for (int set = 0; set < m->winding.sets; set++) {
+            machine_idle(m, &s, set);
+        }
+        machine_evaluate(m, &s, &p);
+        inductance_matrix(&s, &p, machine_shape(m), L);
+        for (int k = 0; k < m->winding.active; k++) {
+            if (!(L[k][k] > 0.0)) {
+                return false;
+            }
+            for (int row = k + 1; row < m->winding.active; row++) {
+                double factor = L[row][k] / L[k][k];
+                for (int column = k; column < m->winding.active; column++) {
+                    L[row][column] -= factor * L[k][column];
+                }
+            }
+        }
+    }
+    return true;
 }

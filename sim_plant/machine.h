@@ -1,22 +1,27 @@
-/* Saturating permanent-magnet machine as an energy-form flux map (METHODS.md 0.2 E1, E2).
+/* The motor: one or two sets of three phases around a common rotor (METHODS.md 0.2 E1 to E5, E14, E16, E17,
+ * E19).
  *
- *   i_d = psi_d/L_d0 + c psi_d |psi|^4 - i_f      i_q = psi_q/L_q0 + c psi_q |psi|^4
+ * The core of each set is a flux map in rotor coordinates, either the energy form
  *
- * are the gradient of one stored energy
+ *   i_d = psi_d/L_d0 + c psi_d |psi|^4 - i_f      i_q = psi_q/L_q0 + c psi_q |psi|^4,
  *
- *   W = 1.5 (psi_d^2/(2 L_d0) + psi_q^2/(2 L_q0) + c |psi|^6/6 - i_f psi_d),
+ * the gradient of the stored energy W = 1.5 (psi_d^2/(2 L_d0) + psi_q^2/(2 L_q0) + c |psi|^6/6 - i_f psi_d),
+ * so that saturation, cross-coupling and polarity belong together and no energy is made or lost; or a table
+ * (map_table.h). i_f is the magnet's equivalent current. winding.h adds what is linear in the currents.
  *
- * so the map is reciprocal, saturation, cross-coupling and polarity belong together, and no energy is
- * made or lost. i_f is the magnet's equivalent current: it makes psi_m the flux at zero current.
- * W, like the factor 1.5 of the torque, is of the three-phase machine. No leakage between sets, no
- * spatial harmonics, no zero sequence.
+ * State of a coordinate: core flux with the energy form, core current with a table, and the current itself
+ * for a zero sequence or the fault branch. A plain machine, one star set of the energy form and nothing
+ * added, has dpsi/dt = v - R i and is computed inline; machine_rates() does every other.
  *
- * Cost: about 15 multiplications each. Tests: machine_test.cpp. */
+ * E19: a shorted circuit (L_eddy, R_eddy) on each rotor axis carries L_eddy di_e/dt = dpsi_core/dt - R_eddy
+ * i_e beside the core current.
+ *
+ * Tests: machine_test.cpp. */
 #ifndef PLANT_MACHINE_H
 #define PLANT_MACHINE_H
 
-#include "sim_plant/frame.h"
-#include "sim_plant/plant.h"
+#include "sim_plant/map_table.h"
+#include "sim_plant/winding.h"
 
 typedef struct {
     double R_s_ohm;
@@ -27,6 +32,15 @@ typedef struct {
     double psi_m_Wb;
     double torque_gain; /* 1.5 P */
     double pole_pairs;
+    bool plain;
+    bool loose;  /* nothing links the cores but the magnet: see machine_rates.h */
+    bool biased; /* has eddy circuits or a map */
+    double loose_gamma_1_H[ACTIVE];
+    double gamma_sum_1_H; /* bounds, without current: of any current's response, */
+    double fastest_1_s;   /* and of the rate of decay of any */
+    const map_table_t *map;
+    double gamma_eddy_d_1_H, gamma_eddy_q_1_H, R_eddy_ohm; /* zero: no eddy circuits */
+    winding_t winding;
 } machine_t;
 
 /* Tangent inverse inductances: di_d = d dpsi_d + dq dpsi_q, di_q = dq dpsi_d + q dpsi_q. 1/H */
@@ -34,8 +48,66 @@ typedef struct {
     double d, dq, q;
 } machine_tangent_t;
 
-void machine_set(machine_t *machine, const plant_machine_t *parameters);
-double machine_energy_J(const machine_t *machine, dq_t psi_Wb);
+/* Electrical state of all windings at one instant. Eddy currents are in rotor coordinates, two a set. */
+typedef struct {
+    double u[ACTIVE]; /* by active coordinate; see above */
+    double eddy_A[2 * PLANT_SETS];
+    rotor_t rotor;
+    double theta_e_rad;
+} machine_state_t;
+
+/* What follows from it. */
+typedef struct {
+    dq_t i_A, psi_Wb; /* of the core, without its eddy circuits */
+    machine_tangent_t gamma_1_H;
+    machine_tangent_t L_H; /* with them */
+    dq_t psi_theta_Wb;
+} core_t;
+
+typedef struct {
+    double i_A[ACTIVE]; /* terminal currents, active coordinates */
+    double torque_Nm;
+    core_t core[PLANT_SETS];
+    winding_point_t series;
+} machine_point_t;
+
+/* Rates under given voltages of the active coordinates. */
+typedef struct {
+    double u[ACTIVE];
+    double i_A_s[ACTIVE];
+    double eddy_A_s[2 * PLANT_SETS];
+} machine_rate_t;
+
+/* See winding_branch(). */
+void machine_set_branch(machine_t *machine, const double axis[PLANT_LEGS], double R_ohm);
+
+/* False when what the winding adds leaves an inductance that is not positive. */
+bool machine_is_sound(const machine_t *machine);
+
+void machine_set(machine_t *machine, const plant_config_t *config, double winding_degC, double magnet_degC);
+
+void machine_evaluate(const machine_t *machine, const machine_state_t *state, machine_point_t *point);
+void machine_rates(const machine_t *machine, const machine_state_t *state, const machine_point_t *point,
+                   double omega_e_rad_s, const double v_V[ACTIVE], machine_rate_t *rate);
+
+/* Response of the currents to voltages: di = admittance v dt, 1/H, by active coordinate. */
+void machine_admittance(const machine_t *machine, const machine_state_t *state, const machine_point_t *point,
+                        double admittance_1_H[ACTIVE][ACTIVE]);
+
+/* The state after flux linkage has been added to the windings in no time. */
+void machine_kick(const machine_t *machine, machine_state_t *state, const machine_point_t *point,
+                  const double kick_Wb[ACTIVE]);
+
+/* State of a set whose legs carry nothing. */
+void machine_idle(const machine_t *machine, machine_state_t *state, int set);
+
+/* Total flux linkage of the first set, with that of the winding. */
+dq_t machine_flux_Wb(const machine_t *machine, const machine_state_t *state, const machine_point_t *point);
+
+double machine_energy_J(const machine_t *machine, const machine_state_t *state, const machine_point_t *point);
+
+/* The voltage drop of the windings' resistance. */
+void machine_drop_V(const machine_t *machine, const double i_A[ACTIVE], double drop_V[ACTIVE]);
 
 static inline dq_t machine_current_A(const machine_t *m, dq_t psi_Wb)
 {

@@ -6,49 +6,159 @@
 #define REVERSED_RAD_S 1e-9
 #define BREAKAWAY      (1.0 + 1e-9)
 
+#define LOAD_HARMONICS (int)(sizeof((plant_mech_t){0}.load_angle) / sizeof(plant_harmonic_t))
+
+static bool two_masses(const mechanics_t *mech)
+{
+    return mech->parameters.J_load_kgm2 > 0.0;
+}
+
+static bool constant_load(const plant_mech_t *p)
+{
+    bool constant = p->load_Nms == 0.0 && p->load_Nms2 == 0.0;
+    for (int n = 0; n < LOAD_HARMONICS; n++) {
+        constant = constant && (p->load_angle[n].order == 0 || p->load_angle[n].amplitude == 0.0);
+    }
+    return constant;
+}
+
 void mechanics_init(mechanics_t *mech, const plant_mech_t *parameters)
 {
     *mech = (mechanics_t){.parameters = *parameters};
-    mechanics_settle(mech, 0.0, 0.0);
+    mech->plain = !two_masses(mech) && constant_load(parameters);
+    mechanics_settle(mech, &(mechanics_motion_t){0}, 0.0);
 }
 
-double mechanics_settle(mechanics_t *mech, double omega_mech_rad_s, double torque_Nm)
+void mechanics_impose(mechanics_t *mech, double omega_mech_rad_s)
+{
+    mech->imposed = true;
+    mech->imposed_rad_s = omega_mech_rad_s;
+    mech->ramping = false;
+}
+
+/* Load torque by speed and angle, without the constant part. */
+static double varying_load_Nm(const plant_mech_t *p, double omega_rad_s, double theta_rad)
+{
+    double torque_Nm = (p->load_Nms + p->load_Nms2 * fabs(omega_rad_s)) * omega_rad_s;
+    for (int n = 0; n < LOAD_HARMONICS; n++) {
+        const plant_harmonic_t *h = &p->load_angle[n];
+        if (h->order != 0) {
+            torque_Nm += h->amplitude * cos(h->order * theta_rad + h->phase_rad);
+        }
+    }
+    return torque_Nm;
+}
+
+static double shaft_Nm(const plant_mech_t *p, const mechanics_motion_t *m)
+{
+    return p->k_shaft_Nm * m->twist_rad + p->d_shaft_Nms * (m->omega_mech_rad_s - m->omega_load_rad_s);
+}
+
+/* What opposes the rotor beside bias_Nm and its own viscous friction. */
+static double resisting_Nm(const mechanics_t *mech, const mechanics_motion_t *m)
+{
+    if (mech->plain) {
+        return 0.0;
+    }
+    return two_masses(mech) ? shaft_Nm(&mech->parameters, m)
+                            : varying_load_Nm(&mech->parameters, m->omega_mech_rad_s, m->theta_mech_rad);
+}
+
+/* The constant load's share in it. */
+static double constant_Nm(const mechanics_t *mech)
+{
+    return two_masses(mech) ? 0.0 : mech->load_Nm;
+}
+
+/* Torque on the rotor at rest, which friction may hold. */
+static double drive_Nm(const mechanics_t *mech, const mechanics_motion_t *motion, double torque_Nm)
+{
+    return torque_Nm - resisting_Nm(mech, motion) - constant_Nm(mech);
+}
+
+/* Locked, or imposed: then the speed asked for, or where a ramp has brought it. */
+static double given_speed(mechanics_t *mech, double omega_mech_rad_s)
+{
+    mech->slide = 0.0;
+    if (mech->parameters.locked) {
+        mech->ramping = false;
+        return 0.0;
+    }
+    if (mech->ramping) {
+        mech->imposed_rad_s = omega_mech_rad_s;
+    }
+    mech->ramping = mech->imposed_rate_rad_s2 != 0.0;
+    mech->given_rad_s2 = mech->imposed_rate_rad_s2;
+    return mech->imposed_rad_s;
+}
+
+/* Sticking or sliding; returns the speed. */
+static double rub(mechanics_t *mech, const mechanics_motion_t *motion, double torque_Nm)
+{
+    double omega_rad_s = motion->omega_mech_rad_s;
+    double moving = mech->slide * omega_rad_s;
+    if (omega_rad_s != 0.0 && (mech->slide == 0.0 || moving > -REVERSED_RAD_S)) {
+        mech->slide = mech->slide == 0.0 ? copysign(1.0, omega_rad_s) : mech->slide;
+        return omega_rad_s;
+    }
+    double drive = drive_Nm(mech, motion, torque_Nm);
+    mech->stuck = fabs(drive) <= mech->parameters.T_coulomb_Nm * BREAKAWAY;
+    mech->slide = mech->stuck ? 0.0 : copysign(1.0, drive);
+    return 0.0;
+}
+
+double mechanics_settle(mechanics_t *mech, const mechanics_motion_t *motion, double torque_Nm)
 {
     double friction_Nm = mech->parameters.T_coulomb_Nm;
-    double drive_Nm = torque_Nm - mech->load_Nm;
-
+    double omega_rad_s = motion->omega_mech_rad_s;
     mech->gain_1_kgm2 = 0.0;
     mech->bias_Nm = 0.0;
+    mech->given_rad_s2 = 0.0;
     mech->stuck = false;
     if (mech->parameters.locked || mech->imposed) {
-        mech->slide = 0.0;
-        return mech->parameters.locked ? 0.0 : mech->imposed_rad_s;
+        return given_speed(mech, omega_rad_s);
     }
     if (friction_Nm > 0.0) {
-        double moving = mech->slide * omega_mech_rad_s;
-        if (omega_mech_rad_s != 0.0 && (mech->slide == 0.0 || moving > -REVERSED_RAD_S)) {
-            mech->slide = mech->slide == 0.0 ? copysign(1.0, omega_mech_rad_s) : mech->slide;
-        } else if (fabs(drive_Nm) <= friction_Nm * BREAKAWAY) {
-            mech->slide = 0.0;
-            mech->stuck = true;
-            return 0.0;
-        } else {
-            mech->slide = copysign(1.0, drive_Nm);
-            omega_mech_rad_s = 0.0;
-        }
-    } else {
-        mech->slide = 0.0;
+        omega_rad_s = rub(mech, motion, torque_Nm);
     }
-    mech->gain_1_kgm2 = 1.0 / mech->parameters.J_kgm2;
-    mech->bias_Nm = -mech->load_Nm - mech->slide * friction_Nm;
-    return omega_mech_rad_s;
+    if (!mech->stuck) {
+        mech->gain_1_kgm2 = 1.0 / mech->parameters.J_kgm2;
+        mech->bias_Nm = -constant_Nm(mech) - mech->slide * friction_Nm;
+    }
+    return omega_rad_s;
 }
 
-double mechanics_excess(const mechanics_t *mech, double omega_mech_rad_s, double torque_Nm)
+double mechanics_excess(const mechanics_t *mech, const mechanics_motion_t *motion, double torque_Nm)
 {
-    double friction_Nm = mech->parameters.T_coulomb_Nm;
     if (mech->stuck) {
-        return fabs(torque_Nm - mech->load_Nm) / friction_Nm - BREAKAWAY;
+        return fabs(drive_Nm(mech, motion, torque_Nm)) / mech->parameters.T_coulomb_Nm - BREAKAWAY;
     }
-    return mech->slide != 0.0 ? -mech->slide * omega_mech_rad_s - REVERSED_RAD_S : -1.0;
+    return mech->slide != 0.0 ? -mech->slide * motion->omega_mech_rad_s - REVERSED_RAD_S : -1.0;
+}
+
+void mechanics_rates(const mechanics_t *mech, const mechanics_motion_t *m, double torque_Nm,
+                     mechanics_motion_rate_t *rate)
+{
+    const plant_mech_t *p = &mech->parameters;
+    double resisting_torque_Nm = resisting_Nm(mech, m);
+    *rate = (mechanics_motion_rate_t){
+        .omega_mech_rad_s2 = mechanics_rate(mech, m->omega_mech_rad_s, torque_Nm - resisting_torque_Nm),
+    };
+    if (two_masses(mech)) {
+        double load_Nm =
+            varying_load_Nm(p, m->omega_load_rad_s, m->theta_mech_rad - m->twist_rad) + mech->load_Nm;
+        rate->omega_load_rad_s2 = (resisting_torque_Nm - load_Nm) / p->J_load_kgm2;
+        rate->twist_rad_s = m->omega_mech_rad_s - m->omega_load_rad_s;
+    }
+}
+
+double mechanics_energy_J(const mechanics_t *mech, const mechanics_motion_t *m)
+{
+    const plant_mech_t *p = &mech->parameters;
+    double energy_J = 0.5 * p->J_kgm2 * m->omega_mech_rad_s * m->omega_mech_rad_s;
+    if (two_masses(mech)) {
+        energy_J += 0.5 * p->J_load_kgm2 * m->omega_load_rad_s * m->omega_load_rad_s +
+                    0.5 * p->k_shaft_Nm * m->twist_rad * m->twist_rad;
+    }
+    return energy_J;
 }

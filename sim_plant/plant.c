@@ -10,28 +10,28 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define AMBIENT_DEGC 25.0
+
 struct plant {
-    plant_machine_t machine; /* as the scenario sets it, and as the circuit knows it */
-    plant_machine_t machine_known;
-    plant_sensor_t sensor;
+    plant_config_t config; /* machine and sensor as the scenario sets them, */
+    plant_machine_t known; /* and the machine as the circuit knows it */
     circuit_t circuit;
     gates_t gates;
     noise_t noise;
     plant_pwm_t queued;    /* for the period after the present one */
     unsigned long periods; /* complete ones */
     double t_s;            /* within the period */
-    double i_sampled_A[PLANT_LEGS];
-    double v_sampled_V;
+    double winding_degC, magnet_degC;
+    sensor_input_t sampled;
+    double instant_s[PLANT_INSTANTS];
+    int instants;
+    sensor_input_t at_instant[PLANT_INSTANTS];
+    probe_t complete;       /* comparator edges of the last period */
     double start[ELEMENTS]; /* of the period */
     double v_mean_alpha_V, v_mean_beta_V;
     double field_base_J; /* field energy at init, less what was put in by hand since */
     double slip_J;       /* work of plant_turn_rotor() */
 };
-
-static double field_J(const plant_t *plant)
-{
-    return machine_energy_J(&plant->circuit.machine, plant->circuit.now.psi_dq_Wb);
-}
 
 plant_t *plant_create(const plant_config_t *config, double theta_e_rad, const char **error)
 {
@@ -46,15 +46,19 @@ plant_t *plant_create(const plant_config_t *config, double theta_e_rad, const ch
     if (!plant) {
         return NULL;
     }
-    plant->machine = config->machine;
-    plant->machine_known = config->machine;
-    plant->sensor = config->sensor;
+    plant->config = *config;
+    plant->known = config->machine;
+    plant->winding_degC = AMBIENT_DEGC;
+    plant->magnet_degC = AMBIENT_DEGC;
     noise_seed(&plant->noise, config->sensor.seed);
-    gates_init(&plant->gates, &config->inverter);
-    gates_load(&plant->gates, &plant->queued);
     circuit_init(&plant->circuit, config, theta_e_rad);
-    plant->v_sampled_V = plant->circuit.now.x[V_DC];
-    plant->field_base_J = field_J(plant);
+    gates_init(&plant->gates, &config->inverter, plant->circuit.bridge.legs);
+    gates_load(&plant->gates, &plant->queued);
+    plant->sampled.v_dc_V = plant->circuit.now.x[V_DC];
+    plant->sampled.legs = plant->circuit.bridge.legs;
+    plant->sampled.sets = plant->circuit.machine.winding.sets;
+    plant->sampled.temperature_degC = AMBIENT_DEGC;
+    plant->field_base_J = circuit_field_J(&plant->circuit);
     memcpy(plant->start, plant->circuit.now.x, sizeof plant->start);
     return plant;
 }
@@ -64,28 +68,77 @@ void plant_destroy(plant_t *plant)
     free(plant);
 }
 
+/* Whether the gates at their next edge change nothing but who carries the current: a diode or the switch
+ * across it, with the same drop. Half of all edges do. Then nothing need wait for the edge. */
+static bool edge_is_neutral(const plant_t *plant, double edge_s, gates_t *after, unsigned *changed)
+{
+    *after = plant->gates;
+    *changed = gates_update(after, edge_s);
+    return circuit_ignores(&plant->circuit, after, *changed, edge_s - plant->t_s);
+}
+
 /* Advances to time t of the present period. */
 static void run_until(plant_t *plant, double t_s)
 {
     gates_t *gates = &plant->gates;
+    circuit_settle(&plant->circuit);
     while (plant->t_s < t_s) {
-        if (gates_update(gates, plant->t_s)) {
-            circuit_switch(&plant->circuit, gates);
+        unsigned changed = gates_update(gates, plant->t_s);
+        if (changed != 0u) {
+            circuit_switch(&plant->circuit, gates, changed);
         }
         double next_s = fmin(gates_next_s(gates, plant->t_s), t_s);
+        gates_t after;
+        while (next_s < t_s && edge_is_neutral(plant, next_s, &after, &changed)) {
+            *gates = after;
+            circuit_switch(&plant->circuit, gates, changed);
+            next_s = fmin(gates_next_s(gates, next_s), t_s);
+        }
         circuit_advance(&plant->circuit, next_s - plant->t_s);
         plant->t_s = next_s;
     }
 }
 
-static void capture(plant_t *plant)
+static double leg_A(const plant_t *plant, int k)
 {
-    for (int k = 0; k < PLANT_LEGS; k++) {
-        plant->i_sampled_A[k] = plant->circuit.bridge.leg[k] == LEG_FLOATING
-                                    ? 0.0
-                                    : frame_dot(frame_axis[k], plant->circuit.now.i_A);
+    return plant->circuit.bridge.leg[k] == LEG_FLOATING
+               ? 0.0
+               : circuit_leg_A(&plant->circuit, &plant->circuit.now, k);
+}
+
+static bool has_voltage_channels(const plant_t *plant)
+{
+    return plant->config.sensor.v_leg_full_scale_V > 0.0;
+}
+
+/* What the converters see now. Node voltages only where a board measures them: they cost. */
+static void capture(const plant_t *plant, sensor_input_t *seen)
+{
+    const circuit_t *circuit = &plant->circuit;
+    const gates_t *gates = &plant->gates;
+    *seen = (sensor_input_t){
+        .v_dc_V = circuit->now.x[V_DC],
+        .temperature_degC = plant->winding_degC,
+        .quiet_s = plant->t_s - gates->edge_s,
+        .legs = circuit->bridge.legs,
+        .sets = circuit->machine.winding.sets,
+    };
+    for (int k = 0; k < circuit->bridge.legs; k++) {
+        bool low = circuit->bridge.leg[k] == LEG_LOW || circuit->bridge.leg[k] == LEG_DIODE_LOW;
+        seen->i_A[k] = leg_A(plant, k);
+        seen->low_for_s[k] = low ? circuit->t_s - circuit->low_since_s[k] : -1.0;
+        seen->i_dc_A += circuit->bridge.upper[k] * seen->i_A[k];
     }
-    plant->v_sampled_V = plant->circuit.now.x[V_DC];
+    if (!has_voltage_channels(plant)) {
+        return;
+    }
+    circuit_nodes_t nodes;
+    circuit_nodes(circuit, &circuit->now, &nodes);
+    for (int n = 0; n < PLANT_LEGS + PLANT_SETS; n++) {
+        double raw_V = n < PLANT_LEGS ? nodes.v_leg_V[n] : nodes.v_neutral_V[n - PLANT_LEGS];
+        double seen_V = probe_active(&circuit->probe) ? probe_voltage(&circuit->probe, n) : raw_V;
+        *(n < PLANT_LEGS ? &seen->v_leg_V[n] : &seen->v_neutral_V[n - PLANT_LEGS]) = seen_V;
+    }
 }
 
 static bool same_machine(const plant_machine_t *a, const plant_machine_t *b)
@@ -94,64 +147,97 @@ static bool same_machine(const plant_machine_t *a, const plant_machine_t *b)
            a->c_A_Wb5 == b->c_A_Wb5 && a->psi_m_Wb == b->psi_m_Wb && a->pole_pairs == b->pole_pairs;
 }
 
-/* Drift is not the circuit's doing: ohmic energy so far is booked with the old resistance, and the field
- * energy that the change itself brings is left out of the balance. */
-static void take_parameters(plant_t *plant)
+/* Drift is not the circuit's doing: the field energy that the change itself brings is left out of the
+ * balance. */
+static void change_machine(plant_t *plant)
 {
-    if (same_machine(&plant->machine, &plant->machine_known)) {
-        return;
+    assert(!config_machine_fault(&plant->config));
+    double before_J = circuit_field_J(&plant->circuit);
+    circuit_set_machine(&plant->circuit, &plant->config, plant->winding_degC, plant->magnet_degC);
+    plant->field_base_J += circuit_field_J(&plant->circuit) - before_J;
+    plant->known = plant->config.machine;
+}
+
+static void start_period(plant_t *plant)
+{
+    plant->t_s = 0.0;
+    plant->circuit.period_start_s = plant->circuit.t_s;
+    if (probe_active(&plant->circuit.probe)) {
+        plant->complete = plant->circuit.probe;
+        probe_start_period(&plant->circuit.probe);
     }
-    assert(!config_machine_fault(&plant->machine));
-    circuit_t *circuit = &plant->circuit;
-    circuit->e_copper_J += 1.5 * circuit->machine.R_s_ohm * circuit->now.x[INT_I2];
-    circuit->e_on_J += 1.5 * circuit->bridge.r_on_ohm * circuit->now.x[INT_I2];
-    circuit->now.x[INT_I2] = 0.0;
-    double before_J = field_J(plant);
-    machine_set(&circuit->machine, &plant->machine);
-    circuit_refresh(circuit);
-    plant->field_base_J += field_J(plant) - before_J;
-    plant->machine_known = plant->machine;
+    circuit_align(&plant->circuit);
+    if (!same_machine(&plant->config.machine, &plant->known)) {
+        change_machine(plant);
+    }
+    memcpy(plant->start, plant->circuit.now.x, sizeof plant->start);
 }
 
 static void finish_period(plant_t *plant)
 {
     const double *x = plant->circuit.now.x;
-    double R = plant->circuit.machine.R_s_ohm;
     double T = plant->gates.period_s;
-    const double *x0 = plant->start;
-    plant->v_mean_alpha_V = (x[PSI_ALPHA] - x0[PSI_ALPHA] + R * (x[INT_I_ALPHA] - x0[INT_I_ALPHA])) / T;
-    plant->v_mean_beta_V = (x[PSI_BETA] - x0[PSI_BETA] + R * (x[INT_I_BETA] - x0[INT_I_BETA])) / T;
+    plant->v_mean_alpha_V = (x[INT_V_ALPHA] - plant->start[INT_V_ALPHA]) / T;
+    plant->v_mean_beta_V = (x[INT_V_BETA] - plant->start[INT_V_BETA]) / T;
     plant->periods++;
-    plant->t_s = 0.0;
     gates_load(&plant->gates, &plant->queued);
-    circuit_align(&plant->circuit);
-    take_parameters(plant);
-    memcpy(plant->start, plant->circuit.now.x, sizeof plant->start);
+    start_period(plant);
 }
 
 void plant_run_period(plant_t *plant)
 {
     double period_s = plant->gates.period_s;
-    double early_s = plant->sensor.delay_s < 0.0 ? fmax(period_s + plant->sensor.delay_s, 0.0) : period_s;
-    run_until(plant, early_s);
-    if (early_s < period_s) {
-        capture(plant);
-        run_until(plant, period_s);
+    double delay_s = plant->config.sensor.delay_s;
+    double early_s = delay_s < 0.0 ? fmax(period_s + delay_s, 0.0) : (double)INFINITY;
+    for (int n = 0; n < plant->instants; n++) {
+        if (early_s <= plant->instant_s[n]) {
+            run_until(plant, early_s);
+            capture(plant, &plant->sampled);
+            early_s = (double)INFINITY;
+        }
+        run_until(plant, plant->instant_s[n]);
+        capture(plant, &plant->at_instant[n]);
     }
+    if (early_s < period_s) {
+        run_until(plant, early_s);
+        capture(plant, &plant->sampled);
+    }
+    run_until(plant, period_s);
     finish_period(plant);
 }
 
 void plant_sample(plant_t *plant, plant_adc_t *adc)
 {
-    assert(!config_sensor_fault(&plant->sensor, plant->gates.period_s));
-    if (plant->sensor.delay_s >= 0.0) {
-        run_until(plant, fmin(plant->sensor.delay_s, plant->gates.period_s));
-        capture(plant);
+    assert(!config_sensor_fault(&plant->config.sensor, plant->gates.period_s));
+    if (plant->config.sensor.delay_s >= 0.0) {
+        run_until(plant, fmin(plant->config.sensor.delay_s, plant->gates.period_s));
+        capture(plant, &plant->sampled);
     }
-    for (int k = 0; k < PLANT_LEGS; k++) {
-        adc->i_leg[k] = sensor_current(&plant->sensor, &plant->noise, k, plant->i_sampled_A[k]);
+    sensor_convert(&plant->config.sensor, &plant->noise, &plant->sampled, adc);
+}
+
+void plant_set_instants(plant_t *plant, const double after_s[], int count)
+{
+    assert(count >= 0 && count <= PLANT_INSTANTS);
+    plant->instants = count;
+    for (int n = 0; n < count; n++) {
+        assert(after_s[n] >= (n > 0 ? after_s[n - 1] : 0.0) && after_s[n] <= plant->gates.period_s);
+        plant->instant_s[n] = after_s[n];
     }
-    adc->v_dc = sensor_voltage(&plant->sensor, &plant->noise, plant->v_sampled_V);
+}
+
+void plant_sampled(plant_t *plant, int n, plant_adc_t *adc)
+{
+    assert(n >= 0 && n < plant->instants);
+    sensor_convert(&plant->config.sensor, &plant->noise, &plant->at_instant[n], adc);
+}
+
+int plant_captured(const plant_t *plant, plant_capture_t captured[], int most)
+{
+    const probe_t *probe = &plant->complete;
+    int count = probe->edges < most ? probe->edges : most;
+    memcpy(captured, probe->edge, (size_t)(count > 0 ? count : 0) * sizeof captured[0]);
+    return probe->edges + (int)probe->lost;
 }
 
 void plant_set_pwm(plant_t *plant, const plant_pwm_t *pwm)
@@ -163,7 +249,24 @@ void plant_trip(plant_t *plant)
 {
     memset(&plant->queued, 0, sizeof plant->queued);
     gates_off(&plant->gates);
-    circuit_switch(&plant->circuit, &plant->gates);
+    circuit_switch(&plant->circuit, &plant->gates, ~0u);
+}
+
+void plant_run_voltages(plant_t *plant, const double v_leg_V[], double rate_rad_s2, double duration_s)
+{
+    circuit_t *circuit = &plant->circuit;
+    assert(isfinite(duration_s) && duration_s >= 0.0 && isfinite(rate_rad_s2));
+    circuit_sources(circuit, v_leg_V);
+    circuit->mech.imposed_rate_rad_s2 = rate_rad_s2;
+    double longest_s = plant->gates.period_s;
+    for (double left_s = duration_s; left_s > 0.0;) {
+        double part_s = fmin(left_s, longest_s);
+        circuit_settle(circuit);
+        circuit_advance(circuit, part_s);
+        left_s -= part_s;
+        circuit_align(circuit);
+    }
+    circuit->mech.imposed_rate_rad_s2 = 0.0;
 }
 
 void plant_set_load(plant_t *plant, double torque_Nm)
@@ -175,8 +278,7 @@ void plant_set_load(plant_t *plant, double torque_Nm)
 void plant_set_speed(plant_t *plant, double omega_mech_rad_s)
 {
     assert(isfinite(omega_mech_rad_s));
-    plant->circuit.mech.imposed = true;
-    plant->circuit.mech.imposed_rad_s = omega_mech_rad_s;
+    mechanics_impose(&plant->circuit.mech, omega_mech_rad_s);
 }
 
 void plant_free_speed(plant_t *plant)
@@ -198,52 +300,92 @@ void plant_set_source(plant_t *plant, double v_source_V)
     }
 }
 
+void plant_set_supply(plant_t *plant, bool connected)
+{
+    assert(connected || plant->circuit.link.inv_C_1_F > 0.0);
+    plant->circuit.link.connected = connected;
+}
+
+void plant_set_temperature(plant_t *plant, double winding_degC, double magnet_degC)
+{
+    assert(isfinite(winding_degC) && isfinite(magnet_degC));
+    plant->winding_degC = winding_degC;
+    plant->magnet_degC = magnet_degC;
+    change_machine(plant);
+}
+
+void plant_set_leg_fault(plant_t *plant, int leg, plant_leg_fault_t fault)
+{
+    assert(leg >= 0 && leg < plant->circuit.bridge.legs);
+    bool off = fault == PLANT_WIRE_OPEN;
+    plant->gates.leg[leg].fault = fault;
+    if (off != plant->circuit.bridge.off_wire[leg]) {
+        circuit_wire(&plant->circuit, leg, off);
+    }
+    circuit_switch(&plant->circuit, &plant->gates, ~0u);
+}
+
+void plant_set_short(plant_t *plant, int leg_a, int leg_b, double R_ohm)
+{
+    int legs = plant->circuit.bridge.legs;
+    assert(leg_a >= 0 && leg_a < legs && leg_b < legs && leg_a != leg_b && isfinite(R_ohm));
+    circuit_short(&plant->circuit, leg_a, leg_b, R_ohm);
+}
+
 plant_machine_t *plant_machine(plant_t *plant)
 {
-    return &plant->machine;
+    return &plant->config.machine;
 }
 
 plant_sensor_t *plant_sensor(plant_t *plant)
 {
-    return &plant->sensor;
+    return &plant->config.sensor;
 }
 
 void plant_turn_rotor(plant_t *plant, double angle_e_rad)
 {
     assert(isfinite(angle_e_rad));
-    double before_J = field_J(plant);
-    plant->circuit.now.x[THETA_E] += angle_e_rad;
-    circuit_refresh(&plant->circuit);
-    plant->slip_J += before_J - field_J(plant);
+    double before_J = circuit_field_J(&plant->circuit);
+    circuit_turn(&plant->circuit, angle_e_rad);
+    plant->slip_J += before_J - circuit_field_J(&plant->circuit);
 }
 
 void plant_truth(const plant_t *plant, plant_truth_t *truth)
 {
     const circuit_t *circuit = &plant->circuit;
-    const point_t *now = &circuit->now;
-    double r_on = circuit->bridge.r_on_ohm;
-    motor_port_t port = circuit_port(circuit, now);
+    const double *x = circuit->now.x;
+    machine_state_t state = circuit_machine_state(&circuit->now);
+    machine_point_t point;
+    circuit_nodes_t nodes;
+    machine_evaluate(&circuit->machine, &state, &point);
+    circuit_nodes(circuit, &circuit->now, &nodes);
+    dq_t i = frame_to_dq((ab_t){point.i_A[0], point.i_A[1]}, state.rotor);
+    dq_t psi = machine_flux_Wb(&circuit->machine, &state, &point);
     *truth = (plant_truth_t){
         .t_s = (double)plant->periods * plant->gates.period_s + plant->t_s,
-        .i_d_A = now->i_dq_A.d,
-        .i_q_A = now->i_dq_A.q,
-        .psi_d_Wb = now->psi_dq_Wb.d,
-        .psi_q_Wb = now->psi_dq_Wb.q,
-        .theta_e_rad = now->x[THETA_E],
-        .omega_mech_rad_s = now->x[OMEGA_MECH],
-        .torque_Nm = now->torque_Nm,
-        .v_dc_V = now->x[V_DC],
+        .i_d_A = i.d,
+        .i_q_A = i.q,
+        .psi_d_Wb = psi.d,
+        .psi_q_Wb = psi.q,
+        .theta_e_rad = x[THETA_E],
+        .omega_mech_rad_s = x[OMEGA_MECH],
+        .torque_Nm = point.torque_Nm,
+        .v_dc_V = x[V_DC],
+        .i_zero_A = circuit->machine.winding.zero >= 0 ? point.i_A[circuit->machine.winding.zero] : 0.0,
+        .i_dc_A = nodes.i_dc_A,
         .v_mean_alpha_V = plant->v_mean_alpha_V,
         .v_mean_beta_V = plant->v_mean_beta_V,
-        .e_in_J = now->x[INT_IN],
-        .e_copper_J = circuit->e_copper_J + 1.5 * circuit->machine.R_s_ohm * now->x[INT_I2],
-        .e_device_J = circuit->e_on_J + 1.5 * r_on * now->x[INT_I2] + now->x[INT_DROP],
-        .e_mech_J = now->x[INT_MECH] + plant->slip_J,
-        .e_field_J = field_J(plant) - plant->field_base_J,
+        .omega_load_rad_s = x[OMEGA_LOAD],
+        .e_in_J = x[INT_IN] + circuit->jump_in_J,
+        .e_copper_J = x[INT_COPPER],
+        .e_device_J = x[INT_DEVICE] + circuit->jump_device_J,
+        .e_mech_J = x[INT_MECH] + plant->slip_J,
+        .e_field_J = circuit_field_J(circuit) - plant->field_base_J,
     };
-    for (int k = 0; k < PLANT_LEGS; k++) {
-        bool floating = circuit->bridge.leg[k] == LEG_FLOATING;
-        truth->i_A[k] = floating ? 0.0 : frame_dot(frame_axis[k], now->i_A);
-        truth->v_leg_V[k] = bridge_leg_V(&circuit->bridge, &circuit->machine, &port, k);
+    memcpy(truth->v_leg_V, nodes.v_leg_V, sizeof truth->v_leg_V);
+    memcpy(truth->v_neutral_V, nodes.v_neutral_V, sizeof truth->v_neutral_V);
+    memcpy(truth->v_zero_V, nodes.v_zero_V, sizeof truth->v_zero_V);
+    for (int k = 0; k < circuit->bridge.legs; k++) {
+        truth->i_A[k] = leg_A(plant, k);
     }
 }

@@ -1,10 +1,10 @@
 /* The motor, its inverter, DC link, sensors and load, in double precision and SI units.
  *
- * Truth for every test of the firmware, so it shares no code with it. METHODS.md 0.2: E1, E2, E6, E8,
- * E9, E10, E13, E14, E15. Between two switching instants (PWM edges, dead times, diodes starting or
- * ceasing to conduct) the circuit is fixed and its equations are integrated by an error-controlled step.
- * Parts: machine.h, gates.h (timer, dead time), bridge.h (switches, diodes, floating legs), dclink.h,
- * mechanics.h, sensor.h; circuit.h puts them together.
+ * Truth for every test of the firmware, so it shares no code with it. METHODS.md 0.2, E1 to E19. Between
+ * two switching instants (PWM edges, dead times, diodes starting or ceasing to conduct) the circuit is fixed
+ * and its equations are integrated by an error-controlled step.
+ * Parts: plant_config.h (what it is made of), machine.h, gates.h (timer, dead time), bridge.h (switches,
+ * diodes, floating legs), dclink.h, mechanics.h, sensor.h; circuit.h puts them together.
  *
  * Use: plant_create(), then for each PWM period plant_sample() -> control -> plant_set_pwm() for the
  * period that follows the coming one (the plant holds the one-period update delay), plant_run_period().
@@ -18,66 +18,11 @@
 #ifndef PLANT_H
 #define PLANT_H
 
-#include <stdbool.h>
-#include <stdint.h>
+#include "sim_plant/plant_config.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-#define PLANT_LEGS 3
-
-typedef struct {
-    double R_s_ohm;
-    double L_d0_H;   /* core constants of the energy form: i_d = psi_d/L_d0 + c psi_d |psi|^4 - i_f, */
-    double L_q0_H;   /* i_q = psi_q/L_q0 + c psi_q |psi|^4, |psi|^2 = psi_d^2 + psi_q^2               */
-    double c_A_Wb5;  /* saturation coefficient; 0: linear machine */
-    double psi_m_Wb; /* open-circuit magnet flux; i_f follows from it */
-    int pole_pairs;
-} plant_machine_t;
-
-typedef struct {
-    double J_kgm2;
-    double B_Nms;        /* viscous */
-    double T_coulomb_Nm; /* dry friction, with true sticking at standstill */
-    bool locked;         /* rotor held */
-} plant_mech_t;
-
-typedef struct {
-    double f_pwm_Hz;
-    double dead_time_s;
-    double v_switch_V;     /* drop of a closed switch, against the current in either direction */
-    double v_diode_V;      /* drop of a diode while both switches of its leg are open */
-    double r_on_ohm;       /* in series with both */
-    uint32_t timer_counts; /* carrier counts in half a period: resolution of an edge */
-} plant_inverter_t;
-
-typedef struct {
-    double v_source_V;
-    double r_source_ohm;
-    double c_F;         /* 0: stiff link */
-    bool source_blocks; /* rectifier-fed: no current back into the source */
-} plant_dclink_t;
-
-typedef struct {
-    int bits;              /* 0: ideal converter (no rounding, full-scale still clips) */
-    double i_full_scale_A; /* codes span -fs ... +fs */
-    double v_full_scale_V; /* DC-link channel spans 0 ... fs */
-    double noise_lsb;      /* rms, at the converter */
-    double gain_error[PLANT_LEGS];
-    double offset_A[PLANT_LEGS];
-    double delay_s; /* sample instant after the centre of the zero vector; may be negative */
-    uint64_t seed;
-} plant_sensor_t;
-
-typedef struct {
-    plant_machine_t machine;
-    plant_mech_t mech;
-    plant_inverter_t inverter;
-    plant_dclink_t dclink;
-    plant_sensor_t sensor;
-    double tolerance; /* relative local error of the integrator; 0: 1e-6 */
-} plant_config_t;
 
 /* What the timer is told for one period. Compare values are counts of the half carrier: the high side
  * is on while the carrier is below compare, so compare/timer_counts is the duty of that half. */
@@ -88,9 +33,29 @@ typedef struct {
 
 /* Converter codes, left-aligned to 16 bits as the MCU delivers them; mid-scale is zero current. */
 typedef struct {
-    uint16_t i_leg[PLANT_LEGS];
+    uint16_t i_leg[PLANT_LEGS]; /* single shunt: the link current in [0] */
     uint16_t v_dc;
+    uint16_t v_leg[PLANT_LEGS];
+    uint16_t v_neutral[PLANT_SETS];
+    uint16_t temperature;
+    uint8_t settled; /* bit k: i_leg[k] was sampled in its valid window */
 } plant_adc_t;
+
+/* An edge of a terminal comparator, in counts of capture_s since the start of the period it fell into. */
+typedef struct {
+    uint32_t count;
+    uint8_t leg;
+    bool rising;
+} plant_capture_t;
+
+typedef enum {
+    PLANT_HEALTHY,
+    PLANT_UPPER_OPEN, /* a switch that no longer closes, ... */
+    PLANT_LOWER_OPEN,
+    PLANT_UPPER_SHORT, /* ... or no longer opens */
+    PLANT_LOWER_SHORT,
+    PLANT_WIRE_OPEN /* the terminal of the motor has come off the leg */
+} plant_leg_fault_t;
 
 /* Truth, for tests and traces only. */
 typedef struct {
@@ -102,8 +67,13 @@ typedef struct {
     double omega_mech_rad_s;
     double torque_Nm;
     double v_dc_V;
-    double v_leg_V[PLANT_LEGS];           /* terminals against the negative rail, just before t */
-    double v_mean_alpha_V, v_mean_beta_V; /* mean terminal voltage over the last complete period */
+    double v_leg_V[PLANT_LEGS];     /* terminals against the negative rail, just before t */
+    double v_neutral_V[PLANT_SETS]; /* star points against the negative rail */
+    double v_zero_V[PLANT_SETS];    /* zero sequence of the phase voltages: star network against neutral */
+    double i_zero_A;                /* of an open winding */
+    double i_dc_A;                  /* from the link into the legs */
+    double v_mean_alpha_V, v_mean_beta_V; /* mean terminal voltage of set 0 over the last complete period */
+    double omega_load_rad_s;              /* of the second mass */
     /* Energies since init: e_in (from the link into the legs) = e_copper + e_device (drops, r_on) + e_mech
      * (shaft) + e_field (change of the stored energy). */
     double e_in_J, e_copper_J, e_device_J, e_mech_J, e_field_J;
@@ -121,8 +91,17 @@ void plant_set_speed(plant_t *plant, double omega_mech_rad_s); /* imposed by an 
 void plant_free_speed(plant_t *plant);                         /* ... and released again */
 void plant_set_locked(plant_t *plant, bool locked);
 void plant_set_source(plant_t *plant, double v_source_V);
-plant_machine_t *plant_machine(plant_t *plant); /* R, psi_m drift; next period on */
+plant_machine_t *plant_machine(plant_t *plant); /* drift; next period on */
 plant_sensor_t *plant_sensor(plant_t *plant);   /* sensor faults */
+void plant_set_temperature(plant_t *plant, double winding_degC, double magnet_degC);
+void plant_set_leg_fault(plant_t *plant, int leg, plant_leg_fault_t fault);
+void plant_set_supply(plant_t *plant, bool connected); /* lost supply: the link runs on its capacitor */
+/* Ties two terminals, or one to the negative rail (leg_b < 0), through a resistance and 1 uH; R < 0 opens. */
+void plant_set_short(plant_t *plant, int leg_a, int leg_b, double R_ohm);
+
+/* Further sample instants, from the start of a period and in order of time, beside the one of plant_sample().
+ */
+void plant_set_instants(plant_t *plant, const double after_s[], int count);
 
 /* A slip: flux linkages are kept, so currents jump, but for those of floating legs. */
 void plant_turn_rotor(plant_t *plant, double angle_e_rad);
@@ -132,6 +111,15 @@ void plant_sample(plant_t *plant, plant_adc_t *adc);
 void plant_set_pwm(plant_t *plant, const plant_pwm_t *pwm); /* takes effect after the coming period */
 void plant_trip(plant_t *plant);                            /* all legs off, at once, until plant_set_pwm */
 void plant_run_period(plant_t *plant);
+
+void plant_sampled(plant_t *plant, int n, plant_adc_t *adc); /* further instant n of the last period */
+
+/* Comparator edges of the last period, oldest first; returns their number, at most `most` are written. */
+int plant_captured(const plant_t *plant, plant_capture_t captured[], int most);
+
+/* Without inverter: ideal sources hold the legs at the given voltages for that long. `pmsim plant`. With
+ * rate_rad_s2 the imposed speed moves linearly. */
+void plant_run_voltages(plant_t *plant, const double v_leg_V[], double rate_rad_s2, double duration_s);
 void plant_truth(const plant_t *plant, plant_truth_t *truth);
 
 #ifdef __cplusplus

@@ -1,8 +1,12 @@
 #include "sim_plant/sensor.h"
 
+#include <assert.h>
 #include <math.h>
 
-#define CODE_BITS 16
+#define CODE_BITS         16
+#define MID_SCALE         0x8000u
+#define SETTLE_CONSTANTS  5.0 /* time constants of a shunt's amplifier in settle_s */
+#define T_FULL_SCALE_DEGC 200.0
 
 void noise_seed(noise_t *noise, uint64_t seed)
 {
@@ -38,26 +42,90 @@ double noise_gaussian(noise_t *noise)
     return x * scale;
 }
 
+static int resolution(const plant_sensor_t *sensor)
+{
+    return sensor->bits > 0 ? sensor->bits : CODE_BITS;
+}
+
+static double draw_lsb(const plant_sensor_t *sensor, noise_t *noise)
+{
+    return sensor->bits > 0 && sensor->noise_lsb > 0.0 ? sensor->noise_lsb * noise_gaussian(noise) : 0.0;
+}
+
 /* lsb: the value in converter steps above code zero */
-static uint16_t convert(const plant_sensor_t *sensor, noise_t *noise, int bits, double lsb)
+static uint16_t code(int bits, double lsb)
 {
-    double top = ldexp(1.0, bits) - 1.0;
-    if (sensor->bits > 0 && sensor->noise_lsb > 0.0) {
-        lsb += sensor->noise_lsb * noise_gaussian(noise);
-    }
-    double code = fmin(fmax(round(lsb), 0.0), top);
-    return (uint16_t)((unsigned)code << (CODE_BITS - bits));
+    unsigned top = (1u << bits) - 1u;
+    unsigned steps = lsb >= top ? top : lsb > 0.0 ? (unsigned)round(lsb) : 0u;
+    return (uint16_t)(steps << (CODE_BITS - bits));
 }
 
-uint16_t sensor_current(const plant_sensor_t *sensor, noise_t *noise, int leg, double i_A)
+static uint16_t bipolar(int bits, double share, double noise_lsb)
 {
-    int bits = sensor->bits > 0 ? sensor->bits : CODE_BITS;
+    return code(bits, (share + 1.0) * (1u << (bits - 1)) + noise_lsb);
+}
+
+static uint16_t unipolar(int bits, double share, double noise_lsb)
+{
+    return code(bits, share * (1u << bits) + noise_lsb);
+}
+
+static uint16_t current(const plant_sensor_t *sensor, noise_t *noise, int leg, double i_A)
+{
     double seen_A = (1.0 + sensor->gain_error[leg]) * i_A + sensor->offset_A[leg];
-    return convert(sensor, noise, bits, ldexp(seen_A / sensor->i_full_scale_A + 1.0, bits - 1));
+    return bipolar(resolution(sensor), seen_A / sensor->i_full_scale_A, draw_lsb(sensor, noise));
 }
 
-uint16_t sensor_voltage(const plant_sensor_t *sensor, noise_t *noise, double v_V)
+/* Output of a shunt's amplifier so long after its current has come on. */
+static double shunt_A(const plant_sensor_t *sensor, double i_A, double after_s)
 {
-    int bits = sensor->bits > 0 ? sensor->bits : CODE_BITS;
-    return convert(sensor, noise, bits, ldexp(v_V / sensor->v_full_scale_V, bits));
+    if (after_s >= sensor->settle_s) {
+        return i_A;
+    }
+    return after_s > 0.0 ? -expm1(-SETTLE_CONSTANTS * after_s / sensor->settle_s) * i_A : 0.0;
+}
+
+static void convert_currents(const plant_sensor_t *sensor, noise_t *noise, const sensor_input_t *input,
+                             plant_adc_t *adc)
+{
+    bool in_line = sensor->shunt == PLANT_IN_LINE;
+    bool single = sensor->shunt == PLANT_SINGLE_SHUNT;
+    int shunts = single ? 1 : input->legs;
+    for (int k = 0; k < shunts; k++) {
+        double i_A = single ? input->i_dc_A : input->i_A[k];
+        double after_s = in_line ? (double)INFINITY : single ? input->quiet_s : input->low_for_s[k];
+        adc->i_leg[k] = current(sensor, noise, k, shunt_A(sensor, i_A, after_s));
+        adc->settled |= (uint8_t)((after_s >= sensor->settle_s) << k);
+    }
+    for (int k = shunts; k < PLANT_LEGS; k++) {
+        adc->i_leg[k] = MID_SCALE;
+    }
+}
+
+/* n: of the divider, neutrals after all terminals */
+static uint16_t divided(const plant_sensor_t *sensor, noise_t *noise, int n, double v_V)
+{
+    bool own = sensor->v_leg_full_scale_V > 0.0;
+    double full_scale_V = own ? sensor->v_leg_full_scale_V : sensor->v_full_scale_V;
+    double noise_lsb = own ? draw_lsb(sensor, noise) : 0.0;
+    return unipolar(resolution(sensor), (1.0 + sensor->divider_error[n]) * v_V / full_scale_V, noise_lsb);
+}
+
+void sensor_convert(const plant_sensor_t *sensor, noise_t *noise, const sensor_input_t *input,
+                    plant_adc_t *adc)
+{
+    assert(input->legs <= PLANT_LEGS && input->sets <= PLANT_SETS);
+    int bits = resolution(sensor);
+    *adc = (plant_adc_t){.settled = 0};
+    convert_currents(sensor, noise, input, adc);
+    adc->v_dc = unipolar(bits, input->v_dc_V / sensor->v_full_scale_V, draw_lsb(sensor, noise));
+    for (int k = 0; k < input->legs; k++) {
+        adc->v_leg[k] = divided(sensor, noise, k, input->v_leg_V[k]);
+    }
+    for (int set = 0; set < input->sets; set++) {
+        adc->v_neutral[set] = divided(sensor, noise, PLANT_LEGS + set, input->v_neutral_V[set]);
+    }
+    double t_full_scale_degC =
+        sensor->t_full_scale_degC > 0.0 ? sensor->t_full_scale_degC : T_FULL_SCALE_DEGC;
+    adc->temperature = bipolar(bits, input->temperature_degC / t_full_scale_degC, 0.0);
 }

@@ -1,9 +1,21 @@
-/* Current and voltage converters (METHODS.md 0.2 E8).
+/* Current, voltage and temperature converters (METHODS.md 0.2 E8, E12).
  *
- * code = round(((1 + gain_error) i + offset) / full scale * 2^(bits-1) + noise) + 2^(bits-1), clipped to
- * the range of the converter and left-aligned to 16 bits; the DC-link channel is unipolar and has noise
- * only. bits = 0: sixteen bits, the finest that the answer can carry, without noise.
- * The noise is Gaussian from an own generator: equal seeds give equal runs. Tests: sensor_test.cpp. */
+ * Currents: code = round(((1 + gain_error) i + offset) / full scale * 2^(bits-1) + noise) + 2^(bits-1),
+ * clipped to the range of the converter and left-aligned to 16 bits. bits = 0: sixteen bits, the finest that
+ * the answer can carry, without noise. In line:      the leg's current; always settled. Low side:     the
+ * leg's current while its lower switch or diode conducts, else zero current. Single shunt: the link current
+ * in i_leg[0], with gain_error[0] and offset_A[0]. Channels without a shunt read mid-scale. A shunt's
+ * amplifier starts from zero current, after the lower path of its leg has closed or, with a single shunt,
+ * after the last edge of any leg, and approaches the current with the time constant settle_s / 5. At settle_s
+ * the remaining e^-5 (0.7 %) counts as none: from there on the reading is exact and its `settled` bit is set.
+ * Where the current ends the reading is zero at once.
+ *
+ * Voltages are unipolar. The DC link has noise only; terminals and neutrals, which the caller has filtered
+ * (probe.h), have the gain of their divider too. Temperature is bipolar, without noise.
+ *
+ * The noise is Gaussian from an own generator: equal seeds give equal runs. Drawn in the order i_leg, v_dc,
+ * v_leg, v_neutral; the last two only with v_leg_full_scale_V > 0, else they are free of noise.
+ * Tests: sensor_test.cpp. */
 #ifndef PLANT_SENSOR_H
 #define PLANT_SENSOR_H
 
@@ -15,10 +27,24 @@ typedef struct {
     bool has_spare;
 } noise_t;
 
+typedef struct {
+    double i_A[PLANT_LEGS];
+    double v_leg_V[PLANT_LEGS]; /* behind the filter, as v_neutral_V */
+    double v_neutral_V[PLANT_SETS];
+    double v_dc_V;
+    double i_dc_A;
+    double temperature_degC;
+    double
+        low_for_s[PLANT_LEGS]; /* how long the lower switch or diode has conducted; negative: it does not */
+    double quiet_s;            /* since the last edge of any leg */
+    int legs, sets;
+} sensor_input_t;
+
 void noise_seed(noise_t *noise, uint64_t seed);
 double noise_gaussian(noise_t *noise);
 
-uint16_t sensor_current(const plant_sensor_t *sensor, noise_t *noise, int leg, double i_A);
-uint16_t sensor_voltage(const plant_sensor_t *sensor, noise_t *noise, double v_V);
+/* Writes every member of *adc; currents beyond legs read mid-scale, voltages zero. */
+void sensor_convert(const plant_sensor_t *sensor, noise_t *noise, const sensor_input_t *input,
+                    plant_adc_t *adc);
 
 #endif

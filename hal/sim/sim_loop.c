@@ -11,7 +11,7 @@ static bool comparators_trip(const sim_loop_t *loop)
     }
     plant_truth_t truth;
     plant_truth(loop->plant, &truth);
-    for (int leg = 0; leg < PLANT_LEGS; ++leg) {
+    for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
         if (fabs(truth.i_A[leg]) > loop->i_break_A) {
             return true;
         }
@@ -33,7 +33,7 @@ void sim_loop_step(sim_loop_t *loop)
 {
     plant_adc_t adc;
     plant_sample(loop->plant, &adc);
-    for (int leg = 0; leg < PLANT_LEGS; ++leg) {
+    for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
         loop->in.i_leg[leg] = adc.i_leg[leg];
     }
     loop->in.v_dc = adc.v_dc;
@@ -45,8 +45,8 @@ void sim_loop_step(sim_loop_t *loop)
         drive_slow(&loop->drive, &slow);
     }
 
-    plant_pwm_t pwm;
-    for (int leg = 0; leg < PLANT_LEGS; ++leg) {
+    plant_pwm_t pwm = {0};
+    for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
         pwm.compare[leg][0] = loop->out.compare[leg][0];
         pwm.compare[leg][1] = loop->out.compare[leg][1];
         pwm.driven[leg] = loop->out.driven[leg];

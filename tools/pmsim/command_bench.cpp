@@ -5,6 +5,7 @@
 
 #include "tools/pmsim/commands.h"
 #include "tools/pmsim/loop.h"
+#include "tools/pmsim/notes.h"
 #include "tools/pmsim/record_file.h"
 #include "tools/pmsim/settings_option.h"
 
@@ -42,6 +43,7 @@ void bench(const Options &options)
 {
     const ScenarioFile file(options.scenario, parse_settings(options.settings));
     const Scenario scenario = file.scenario(file.runs().front());
+    print_notes(scenario.setup);
     const Recording recording = record_scenario(scenario, UINT64_MAX);
     const std::vector<record_period_t> &periods = recording.periods;
     const double f_Hz = scenario.setup.plant.inverter.f_pwm_Hz;

@@ -4,6 +4,7 @@
 
 #include "tools/pmsim/commands.h"
 #include "tools/pmsim/loop.h"
+#include "tools/pmsim/notes.h"
 #include "tools/pmsim/record_file.h"
 #include "tools/pmsim/settings_option.h"
 
@@ -25,7 +26,9 @@ void record(const Options &options)
         throw InputError(options.scenario + ": stands for " + std::to_string(file.runs().size()) +
                          " runs; choose one with --set");
     }
-    const Recording recording = record_scenario(file.scenario(file.runs().front()), options.periods);
+    const Scenario scenario = file.scenario(file.runs().front());
+    print_notes(scenario.setup);
+    const Recording recording = record_scenario(scenario, options.periods);
     write_recording(recording, options.out);
     std::cout << options.out << ": " << recording.periods.size() << " control periods\n";
 }

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "tools/pmsim/commands.h"
+#include "tools/pmsim/notes.h"
 #include "tools/pmsim/report.h"
 #include "tools/pmsim/settings_option.h"
 #include "tools/pmsim/text.h"
@@ -57,6 +58,7 @@ std::string timing_line(const ScenarioFile &file, double simulated_s, double wal
 int run(const Options &options)
 {
     const ScenarioFile file(options.scenario, parse_settings(options.settings));
+    print_notes(file.scenario(file.runs().front()).setup);
     const std::filesystem::path out = options.out;
     if (!options.out.empty()) {
         std::filesystem::create_directories(out);

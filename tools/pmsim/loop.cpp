@@ -25,6 +25,10 @@ static rig_t *create(const Scenario &scenario)
     rig_t *rig = rig_create(&scenario.setup.plant, scenario.theta_e_rad, &scenario.setup.params,
                             refusal_expected(scenario), error, sizeof error);
     if (rig == nullptr) {
+        const std::string reason = error, plant = "plant: ";
+        if (reason.rfind(plant, 0) == 0) {
+            refuse_plant(scenario.setup, reason.substr(plant.size()));
+        }
         throw InputError(scenario.setup.name + ": " + error);
     }
     return rig;

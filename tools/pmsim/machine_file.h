@@ -1,16 +1,45 @@
-// Machine files: sim_plant/machines/*.yaml. Format: docs/pmsim.md.
+// Machine files, sim_plant/machines/*.yaml, and what is laid over them: the sections of a scenario, then the
+// settings of the command line. Format: docs/pmsim.md. Tests: tests/unit/pmsim/machine_file_test.cpp,
+// plant_run_test.cpp.
 #ifndef PMSIM_MACHINE_FILE_H
 #define PMSIM_MACHINE_FILE_H
 
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "tools/pmsim/setup.h"
 
 namespace pmsim
 {
 
+using Settings = std::vector<std::pair<std::string, std::string>>; // --set name=value
+
 Setup read_machine(const Value &value); // the content of a machine file
 Setup load_machine_file(const std::string &path);
+
+// `machine:` of a document, its other sections and the settings.
+Setup read_layers(const Map &document, const Settings &settings);
+
+void apply_settings(Setup &setup, const Settings &settings);
+
+// The last one of this name.
+std::optional<Value> setting_value(const Settings &settings, const std::string &name);
+
+// Refuses a name that is none of `known`, no drive parameter and no section.key.
+void check_settings(const Settings &settings, std::vector<std::string> known);
+
+// A number in degrees, or the word random.
+double read_angle(const Value &value, uint64_t seed);
+
+// What `pmsim plant` takes: a machine file, or any document with `machine:`, of a sweep the first run.
+struct PlantFile {
+    Setup setup;
+    double theta_e_rad;
+};
+PlantFile load_plant_file(const std::string &path, const Settings &settings = {});
+PlantFile read_plant_file(const Value &document, const Settings &settings = {});
 
 } // namespace pmsim
 

@@ -15,6 +15,8 @@ Profile::Profile(const Scenario &scenario, rig_t *rig)
     const auto preset = [this](Channel channel, double value) { ramp(channel).now = value; };
     preset(Channel::v_source_V, scenario.setup.plant.dclink.v_source_V);
     preset(Channel::temperature_degC, room_degC);
+    preset(Channel::winding_degC, room_degC);
+    preset(Channel::magnet_degC, room_degC);
     preset(Channel::R_s_ohm, scenario.setup.plant.machine.R_s_ohm);
     preset(Channel::psi_m_Wb, scenario.setup.plant.machine.psi_m_Wb);
     preset(Channel::L_d0_H, scenario.setup.plant.machine.L_d0_H);
@@ -70,6 +72,7 @@ void Profile::start_events(double t_s, double omega_mech_rad_s)
 void Profile::start(const Event &event, double t_s, double omega_mech_rad_s)
 {
     start_switches(event);
+    start_faults(event);
     for (size_t i = 0; i < channel_count; ++i) {
         if (!event.targets[i]) {
             continue;
@@ -104,14 +107,22 @@ void Profile::start_switches(const Event &event)
     if (event.locked) {
         plant_set_locked(plant, *event.locked);
     }
-    if (event.hw_fault) {
-        rig_set_hw_fault(rig_, *event.hw_fault);
-    }
     if (event.free) {
         plant_free_speed(plant);
         imposed_ = false;
         ramp(Channel::imposed_speed_rad_s).moving = false;
     }
+    if (event.rotor_slip_rad) {
+        plant_turn_rotor(plant, *event.rotor_slip_rad);
+    }
+    if (event.clear_fault) {
+        rig_clear_fault(rig_);
+    }
+}
+
+void Profile::start_faults(const Event &event)
+{
+    plant_t *plant = rig_plant(rig_);
     for (size_t leg = 0; leg < PLANT_LEGS; ++leg) {
         if (event.sensor_offset_A) {
             plant_sensor(plant)->offset_A[leg] = (*event.sensor_offset_A)[leg];
@@ -120,11 +131,18 @@ void Profile::start_switches(const Event &event)
             plant_sensor(plant)->gain_error[leg] = (*event.sensor_gain_error)[leg];
         }
     }
-    if (event.rotor_slip_rad) {
-        plant_turn_rotor(plant, *event.rotor_slip_rad);
+    if (event.hw_fault) {
+        rig_set_hw_fault(rig_, *event.hw_fault);
     }
-    if (event.clear_fault) {
-        rig_clear_fault(rig_);
+    if (event.leg_fault) {
+        plant_set_leg_fault(plant, event.leg_fault->leg, event.leg_fault->kind);
+    }
+    if (event.short_circuit) {
+        const ShortCircuit &tie = *event.short_circuit;
+        plant_set_short(plant, tie.leg_a, tie.leg_b, tie.R_ohm);
+    }
+    if (event.supply) {
+        plant_set_supply(plant, *event.supply);
     }
 }
 
@@ -182,6 +200,10 @@ void Profile::apply(Channel channel, double value)
         break;
     case Channel::c_A_Wb5:
         plant_machine(plant)->c_A_Wb5 = value;
+        break;
+    case Channel::winding_degC:
+    case Channel::magnet_degC:
+        plant_set_temperature(plant, ramp(Channel::winding_degC).now, ramp(Channel::magnet_degC).now);
         break;
     case Channel::load_Nm:
     case Channel::load_fan_Nm:

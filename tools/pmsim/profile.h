@@ -37,6 +37,7 @@ class Profile
     void start_events(double t_s, double omega_mech_rad_s);
     void start(const Event &event, double t_s, double omega_mech_rad_s);
     void start_switches(const Event &event);
+    void start_faults(const Event &event);
     void move_ramps(double t_s);
     void apply(Channel channel, double value);
     void apply_load(double omega_mech_rad_s);

@@ -1,6 +1,7 @@
 // `profile:` of a scenario: events and what they change.
 #include "tools/pmsim/names.h"
 #include "tools/pmsim/scenario_file.h"
+#include "tools/pmsim/text.h"
 
 namespace pmsim
 {
@@ -40,6 +41,8 @@ const ChannelKey channel_keys[] = {
     {"L_d0_H", Channel::L_d0_H, 1e-7, 10, nullptr},
     {"L_q0_H", Channel::L_q0_H, 1e-7, 10, nullptr},
     {"c_A_Wb5", Channel::c_A_Wb5, 0, 1e18, nullptr},
+    {"winding_degC", Channel::winding_degC, -100, 1000, nullptr},
+    {"magnet_degC", Channel::magnet_degC, -100, 1000, nullptr},
 };
 
 std::vector<std::string> event_keys()
@@ -55,11 +58,20 @@ std::vector<std::string> event_keys()
                                      "rotor_slip_deg",
                                      "free_speed",
                                      "clear_fault",
-                                     "sensor_gain_error"};
+                                     "sensor_gain_error",
+                                     "leg_fault",
+                                     "short",
+                                     "supply"};
     for (const ChannelKey &entry : channel_keys) {
         keys.emplace_back(entry.key);
     }
     return keys;
+}
+
+bool in_energy_form(Channel channel)
+{
+    return channel == Channel::psi_m_Wb || channel == Channel::L_d0_H || channel == Channel::L_q0_H ||
+           channel == Channel::c_A_Wb5;
 }
 
 void read_channels(Event &event, const Map &map, const Setup &setup)
@@ -73,24 +85,23 @@ void read_channels(Event &event, const Map &map, const Setup &setup)
         if (target) {
             throw InputError(map.key_place(entry.key), "the same value is set twice in one event");
         }
+        if (setup.flux_map && in_energy_form(entry.channel)) {
+            throw InputError(map.key_place(entry.key),
+                             "the machine has a flux map, which this does not change");
+        }
         target = value->number(entry.min, entry.max) * (entry.unit != nullptr ? entry.unit(setup) : 1.0);
     }
 }
 
-std::optional<std::array<double, PLANT_LEGS>> read_legs(const Map &map, const char *key)
+std::optional<std::array<double, PLANT_LEGS>> read_legs_of(const Map &map, const char *key,
+                                                           const Setup &setup)
 {
     const auto value = map.find(key);
     if (!value) {
         return std::nullopt;
     }
-    const std::vector<Value> list = value->list();
-    if (list.size() != PLANT_LEGS) {
-        value->fail("expected one value per leg: [a, b, c]");
-    }
     std::array<double, PLANT_LEGS> legs{};
-    for (size_t leg = 0; leg < PLANT_LEGS; ++leg) {
-        legs[leg] = list[leg].number(-1e5, 1e5);
-    }
+    read_legs(*value, leg_count(setup.plant), -1e5, 1e5, legs.data());
     return legs;
 }
 
@@ -107,6 +118,52 @@ int index_of(const std::vector<std::string> &names, const std::string &name)
         ++index;
     }
     return index;
+}
+
+const std::vector<std::string> leg_fault_names = {"none",        "upper_open",  "lower_open",
+                                                  "upper_short", "lower_short", "wire_open"};
+
+int read_leg(const Value &value, const Setup &setup)
+{
+    const auto legs = leg_names().begin();
+    return index_of(leg_names(), value.word({legs, legs + leg_count(setup.plant)}));
+}
+
+LegFault read_leg_fault(const Value &value, const Setup &setup)
+{
+    const Map map(value, {"leg", "kind"});
+    const int leg = read_leg(map.at("leg"), setup);
+    const std::string kind = map.at("kind").word(leg_fault_names);
+    return {leg, static_cast<plant_leg_fault_t>(index_of(leg_fault_names, kind))};
+}
+
+ShortCircuit read_short(const Value &value, const Setup &setup)
+{
+    if (value.is_scalar()) {
+        value.word({"none"});
+        return {0, -1, -1.0};
+    }
+    const Map map(value, {"from", "to", "R_ohm"});
+    ShortCircuit tie{read_leg(map.at("from"), setup), -1, map.at("R_ohm").number(0, 1e6)};
+    const Value to = map.at("to");
+    if (to.text() != "rail") {
+        tie.leg_b = read_leg(to, setup);
+        if (tie.leg_b == tie.leg_a) {
+            to.fail("a terminal cannot be shorted to itself");
+        }
+    }
+    return tie;
+}
+
+// A temperature that would leave no resistance or no magnets.
+void check_temperature(const Map &map, const char *key, double alpha_1_K)
+{
+    const double room_degC = 25.0, least = 0.01;
+    if (const auto value = map.find(key)) {
+        if (!(1.0 + alpha_1_K * (value->number(-100, 1000) - room_degC) >= least)) {
+            value->fail("at this temperature the coefficient " + format(alpha_1_K) + "/K leaves nothing");
+        }
+    }
 }
 
 } // namespace
@@ -132,11 +189,20 @@ Event read_event(const Value &value, const Setup &setup)
     event.hw_fault = read_flag(map, "hw_fault");
     event.free = read_flag(map, "free_speed").value_or(false);
     event.clear_fault = read_flag(map, "clear_fault").value_or(false);
-    event.sensor_offset_A = read_legs(map, "sensor_offset_A");
-    event.sensor_gain_error = read_legs(map, "sensor_gain_error");
+    event.sensor_offset_A = read_legs_of(map, "sensor_offset_A", setup);
+    event.sensor_gain_error = read_legs_of(map, "sensor_gain_error", setup);
     if (const auto slip = map.find("rotor_slip_deg")) {
         event.rotor_slip_rad = slip->number(-360, 360) * two_pi / 360.0;
     }
+    if (const auto fault = map.find("leg_fault")) {
+        event.leg_fault = read_leg_fault(*fault, setup);
+    }
+    if (const auto tie = map.find("short")) {
+        event.short_circuit = read_short(*tie, setup);
+    }
+    event.supply = read_flag(map, "supply");
+    check_temperature(map, "winding_degC", setup.plant.winding.alpha_R_1_K);
+    check_temperature(map, "magnet_degC", setup.plant.winding.alpha_psi_1_K);
     return event;
 }
 

@@ -176,7 +176,7 @@ void rig_record(const rig_t *rig, record_period_t *record)
         .current_mA = rig->command.current_mA,
         .temperature_dC = rig->loop.temperature_dC,
     };
-    for (int leg = 0; leg < PLANT_LEGS; ++leg) {
+    for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
         record->i_leg[leg] = rig->loop.in.i_leg[leg];
         record->compare[leg][0] = rig->loop.out.compare[leg][0];
         record->compare[leg][1] = rig->loop.out.compare[leg][1];
@@ -187,9 +187,9 @@ void rig_record(const rig_t *rig, record_period_t *record)
 void rig_step_plant(rig_t *rig, const record_period_t *record)
 {
     plant_adc_t adc;
-    plant_pwm_t pwm;
+    plant_pwm_t pwm = {0};
     plant_sample(rig->loop.plant, &adc);
-    for (int leg = 0; leg < PLANT_LEGS; ++leg) {
+    for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
         pwm.compare[leg][0] = record->compare[leg][0];
         pwm.compare[leg][1] = record->compare[leg][1];
         pwm.driven[leg] = record->driven[leg] != 0U;

@@ -28,10 +28,22 @@ enum class Channel {
     L_d0_H,
     L_q0_H,
     c_A_Wb5,
+    winding_degC, // of the machine itself, by its temperature coefficients
+    magnet_degC,
     count
 };
 
 constexpr size_t channel_count = static_cast<size_t>(Channel::count);
+
+struct LegFault {
+    int leg;
+    plant_leg_fault_t kind;
+};
+
+struct ShortCircuit { // of terminals; leg_b < 0: to the negative rail; R_ohm < 0: ended
+    int leg_a, leg_b;
+    double R_ohm;
+};
 
 struct Event {
     double t_s = 0.0; // of the scenario, or after `state` was first entered
@@ -42,7 +54,10 @@ struct Event {
     std::optional<int> mode;
     std::optional<std::array<double, PLANT_LEGS>> sensor_offset_A, sensor_gain_error;
     std::optional<double> rotor_slip_rad; // electrical
-    bool free = false;                    // ends an imposed speed
+    std::optional<LegFault> leg_fault;
+    std::optional<ShortCircuit> short_circuit;
+    std::optional<bool> supply; // false: lost
+    bool free = false;          // ends an imposed speed
     bool clear_fault = false;
 };
 

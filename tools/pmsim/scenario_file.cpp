@@ -1,10 +1,7 @@
 #include "tools/pmsim/scenario_file.h"
 
 #include <algorithm>
-#include <cmath>
-#include <filesystem>
 
-#include "tools/pmsim/machine_file.h"
 #include "tools/pmsim/metrics.h"
 #include "tools/pmsim/text.h"
 
@@ -13,7 +10,6 @@ namespace pmsim
 namespace
 {
 
-const double two_pi = 6.283185307179586;
 const double max_periods = 1e9;
 
 std::vector<std::string> scenario_keys()
@@ -26,44 +22,6 @@ std::vector<std::string> scenario_keys()
     return keys;
 }
 
-Map open_document(const Value &document)
-{
-    static const std::vector<std::string> known = scenario_keys();
-    return Map(document, known);
-}
-
-// A machine file's path is relative to the file that names it.
-Setup read_machine_of(const Map &document)
-{
-    const Value machine = document.at("machine");
-    if (machine.is_map()) {
-        return read_machine(machine);
-    }
-    namespace fs = std::filesystem;
-    const fs::path path = fs::path(machine.file()).parent_path() / machine.text();
-    if (!fs::is_regular_file(path)) {
-        machine.fail("there is no machine file " + path.lexically_normal().string());
-    }
-    return load_machine_file(path.lexically_normal().string());
-}
-
-// Uniform in 0 ... 1 (splitmix64), so that a seed gives the same rotor angle everywhere.
-double random_fraction(uint64_t seed)
-{
-    uint64_t z = seed + 0x9e3779b97f4a7c15U;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9U;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
-    return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
-}
-
-double read_angle(const Value &value, uint64_t seed)
-{
-    if (value.is_scalar() && value.text() == "random") {
-        return two_pi * random_fraction(seed);
-    }
-    return value.number(-360, 360) * two_pi / 360.0;
-}
-
 void read_window(Scenario &scenario, Expectation &expectation, const Value &item)
 {
     expectation.t1_s = std::min(expectation.t1_s, scenario.duration_s);
@@ -73,7 +31,46 @@ void read_window(Scenario &scenario, Expectation &expectation, const Value &item
     }
 }
 
+bool can_be(const plant_config_t &config, const char *&reason)
+{
+    plant_t *plant = plant_create(&config, 0.0, &reason);
+    plant_destroy(plant);
+    return plant != nullptr;
+}
+
+// The worst machine that the events can make together: the plant must be able to be it.
+void check_drift(const Scenario &scenario, const Value &profile)
+{
+    plant_config_t worst = scenario.setup.plant;
+    plant_machine_t &m = worst.machine;
+    const auto least = [&](Channel channel, double &value) {
+        for (const Event &event : scenario.profile) {
+            value = std::min(value, event.targets[static_cast<size_t>(channel)].value_or(value));
+        }
+    };
+    least(Channel::R_s_ohm, m.R_s_ohm);
+    least(Channel::L_d0_H, m.L_d0_H);
+    least(Channel::L_q0_H, m.L_q0_H);
+    const double c = m.c_A_Wb5, psi_m = m.psi_m_Wb;
+    for (const Event &event : scenario.profile) { // more of both saturates more
+        m.c_A_Wb5 = std::max(m.c_A_Wb5, event.targets[static_cast<size_t>(Channel::c_A_Wb5)].value_or(c));
+        m.psi_m_Wb =
+            std::max(m.psi_m_Wb, event.targets[static_cast<size_t>(Channel::psi_m_Wb)].value_or(psi_m));
+    }
+    const char *reason = nullptr;
+    const char *ignored = nullptr; // a machine that cannot be from the start is refused when it is made
+    if (!can_be(worst, reason) && can_be(scenario.setup.plant, ignored)) {
+        profile.fail(std::string("the events together make a machine that cannot be: ") + reason);
+    }
+}
+
 } // namespace
+
+Map open_scenario(const Value &document)
+{
+    static const std::vector<std::string> known = scenario_keys();
+    return Map(document, known);
+}
 
 ScenarioFile::ScenarioFile(const std::string &path, Settings settings)
     : ScenarioFile(Value::from_file(path), std::move(settings))
@@ -83,7 +80,7 @@ ScenarioFile::ScenarioFile(const std::string &path, Settings settings)
 ScenarioFile::ScenarioFile(const Value &document, Settings settings)
     : document_(document), settings_(std::move(settings))
 {
-    const Map map = open_document(document_);
+    const Map map = open_scenario(document_);
     Variables fixed;
     const std::vector<std::string> variables = variable_names(map);
     for (const auto &[name, value] : settings_) {
@@ -92,36 +89,16 @@ ScenarioFile::ScenarioFile(const Value &document, Settings settings)
         }
     }
     runs_ = expand_runs(map, fixed);
-    check_settings();
-}
-
-// --set: a variable, section.key, or the bare name of a drive parameter.
-void ScenarioFile::check_settings() const
-{
-    const std::vector<std::string> variables = variable_names(open_document(document_));
-    std::vector<std::string> known = parameter_names();
-    known.insert(known.end(), variables.begin(), variables.end());
-    for (const char *key : {"seed", "duration_s", "start.theta_e_deg", "machine"}) {
+    std::vector<std::string> known = variables;
+    for (const char *key : {"seed", "duration_s", "start.theta_e_deg"}) {
         known.emplace_back(key);
     }
-    for (const std::string &section : setup_sections()) {
-        for (const std::string &key : section_keys(section)) {
-            known.push_back(section);
-            known.back().append(".").append(key);
-        }
-    }
-    for (const auto &setting : settings_) {
-        if (std::find(known.begin(), known.end(), setting.first) == known.end()) {
-            const auto near = nearest(setting.first, known);
-            throw InputError("--set " + setting.first + ": no such variable, drive parameter or section.key" +
-                             did_you_mean(near));
-        }
-    }
+    check_settings(settings_, known);
 }
 
 std::string ScenarioFile::title() const
 {
-    return open_document(document_).at("title").text();
+    return open_scenario(document_).at("title").text();
 }
 
 const std::vector<Run> &ScenarioFile::runs() const
@@ -129,42 +106,17 @@ const std::vector<Run> &ScenarioFile::runs() const
     return runs_;
 }
 
-static std::optional<Value> setting_value(const Settings &settings, const std::string &name)
-{
-    for (auto it = settings.rbegin(); it != settings.rend(); ++it) {
-        if (it->first == name) {
-            return Value::from_text(it->second, "--set " + name);
-        }
-    }
-    return std::nullopt;
-}
-
-static void apply_settings(Setup &setup, const Settings &settings)
-{
-    const std::vector<std::string> &sections = setup_sections();
-    for (const auto &[name, text] : settings) {
-        const size_t dot = name.find('.');
-        const std::string section = dot == std::string::npos ? "drive" : name.substr(0, dot);
-        const std::string key = dot == std::string::npos ? name : name.substr(dot + 1);
-        const bool is_section = std::find(sections.begin(), sections.end(), section) != sections.end();
-        if (is_section && (section != "drive" || find_parameter(key))) {
-            read_setting(setup, section, key, Value::from_text(text, "--set " + name));
-        }
-    }
-}
-
 Scenario ScenarioFile::scenario(const Run &run) const
 {
-    const Map map = open_document(document_.with(&run.variables));
+    const Map map = open_scenario(document_.with(&run.variables));
     const auto value_of = [&](const std::string &key) {
         const auto set = setting_value(settings_, key);
         return set ? set : map.find(key);
     };
     Scenario scenario;
     scenario.title = map.at("title").text();
-    scenario.setup = read_machine_of(map);
-    read_sections(scenario.setup, map, false);
-    apply_settings(scenario.setup, settings_);
+    scenario.setup = read_layers(map, settings_);
+    require_drive(scenario.setup);
     if (const auto seed = value_of("seed")) {
         scenario.seed = static_cast<uint64_t>(seed->integer(0, int64_t(1) << 53));
     }
@@ -178,6 +130,7 @@ Scenario ScenarioFile::scenario(const Run &run) const
     for (const Value &item : map.at("profile").list()) {
         scenario.profile.push_back(read_event(item, scenario.setup));
     }
+    check_drift(scenario, map.at("profile"));
     if (const auto expect = map.find("expect")) {
         for (const Value &item : expect->list()) {
             scenario.expect.push_back(read_expectation(item));

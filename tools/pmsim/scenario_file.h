@@ -4,15 +4,13 @@
 #define PMSIM_SCENARIO_FILE_H
 
 #include <string>
-#include <utility>
 #include <vector>
 
+#include "tools/pmsim/machine_file.h"
 #include "tools/pmsim/scenario.h"
 
 namespace pmsim
 {
-
-using Settings = std::vector<std::pair<std::string, std::string>>; // --set name=value
 
 struct Run {
     std::string name; // "angle=30 direction=-1"; empty when the file has a single run
@@ -30,12 +28,12 @@ class ScenarioFile
     Scenario scenario(const Run &run) const; // reads the whole document with the run's variables
 
   private:
-    void check_settings() const;
-
     Value document_;
     Settings settings_;
     std::vector<Run> runs_;
 };
+
+Map open_scenario(const Value &document); // refuses unknown keys
 
 // All combinations of `cases` and `sweep`; a variable in `fixed` keeps that one value.
 std::vector<Run> expand_runs(const Map &document, const Variables &fixed);

@@ -1,74 +1,15 @@
 #include "tools/pmsim/setup.h"
 
+#include <algorithm>
 #include <cmath>
-#include <variant>
 
+#include "tools/pmsim/setup_fields.h"
 #include "tools/pmsim/text.h"
 
 namespace pmsim
 {
 namespace
 {
-
-using Triple = double (*)[PLANT_LEGS];
-using Target = std::variant<double *, int *, uint32_t *, bool *, Triple>;
-
-struct Field {
-    const char *section, *key;
-    double min, max;
-    bool required; // in a machine file
-    Target (*target)(Setup &);
-};
-
-#define PM_FIELD(section, key, min, max, required, member)                                                   \
-    {                                                                                                        \
-        section, key, min, max, required, [](Setup &s) -> Target { return &s.member; }                       \
-    }
-
-// Limits reject slips of the decimal point, not unusual machines.
-const Field fields[] = {
-    PM_FIELD("electrical", "R_s_ohm", 1e-4, 1e3, true, plant.machine.R_s_ohm),
-    PM_FIELD("electrical", "L_d0_H", 1e-7, 10, true, plant.machine.L_d0_H),
-    PM_FIELD("electrical", "L_q0_H", 1e-7, 10, true, plant.machine.L_q0_H),
-    PM_FIELD("electrical", "c_A_Wb5", 0, 1e18, true, plant.machine.c_A_Wb5),
-    PM_FIELD("electrical", "psi_m_Wb", 1e-5, 10, true, plant.machine.psi_m_Wb),
-    PM_FIELD("electrical", "pole_pairs", 1, 50, true, plant.machine.pole_pairs),
-
-    PM_FIELD("mechanics", "J_kgm2", 1e-9, 1e3, true, plant.mech.J_kgm2),
-    PM_FIELD("mechanics", "B_Nms", 0, 1e3, true, plant.mech.B_Nms),
-    PM_FIELD("mechanics", "T_coulomb_Nm", 0, 1e4, true, plant.mech.T_coulomb_Nm),
-    PM_FIELD("mechanics", "locked", 0, 1, false, plant.mech.locked),
-
-    PM_FIELD("rated", "i_rated_A", 1e-3, 1e4, true, rated.i_rated_A),
-    PM_FIELD("rated", "speed_rated_rad_s", 0.1, 1e5, true, rated.speed_rated_rad_s),
-    PM_FIELD("rated", "torque_rated_Nm", 1e-5, 1e5, true, rated.torque_rated_Nm),
-    PM_FIELD("rated", "v_dc_V", 1, 2000, true, rated.v_dc_V),
-
-    PM_FIELD("inverter", "f_pwm_Hz", 1000, 200e3, false, plant.inverter.f_pwm_Hz),
-    PM_FIELD("inverter", "dead_time_s", 0, 20e-6, false, plant.inverter.dead_time_s),
-    PM_FIELD("inverter", "v_switch_V", 0, 10, false, plant.inverter.v_switch_V),
-    PM_FIELD("inverter", "v_diode_V", 0, 10, false, plant.inverter.v_diode_V),
-    PM_FIELD("inverter", "r_on_ohm", 0, 100, false, plant.inverter.r_on_ohm),
-    PM_FIELD("inverter", "timer_counts", 100, 65535, false, plant.inverter.timer_counts),
-    PM_FIELD("inverter", "i_break_A", 0, 1e5, false, i_break_A),
-
-    PM_FIELD("sensor", "bits", 0, 16, false, plant.sensor.bits),
-    PM_FIELD("sensor", "i_full_scale_A", 1e-2, 1e5, false, plant.sensor.i_full_scale_A),
-    PM_FIELD("sensor", "v_full_scale_V", 1, 1e4, false, plant.sensor.v_full_scale_V),
-    PM_FIELD("sensor", "noise_lsb", 0, 100, false, plant.sensor.noise_lsb),
-    PM_FIELD("sensor", "gain_error", -1, 1, false, plant.sensor.gain_error),
-    PM_FIELD("sensor", "offset_A", -1e5, 1e5, false, plant.sensor.offset_A),
-    PM_FIELD("sensor", "delay_s", -1e-3, 1e-3, false, plant.sensor.delay_s),
-
-    PM_FIELD("dclink", "v_source_V", 0, 2000, false, plant.dclink.v_source_V),
-    PM_FIELD("dclink", "r_source_ohm", 0, 1e3, false, plant.dclink.r_source_ohm),
-    PM_FIELD("dclink", "c_F", 0, 10, false, plant.dclink.c_F),
-    PM_FIELD("dclink", "source_blocks", 0, 1, false, plant.dclink.source_blocks),
-
-    PM_FIELD("solver", "tolerance", 0, 1e-2, false, plant.tolerance),
-};
-
-#undef PM_FIELD
 
 // The defaults of parameters.def are one machine's: another must say its own.
 const drive_param_id_t required_parameters[] = {
@@ -81,30 +22,9 @@ const drive_param_id_t required_parameters[] = {
     DRIVE_PARAM_i_open_loop,
 };
 
-void assign(const Target &target, const Field &field, const Value &value)
-{
-    if (auto *const *number = std::get_if<double *>(&target)) {
-        **number = value.number(field.min, field.max);
-    } else if (auto *const *whole = std::get_if<int *>(&target)) {
-        **whole = static_cast<int>(value.integer(int64_t(field.min), int64_t(field.max)));
-    } else if (auto *const *count = std::get_if<uint32_t *>(&target)) {
-        **count = static_cast<uint32_t>(value.integer(int64_t(field.min), int64_t(field.max)));
-    } else if (auto *const *flag = std::get_if<bool *>(&target)) {
-        **flag = value.flag();
-    } else {
-        const std::vector<Value> legs = value.list();
-        if (legs.size() != PLANT_LEGS) {
-            value.fail("expected one value per leg: [a, b, c]");
-        }
-        for (size_t leg = 0; leg < PLANT_LEGS; ++leg) {
-            (*std::get<Triple>(target))[leg] = legs[leg].number(field.min, field.max);
-        }
-    }
-}
-
 const Field *find_field(const std::string &section, const std::string &key)
 {
-    for (const Field &field : fields) {
+    for (const Field &field : setup_fields()) {
         if (section == field.section && key == field.key) {
             return &field;
         }
@@ -112,16 +32,27 @@ const Field *find_field(const std::string &section, const std::string &key)
     return nullptr;
 }
 
-void require_all(const Map &map)
+bool replaced_by_map(const std::string &section, const std::string &key)
 {
-    for (const Field &field : fields) {
-        if (field.required) {
+    return section == "electrical" &&
+           (key == "L_d0_H" || key == "L_q0_H" || key == "c_A_Wb5" || key == "psi_m_Wb");
+}
+
+// `rated` and `drive` may be left out, but not half of them.
+void require_all(const Setup &setup, const Map &map)
+{
+    for (const Field &field : setup_fields()) {
+        const bool needed = field.need == Need::always || (field.need == Need::core && !setup.flux_map) ||
+                            (field.need == Need::drive && map.has(field.section));
+        if (needed) {
             Map(map.at(field.section)).at(field.key);
         }
     }
-    const Map drive(map.at("drive"));
-    for (const drive_param_id_t id : required_parameters) {
-        drive.at(drive_param_table[id].name);
+    if (const auto drive = map.find("drive")) {
+        const Map keys(*drive);
+        for (const drive_param_id_t id : required_parameters) {
+            keys.at(drive_param_table[id].name);
+        }
     }
 }
 
@@ -131,7 +62,7 @@ void derive_board_parameters(Setup &setup)
     const plant_inverter_t &inverter = setup.plant.inverter;
     const plant_sensor_t &sensor = setup.plant.sensor;
     const auto derive = [&setup](drive_param_id_t id, double si) {
-        if (setup.given.count(id) == 0) {
+        if (setup.given.count(std::string("drive.") + drive_param_table[id].name) == 0) {
             set_parameter_si(setup.params, id, si);
         }
     };
@@ -147,14 +78,38 @@ void derive_board_parameters(Setup &setup)
     derive(DRIVE_PARAM_i_noise, lsb_A * std::sqrt(sensor.noise_lsb * sensor.noise_lsb + 1.0 / 12.0));
 }
 
+void read_flux_map_section(Setup &setup, const Value &value)
+{
+    setup.flux_map = std::make_shared<const FluxMap>(read_flux_map(value));
+    setup.plant.map = setup.flux_map->table.get();
+    setup.plant.machine.psi_m_Wb = setup.flux_map->psi_m_Wb;
+    setup.given["flux_map"] = value.place();
+}
+
+// In the order of the table, since a list's length depends on what stands before it.
+void read_section(Setup &setup, const std::string &section, const Value &value)
+{
+    const std::vector<std::string> known = section_keys(section);
+    const Map map(value, known);
+    if (section == "winding" && map.has("emf") && map.has("trapezoid_flat_deg")) {
+        throw InputError(map.key_place("trapezoid_flat_deg"),
+                         "a trapezoid is a list of harmonics: it cannot stand beside emf");
+    }
+    for (const std::string &key : known) {
+        if (const auto found = map.find(key)) {
+            read_setting(setup, section, key, *found);
+        }
+    }
+}
+
 } // namespace
 
 const std::vector<std::string> &setup_sections()
 {
     static const std::vector<std::string> names = [] {
-        std::vector<std::string> list;
-        for (const Field &field : fields) {
-            if (list.empty() || list.back() != field.section) {
+        std::vector<std::string> list = {"flux_map"};
+        for (const Field &field : setup_fields()) {
+            if (list.back() != field.section) {
                 list.emplace_back(field.section);
             }
         }
@@ -170,7 +125,7 @@ std::vector<std::string> section_keys(const std::string &section)
         return parameter_names();
     }
     std::vector<std::string> keys;
-    for (const Field &field : fields) {
+    for (const Field &field : setup_fields()) {
         if (section == field.section) {
             keys.emplace_back(field.key);
         }
@@ -182,6 +137,8 @@ Setup default_setup()
 {
     Setup setup{};
     drive_params_default(&setup.params);
+    setup.trapezoid_flat_deg = -1.0;
+    setup.plant.winding.sets = 1;
     setup.plant.inverter.f_pwm_Hz = 10e3;
     setup.plant.inverter.dead_time_s = 2e-6;
     setup.plant.inverter.v_switch_V = 1.0;
@@ -200,17 +157,25 @@ void read_setting(Setup &setup, const std::string &section, const std::string &k
 {
     if (section == "drive") {
         read_parameter(setup.params, key, value);
-        setup.given.insert(*find_parameter(key));
+        setup.given[section + "." + key] = value.place();
         return;
     }
     const Field *field = find_field(section, key);
     if (field == nullptr) {
         value.fail(unknown("key", key, section_keys(section)));
     }
-    assign(field->target(setup), *field, value);
+    if (setup.flux_map && replaced_by_map(section, key)) {
+        value.fail("the flux map stands for " + key + ": give one or the other");
+    }
+    read_field(setup, *field, value);
+    setup.given[section + "." + key] = value.place();
     if (section == "rated" && key == "v_dc_V") {
         setup.plant.dclink.v_source_V = setup.rated.v_dc_V;
     }
+    if (section == "winding" && key == "emf") {
+        setup.trapezoid_flat_deg = -1.0;
+    }
+    expand_trapezoid(setup);
     derive_board_parameters(setup);
 }
 
@@ -218,16 +183,68 @@ void read_sections(Setup &setup, const Map &map, bool is_machine_file)
 {
     for (const std::string &section : setup_sections()) { // drive is last: it overrides what is derived
         const auto value = map.find(section);
-        if (value) {
-            const Map keys(*value, section_keys(section));
-            for (const std::string &key : keys.keys()) {
-                read_setting(setup, section, key, keys.at(key));
-            }
+        if (value && section == "flux_map") {
+            read_flux_map_section(setup, *value);
+        } else if (value) {
+            read_section(setup, section, *value);
         }
     }
     if (is_machine_file) {
-        require_all(map);
+        require_all(setup, map);
     }
+}
+
+void require_drive(const Setup &setup)
+{
+    const auto refuse = [&setup](const std::string &why) { throw InputError(setup.file + ": " + why); };
+    if (setup.plant.winding.sets == 2) {
+        refuse("the drive cannot run two sets yet");
+    }
+    if (setup.plant.winding.connection == PLANT_OPEN) {
+        refuse("the drive cannot run an open winding yet");
+    }
+    if (setup.plant.sensor.shunt == PLANT_SINGLE_SHUNT) {
+        refuse("the drive cannot measure with a single shunt yet");
+    }
+    const auto need = [&](const std::string &key) {
+        if (setup.given.count(key) == 0) {
+            refuse(key + " is missing: the drive cannot run this machine without it");
+        }
+    };
+    for (const Field &field : setup_fields()) {
+        if (field.need == Need::drive) {
+            need(std::string(field.section) + "." + field.key);
+        }
+    }
+    for (const drive_param_id_t id : required_parameters) {
+        need(std::string("drive.") + drive_param_table[id].name);
+    }
+}
+
+// The plant speaks of its own structures: "mech.J_kgm2 must be positive".
+static std::string in_words_of_the_file(std::string reason)
+{
+    const std::pair<std::string, std::string> renamed[] = {
+        {"machine.", "electrical."}, {"mech.", "mechanics."}, {"tolerance", "solver.tolerance"}};
+    for (const auto &[from, to] : renamed) {
+        if (reason.compare(0, from.size(), from) == 0) {
+            return reason.replace(0, from.size(), to);
+        }
+    }
+    const std::string radians = "emf_shift_rad";
+    const size_t at = reason.find(radians);
+    return at == std::string::npos ? reason : reason.replace(at, radians.size(), "emf_shift_deg");
+}
+
+void refuse_plant(const Setup &setup, const std::string &reason)
+{
+    const std::string text = in_words_of_the_file(reason);
+    const std::string key = text.substr(0, text.find_first_of(" :")); // or a section, or a key's beginning
+    const auto place = setup.given.lower_bound(key);
+    if (place != setup.given.end() && place->first.rfind(key, 0) == 0) {
+        throw InputError(place->second, text);
+    }
+    throw InputError((setup.file.empty() ? setup.name : setup.file) + ": " + text);
 }
 
 } // namespace pmsim

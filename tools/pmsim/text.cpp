@@ -90,10 +90,10 @@ static size_t edit_distance(const std::string &a, const std::string &b)
 
 // What a key may end with; longer units first where one ends with another.
 static const char *const units[] = {
-    "_A_Wb5", "_rad_s2", "_rad_s", "_kgm2", "_gcm2", "_kgcm2", "_mohm", "_ohm", "_mWb", "_Wb",
-    "_mNm",   "_Nms",    "_Nm",    "_kHz",  "_Hz",   "_mH",    "_uH",   "_H",   "_mA",  "_A",
-    "_mV",    "_kV",     "_V",     "_ms",   "_us",   "_ns",    "_s",    "_uF",  "_mF",  "_F",
-    "_degC",  "_K",      "_deg",   "_rad",  "_rpm",  "_rel",   "_lsb",
+    "_A_Wb5", "_rad_s2", "_rad_s", "_kgm2", "_gcm2", "_kgcm2", "_mohm", "_ohm", "_mWb", "_Wb",   "_mNm",
+    "_Nms",   "_Nm",     "_kHz",   "_Hz",   "_mH",   "_uH",    "_H",    "_mA",  "_A",   "_mV",   "_kV",
+    "_V",     "_ms",     "_us",    "_ns",   "_s",    "_uF",    "_mF",   "_F",   "_nF",  "_pF",   "_mVs",
+    "_Vs",    "_1_K",    "_degC",  "_K",    "_deg",  "_rad",   "_rpm",  "_rel", "_lsb", "_Nms2",
 };
 
 // The name without its unit.

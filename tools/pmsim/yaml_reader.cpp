@@ -16,7 +16,8 @@ std::string to_string(const Place &place)
     if (place.line == 0) {
         return place.file;
     }
-    return place.file + ":" + std::to_string(place.line) + ":" + std::to_string(place.column);
+    const std::string line = place.file + ":" + std::to_string(place.line);
+    return place.column == 0 ? line : line + ":" + std::to_string(place.column);
 }
 
 InputError::InputError(const Place &place, const std::string &message)

@@ -21,8 +21,8 @@ namespace pmsim
 
 struct Place {
     std::string file;
-    int line = 0; // from 1; 0: not from a file
-    int column = 0;
+    int line = 0;   // from 1; 0: not from a file
+    int column = 0; // from 1; 0: the whole line
 };
 
 std::string to_string(const Place &place);

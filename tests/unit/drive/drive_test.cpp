@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "tests/support/plants.h"
 #include "tests/unit/drive/direct.h"
 
 #pragma GCC diagnostic push
@@ -27,16 +28,8 @@ constexpr double kPosition_deg = 6; // METHODS.md 0.3, the demonstration's own b
 
 plant_config_t ipm()
 {
-    plant_config_t c = {};
-    c.machine = {6.0, 46.3e-3, 76.9e-3, 105.0, 0.236, 3};
-    c.mech = {0.01, 1e-3, 0.02, false};
-    c.inverter = {10e3, 2e-6, 1.0, 1.0, 0.0, 8500};
-    c.dclink = {300.0, 0.2, 470e-6, false};
-    c.sensor.bits = 12;
-    c.sensor.i_full_scale_A = 10;
-    c.sensor.v_full_scale_V = 450;
-    c.sensor.noise_lsb = 0.5;
-    c.sensor.seed = 1;
+    plant_config_t c = plants::ipm_1000();
+    c.mech.T_coulomb_Nm = 0.02;
     return c;
 }
 

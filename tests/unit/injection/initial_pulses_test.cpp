@@ -7,6 +7,7 @@
 
 #include "sim_plant/plant.h"
 #include "tests/contract/bench.h"
+#include "tests/support/plants.h"
 
 namespace
 {
@@ -33,15 +34,9 @@ struct Rig {
 
 Rig ipm()
 {
-    plant_config_t c = {};
-    c.machine = {6.0, 46.3e-3, 76.9e-3, 105.0, 0.236, 3};
-    c.mech = {0.01, 1e-3, 0.0, true};
-    c.inverter = {10e3, 2e-6, 1.0, 1.0, 0.0, 8500};
-    c.dclink = {300.0, 0.2, 470e-6, false};
-    c.sensor.bits = 12;
-    c.sensor.i_full_scale_A = 10;
-    c.sensor.v_full_scale_V = 450;
-    c.sensor.noise_lsb = 0.5;
+    plant_config_t c = plants::ipm_1000();
+    c.mech.locked = true;
+    c.sensor.seed = 0;
     c.sensor.gain_error[0] = 0.01;
     c.sensor.gain_error[1] = -0.01;
     return {c, bench::kIpmBase, 4.0, 43e-3, 75e-3};
@@ -50,10 +45,11 @@ Rig ipm()
 Rig spm()
 {
     Rig r = ipm();
-    r.plant.machine = {0.373, 3.385e-3, 3.385e-3, 2.09e5, 77.6e-3, 5};
-    r.plant.inverter = {10e3, 1e-6, 0.0, 0.0, 0.01, 8500};
-    r.plant.dclink = {36.0, 0.05, 2.2e-3, false};
-    r.plant.sensor.v_full_scale_V = 60;
+    const plant_config_t own = plants::spm_400();
+    r.plant.machine = own.machine;
+    r.plant.inverter = own.inverter;
+    r.plant.dclink = own.dclink;
+    r.plant.sensor.v_full_scale_V = own.sensor.v_full_scale_V;
     r.base = bench::kSpmBase;
     r.L_d_H = 3.0e-3;
     r.L_q_H = 3.3e-3;
@@ -173,8 +169,11 @@ TEST(InitialPulses, FindsSpm400)
 TEST(InitialPulses, ExactOnAnIdealInverter)
 {
     Rig r = ipm();
-    r.plant.inverter = {10e3, 0.0, 0.0, 0.0, 0.0, 8500};
-    r.plant.dclink = {300.0, 0.0, 0.0, false};
+    r.plant.inverter.dead_time_s = 0.0;
+    r.plant.inverter.v_switch_V = 0.0;
+    r.plant.inverter.v_diode_V = 0.0;
+    r.plant.dclink.r_source_ohm = 0.0;
+    r.plant.dclink.c_F = 0.0;
     r.plant.sensor.bits = 0;
     r.plant.sensor.noise_lsb = 0;
     r.plant.sensor.gain_error[0] = 0;

@@ -104,6 +104,67 @@ TEST(ScenarioFile, ErrorsOfTheProfile)
     EXPECT_EQ(event_error("{t_s: 0, enable: 1}"), "s.yaml:6:22: expected true or false, found \"1\"");
 }
 
+TEST(ScenarioFile, FaultsOfThePlant)
+{
+    const auto event = [](const std::string &text) {
+        return load(replaced(small_scenario(), "{t_s: 0, mode: speed, speed_rel: 0.1, enable: true}", text))
+            .profile[0];
+    };
+    const Event broken = event("{t_s: 0, leg_fault: {leg: b, kind: lower_short}, supply: false}");
+    EXPECT_EQ(broken.leg_fault->leg, 1);
+    EXPECT_EQ(broken.leg_fault->kind, PLANT_LOWER_SHORT);
+    EXPECT_EQ(broken.supply, false);
+    const Event tied = event("{t_s: 0, short: {from: a, to: c, R_ohm: 0.1}}");
+    EXPECT_EQ(tied.short_circuit->leg_a, 0);
+    EXPECT_EQ(tied.short_circuit->leg_b, 2);
+    EXPECT_EQ(tied.short_circuit->R_ohm, 0.1);
+    EXPECT_EQ(event("{t_s: 0, short: {from: c, to: rail, R_ohm: 0}}").short_circuit->leg_b, -1);
+    EXPECT_LT(event("{t_s: 0, short: none}").short_circuit->R_ohm, 0.0);
+    const Event warm = event("{t_s: 0, winding_degC: 120, magnet_degC: 80, ramp_s: 1}");
+    EXPECT_EQ(*warm.targets[static_cast<size_t>(Channel::winding_degC)], 120.0);
+    EXPECT_EQ(*warm.targets[static_cast<size_t>(Channel::magnet_degC)], 80.0);
+}
+
+TEST(ScenarioFile, ErrorsOfFaults)
+{
+    EXPECT_EQ(event_error("{t_s: 0, leg_fault: {leg: x, kind: none}}"),
+              "s.yaml:6:31: \"x\" is not known here; one of: a, b, c");
+    EXPECT_THAT(event_error("{t_s: 0, leg_fault: {leg: a, kind: open}}"),
+                StartsWith("s.yaml:6:40: \"open\" is not known here"));
+    EXPECT_EQ(event_error("{t_s: 0, leg_fault: {leg: a}}"), "s.yaml:6:25: key \"kind\" is missing");
+    EXPECT_EQ(event_error("{t_s: 0, short: {from: a, to: a, R_ohm: 1}}"),
+              "s.yaml:6:35: a terminal cannot be shorted to itself");
+    EXPECT_THAT(event_error("{t_s: 0, short: {from: a, to: b, R_ohm: -1}}"),
+                StartsWith("s.yaml:6:45: -1 is out of range"));
+    EXPECT_EQ(event_error("{t_s: 0, short: {from: a, to: b, R_mohm: 1}}"),
+              "s.yaml:6:38: unknown key \"R_mohm\": wrong unit; did you mean \"R_ohm\"?");
+    EXPECT_EQ(error_of([] {
+                  load(replaced(small_scenario() + "winding: {alpha_R_1_K: 0.02}\n", "{t_s: 0, mode: speed",
+                                "{t_s: 0, winding_degC: -50, mode: speed"));
+              }),
+              "s.yaml:6:28: at this temperature the coefficient 0.02/K leaves nothing");
+}
+
+// Events that only together make no machine: M of the second set must stay below L.
+TEST(ScenarioFile, DriftThatMakesNoMachine)
+{
+    EXPECT_EQ(event_error("{t_s: 0, L_d0_H: 1.0e-3}"), "no error");
+    const std::string text = replaced(small_scenario(), "start:", "winding: {dL_H: [-0.03, 0, 0]}\nstart:");
+    EXPECT_EQ(error_of([&] { load(text); }), "no error");
+    EXPECT_THAT(error_of([&] {
+                    load(replaced(text, "{t_s: 0, mode: speed", "{t_s: 0, L_d0_H: 1.0e-3, mode: speed"));
+                }),
+                StartsWith("s.yaml:7:3: the events together make a machine that cannot be: winding: "));
+}
+
+TEST(ScenarioFile, MachinesThatTheDriveCannotRun)
+{
+    EXPECT_EQ(error_with("ipm_1000", "dtp_400"),
+              "sim_plant/machines/dtp_400.yaml: the drive cannot run two sets yet");
+    EXPECT_EQ(error_with("ipm_1000", "bldc_fan"), "sim_plant/machines/bldc_fan.yaml: drive.pole_pairs is "
+                                                  "missing: the drive cannot run this machine without it");
+}
+
 TEST(ScenarioFile, ErrorsOfTheExpectations)
 {
     EXPECT_EQ(expectation_error("{metric: angle_error_mean_rad, max: 1, book: x}"),

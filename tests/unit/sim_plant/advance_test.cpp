@@ -77,13 +77,13 @@ plant_config_t random_plant(Random &random)
     if (kind < 0.33) {
         c = rig::spm_400_linear();
         c.machine.c_A_Wb5 = 2.09e5;
-        c.inverter = {10e3, 2e-6, 0.0, 0.8, 0.05, rig::counts};
-        c.dclink = {36.0, 0.2, 1e-3, true};
+        c.inverter = rig::inverter(10e3, 2e-6, 0.0, 0.8, 0.05);
+        c.dclink = rig::dclink(36.0, 0.2, 1e-3, true);
         c.mech.J_kgm2 = 5e-4;
     } else if (kind < 0.66) { // BLDC-HS
         c.machine = {0.025, 25e-6, 25e-6, 0.0, 1.25e-3, 1};
-        c.inverter = {40e3, 0.5e-6, 0.0, 0.8, 0.005, 2000};
-        c.dclink = {24.0, 0.0, 0.0, false};
+        c.inverter = rig::inverter(40e3, 0.5e-6, 0.0, 0.8, 0.005, 2000);
+        c.dclink = rig::dclink(24.0);
         c.mech.J_kgm2 = 2e-6;
         c.sensor.i_full_scale_A = 40.0;
     }
@@ -161,7 +161,7 @@ TEST(Advance, SurvivesRandomOperation)
             plant_truth_t t = plant.truth();
             throughput_J = std::max({throughput_J, std::fabs(t.e_in_J), std::fabs(t.e_mech_J), t.e_copper_J});
             double drop_V = config.inverter.v_diode_V + config.inverter.v_switch_V + 1e-5;
-            for (int leg = 0; leg < PLANT_LEGS; leg++) {
+            for (int leg = 0; leg < 3; leg++) {
                 double r_V = drop_V + config.inverter.r_on_ohm * std::fabs(t.i_A[leg]);
                 ASSERT_TRUE(std::isfinite(t.i_A[leg])) << seed << " " << k;
                 ASSERT_LE(t.v_leg_V[leg], t.v_dc_V + r_V) << seed << " " << k << " " << leg;
@@ -175,6 +175,115 @@ TEST(Advance, SurvivesRandomOperation)
     }
     RecordProperty("worst_balance", std::to_string(1e6 * worst) + "e-6");
     EXPECT_LT(worst, 1e-4); // of what went through; violent runs, so less is asked than of a driven motor
+}
+
+// Any connection, with anything that a winding and an inverter can have.
+plant_config_t random_machine(Random &random)
+{
+    plant_config_t c = random_plant(random);
+    plant_winding_t &w = c.winding;
+    double L = c.machine.L_d0_H, kind = random();
+    if (kind < 0.35) {
+        w.sets = 2;
+        w.M_d_H = random.chance(0.5) ? 0.3 * L : 0.0;
+        w.M_q_H = random.chance(0.5) ? 0.4 * L : w.M_d_H;
+    } else if (kind < 0.7) {
+        w.connection = PLANT_OPEN;
+        w.L_0_H = (0.1 + 0.4 * random()) * L;
+        w.dL_0_H = random.chance(0.5) ? 0.1 * w.L_0_H : 0.0;
+    }
+    if (random.chance(0.5)) {
+        w.emf[0] = {3, 0.05 * c.machine.psi_m_Wb, 6.0 * random()};
+        w.emf[1] = {5, 0.03 * c.machine.psi_m_Wb, 6.0 * random()};
+    }
+    if (random.chance(0.3)) {
+        w.dL_H[static_cast<int>(6.0 * random())] = 0.1 * L;
+        w.dR_ohm[static_cast<int>(6.0 * random())] = 0.2 * c.machine.R_s_ohm;
+        w.saliency[0] = {4, 0.03 * L, 1.0};
+    }
+    if (random.chance(0.2)) {
+        w.L_eddy_d_H = w.L_eddy_q_H = 3.0 * L;
+        w.R_eddy_ohm = 5.0 * c.machine.R_s_ohm;
+    }
+    if (random.chance(0.4)) {
+        c.inverter.c_leg_F = 5e-9 * random();
+    }
+    if (random.chance(0.4) && c.inverter.dead_time_s > 0.0) {
+        c.inverter.turn_on_s = 0.3 * c.inverter.dead_time_s;
+        c.inverter.turn_off_s = 0.6 * c.inverter.dead_time_s;
+    }
+    if (c.inverter.r_on_ohm == 0.0) {
+        c.inverter.r_on_ohm = 0.01; // a shorted switch needs some
+    }
+    return c;
+}
+
+// Whether a short is there afterwards; only without one do the legs' currents add up to nothing.
+bool random_fault(Random &random, rig::Plant &plant, int legs, bool soft, bool shorted)
+{
+    double what = random();
+    int leg = static_cast<int>(legs * random());
+    if (what < 0.02) {
+        plant_set_leg_fault(plant, leg, static_cast<plant_leg_fault_t>(static_cast<int>(6.0 * random())));
+    } else if (what < 0.04) {
+        plant_set_leg_fault(plant, leg, PLANT_HEALTHY);
+    } else if (what < 0.045) {
+        plant_set_short(plant, leg, random.chance(0.5) ? -1 : (leg + 1) % legs, 20.0 * random() + 0.1);
+        return true;
+    } else if (what < 0.06) {
+        plant_set_short(plant, leg, -1, -1.0);
+        return false;
+    } else if (what < 0.065 && soft) { // a stiff link has no supply to lose
+        plant_set_supply(plant, random.chance(0.5));
+    } else if (what < 0.07) {
+        plant_set_temperature(plant, 25.0 + 100.0 * random(), 25.0);
+    }
+    return shorted;
+}
+
+// The same with every machine and every fault: no chatter, no current from nowhere, no energy either.
+TEST(Advance, SurvivesRandomFaults)
+{
+    constexpr int runs = 60, periods = 200;
+    double worst = 0.0;
+    for (uint64_t seed = 1; seed <= runs; seed++) {
+        Random random(seed * 104729);
+        plant_config_t config = random_machine(random);
+        bool open = config.winding.connection == PLANT_OPEN;
+        int legs = open || config.winding.sets == 2 ? 6 : 3;
+        double omega_max =
+            1.5 * config.dclink.v_source_V / (config.machine.psi_m_Wb * config.machine.pole_pairs);
+        rig::Plant plant(config, 6.28 * random());
+        plant_pwm_t pwm{};
+        double throughput_J = 1e-3;
+        bool shorted = false;
+        for (int k = 0; k < periods; k++) {
+            random_event(random, plant, omega_max, config.dclink.v_source_V);
+            shorted = random_fault(random, plant, legs, config.dclink.c_F > 0.0, shorted);
+            if (random.chance(0.2)) {
+                pwm = random_pwm(random, config.inverter.timer_counts);
+            }
+            plant.run(pwm);
+            plant_truth_t t = plant.truth();
+            throughput_J = std::max({throughput_J, std::fabs(t.e_in_J), std::fabs(t.e_mech_J), t.e_copper_J});
+            double sum[3] = {}, scale = config.sensor.i_full_scale_A;
+            for (int leg = 0; leg < legs; leg++) {
+                ASSERT_TRUE(std::isfinite(t.i_A[leg])) << seed << " " << k;
+                ASSERT_TRUE(std::isfinite(t.v_leg_V[leg])) << seed << " " << k;
+                ASSERT_LT(std::fabs(t.i_A[leg]), 1e6) << seed << " " << k;
+                sum[open ? leg % 3 : leg / 3] += t.i_A[leg];
+                scale = std::max(scale, std::fabs(t.i_A[leg]));
+            }
+            for (double s : sum) {
+                ASSERT_TRUE(shorted || std::fabs(s) < 1e-6 * scale) << seed << " " << k << " " << s;
+            }
+        }
+        plant_truth_t t = plant.truth();
+        double residual = t.e_in_J - t.e_copper_J - t.e_device_J - t.e_mech_J - t.e_field_J;
+        worst = std::max(worst, std::fabs(residual) / throughput_J);
+        EXPECT_LT(std::fabs(residual) / throughput_J, 1e-4) << seed;
+    }
+    RecordProperty("worst_balance", std::to_string(1e6 * worst) + "e-6");
 }
 
 } // namespace

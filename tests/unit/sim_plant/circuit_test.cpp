@@ -79,8 +79,9 @@ TEST(Circuit, NoLoadEmfAtTheTerminals)
         // mean over the last period of 0.03 rad: its middle, times sin(0.015)/0.015
         double middle = t.theta_e_rad - 0.015;
         double chord = std::sin(0.015) / 0.015;
-        ASSERT_NEAR(t.v_mean_alpha_V, e * std::sin(middle) * chord, 1e-8);
-        ASSERT_NEAR(t.v_mean_beta_V, -e * std::cos(middle) * chord, 1e-8);
+        ASSERT_NEAR(t.v_mean_alpha_V, e * std::sin(middle) * chord,
+                    1e-5); // integrated: a tenth of closed_form
+        ASSERT_NEAR(t.v_mean_beta_V, -e * std::cos(middle) * chord, 1e-5);
     }
 }
 
@@ -208,7 +209,7 @@ class Reference
 TEST(Circuit, FreeRunAgainstASecondImplementation)
 {
     plant_config_t config = rig::ipm_1000();
-    config.dclink = {300.0, 0.5, 470e-6, false};
+    config.dclink = rig::dclink(300.0, 0.5, 470e-6);
     rig::Plant plant(config);
     Reference reference(config);
     rig::CurrentControl control(config);

@@ -1,10 +1,13 @@
-// gates.h: edges where the compare values put them, dead time after each, nothing at joined periods.
+// gates.h: edges where the compare values put them, dead time after each, nothing at joined periods; delays
+// of the switches, and what conducts when one of them has failed.
 extern "C" {
 #include "sim_plant/gates.h"
 }
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <random>
 #include <vector>
 
 namespace
@@ -23,13 +26,15 @@ struct Change {
 class Gates : public testing::Test
 {
   protected:
-    explicit Gates(double dead_time = dead)
+    explicit Gates(double dead_time = dead, double turn_on = 0.0, double turn_off = 0.0, int legs = 3)
     {
         plant_inverter_t inverter{};
         inverter.f_pwm_Hz = 1.0 / T;
         inverter.dead_time_s = dead_time;
+        inverter.turn_on_s = turn_on;
+        inverter.turn_off_s = turn_off;
         inverter.timer_counts = counts;
-        gates_init(&gates, &inverter);
+        gates_init(&gates, &inverter, legs);
         gates_load(&gates, &pwm);
     }
 
@@ -146,6 +151,185 @@ TEST_F(Gates, TripOpensAll)
     }
     EXPECT_EQ(gates_next_s(&gates, 0.0), gates.period_s);
 }
+
+// Switches that follow their signals late, the opening one less so than the closing one.
+class SlowSwitches : public Gates
+{
+  protected:
+    static constexpr double on = 0.7e-6, off = 1.1e-6, closing = dead + on;
+
+    SlowSwitches() : Gates(dead, on, off)
+    {
+    }
+};
+
+TEST_F(SlowSwitches, OpenAndCloseTheirDelaysAfterTheEdges)
+{
+    run(0, 0);
+    expect(run(600, 200), {{20e-6 + off, GATE_OFF},
+                           {20e-6 + closing, GATE_HIGH},
+                           {60e-6 + off, GATE_OFF},
+                           {60e-6 + closing, GATE_LOW}});
+}
+
+TEST_F(SlowSwitches, PulseIsLongerByTheOpeningAndShorterByTheClosingDelay)
+{
+    run(0, 0);
+    expect(run(30, 30), {{48.5e-6 + off, GATE_OFF},
+                         {48.5e-6 + closing, GATE_HIGH},
+                         {51.5e-6 + off, GATE_OFF},
+                         {51.5e-6 + closing, GATE_LOW}});
+}
+
+TEST_F(SlowSwitches, PulseShorterThanTheClosingDelayIsSwallowed)
+{
+    run(0, 0);
+    expect(run(26, 26), {{48.7e-6 + off, GATE_OFF}, {51.3e-6 + closing, GATE_LOW}});
+}
+
+// A command that has changed back before the switch has opened: it opens all the same, for its signal was
+// gone, and closes again a dead time after the second edge.
+TEST_F(SlowSwitches, GlitchWithinTheOpeningDelayOpensTheSwitch)
+{
+    run(0, 0);
+    expect(run(10, 10), {{49.5e-6 + off, GATE_OFF}, {50.5e-6 + closing, GATE_LOW}});
+}
+
+TEST_F(SlowSwitches, DelaysReachIntoTheNextPeriod)
+{
+    run(500, 500);
+    run(500, counts - 10); // falls at 99.5 us
+    expect(run(0, 0), {{-0.5e-6 + off, GATE_OFF}, {-0.5e-6 + closing, GATE_LOW}});
+}
+
+TEST_F(SlowSwitches, TripDoesNotWaitForThem)
+{
+    run(counts, counts);
+    gates_off(&gates);
+    EXPECT_EQ(gates.leg[0].gate, GATE_OFF);
+    EXPECT_EQ(gates_next_s(&gates, 0.0), gates.period_s);
+}
+
+class SixLegs : public Gates
+{
+  protected:
+    SixLegs() : Gates(dead, 0.7e-6, 1.1e-6, 6)
+    {
+    }
+};
+
+TEST_F(SixLegs, EachFollowsItsOwnCompareValues)
+{
+    std::vector<Change> changes[PLANT_LEGS];
+    for (int k = 0; k < PLANT_LEGS; k++) {
+        pwm.driven[k] = true;
+    }
+    for (uint32_t first : {0u, 100u}) { // of leg A; each further leg 100 counts more
+        for (int k = 0; k < PLANT_LEGS; k++) {
+            pwm.compare[k][0] = pwm.compare[k][1] = first > 0 ? first + 100 * static_cast<uint32_t>(k) : 0;
+            changes[k].clear();
+        }
+        gates_load(&gates, &pwm);
+        for (double t = 0.0; t < T; t = gates_next_s(&gates, t)) {
+            gate_t before[PLANT_LEGS];
+            for (int k = 0; k < PLANT_LEGS; k++) {
+                before[k] = gates.leg[k].gate;
+            }
+            gates_update(&gates, t);
+            for (int k = 0; k < PLANT_LEGS; k++) {
+                if (gates.leg[k].gate != before[k]) {
+                    changes[k].push_back({t, gates.leg[k].gate});
+                }
+            }
+        }
+    }
+    for (int k = 0; k < PLANT_LEGS; k++) {
+        double half_s = 0.5 * T * 0.1 * (k + 1);
+        expect(changes[k], {{50e-6 - half_s + 1.1e-6, GATE_OFF},
+                            {50e-6 - half_s + 2.7e-6, GATE_HIGH},
+                            {50e-6 + half_s + 1.1e-6, GATE_OFF},
+                            {50e-6 + half_s + 2.7e-6, GATE_LOW}});
+    }
+}
+
+// Whatever the compare values: a switch closes only after the other has been open for the dead time and the
+// difference of the delays, and nothing happens between the announced instants.
+TEST_F(SixLegs, NeverOverlapNorMissAnInstant)
+{
+    std::mt19937 random(1);
+    auto draw = [&](uint32_t below) { return static_cast<uint32_t>(random() % below); };
+    double opened[PLANT_LEGS] = {};
+    int closings = 0;
+    for (int period = 0; period < 2000; period++) {
+        for (int k = 0; k < PLANT_LEGS; k++) {
+            for (uint32_t &compare : pwm.compare[k]) {
+                uint32_t kind = draw(8);
+                compare = kind == 0 ? 0 : kind == 1 ? counts : kind < 4 ? draw(60) : draw(counts);
+            }
+            pwm.driven[k] = draw(16) != 0;
+        }
+        gates_load(&gates, &pwm);
+        double start = period * T;
+        for (double t = 0.0; t < T;) {
+            gate_t before[PLANT_LEGS];
+            for (int k = 0; k < PLANT_LEGS; k++) {
+                before[k] = gates.leg[k].gate;
+            }
+            gates_update(&gates, t);
+            for (int k = 0; k < PLANT_LEGS; k++) {
+                gate_t gate = gates.leg[k].gate;
+                if (gate == before[k]) {
+                    continue;
+                }
+                ASSERT_TRUE(gate == GATE_OFF || before[k] == GATE_OFF) << period << " leg " << k;
+                if (gate == GATE_OFF) {
+                    opened[k] = start + t;
+                } else {
+                    closings++;
+                    ASSERT_GE(start + t - opened[k], 2.7e-6 - 1.1e-6 - 2.0 * gates.coincident_s) << k;
+                }
+            }
+            double next = gates_next_s(&gates, t);
+            ASSERT_GT(next, t);
+            if (next - t > 3.0 * gates.coincident_s) {
+                ASSERT_FALSE(gates_update(&gates, 0.5 * (t + next))) << period << " after " << t;
+            }
+            t = next;
+        }
+    }
+    EXPECT_GT(closings, 10000);
+}
+
+struct Fault {
+    plant_leg_fault_t fault;
+    gate_t off, low, high; // what conducts with that gate
+};
+
+class FailedSwitch : public Gates, public testing::WithParamInterface<Fault>
+{
+};
+
+TEST_P(FailedSwitch, ConductsOrNotWhateverItsGateSays)
+{
+    const Fault &f = GetParam();
+    gates.leg[1].fault = f.fault;
+    const gate_t gate[] = {GATE_OFF, GATE_LOW, GATE_HIGH};
+    const gate_t conducting[] = {f.off, f.low, f.high};
+    for (int n = 0; n < 3; n++) {
+        gates.leg[0].gate = gate[n];
+        gates.leg[1].gate = gate[n];
+        EXPECT_EQ(gates_conducting(&gates, 1), conducting[n]);
+        EXPECT_EQ(gates_conducting(&gates, 0), gate[n]) << "the leg beside it is healthy";
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Faults, FailedSwitch,
+                         testing::Values(Fault{PLANT_HEALTHY, GATE_OFF, GATE_LOW, GATE_HIGH},
+                                         Fault{PLANT_UPPER_OPEN, GATE_OFF, GATE_LOW, GATE_OFF},
+                                         Fault{PLANT_LOWER_OPEN, GATE_OFF, GATE_OFF, GATE_HIGH},
+                                         Fault{PLANT_UPPER_SHORT, GATE_HIGH, GATE_BOTH, GATE_HIGH},
+                                         Fault{PLANT_LOWER_SHORT, GATE_LOW, GATE_LOW, GATE_BOTH},
+                                         Fault{PLANT_WIRE_OPEN, GATE_OFF, GATE_LOW, GATE_HIGH}));
 
 TEST_F(Gates, CoincidentEdgesAreOneEvent)
 {

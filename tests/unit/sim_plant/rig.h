@@ -5,6 +5,7 @@
 
 #include "sim_plant/plant.h"
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -16,14 +17,40 @@ namespace rig
 constexpr double pi = 3.14159265358979323846;
 constexpr uint32_t counts = 8400;
 
+// An inverter whose switches follow their gates at once, and its link.
+inline plant_inverter_t inverter(double f_pwm_Hz, double dead_time_s, double v_switch_V, double v_diode_V,
+                                 double r_on_ohm, uint32_t timer_counts = counts)
+{
+    plant_inverter_t v{};
+    v.f_pwm_Hz = f_pwm_Hz;
+    v.dead_time_s = dead_time_s;
+    v.v_switch_V = v_switch_V;
+    v.v_diode_V = v_diode_V;
+    v.r_on_ohm = r_on_ohm;
+    v.timer_counts = timer_counts;
+    return v;
+}
+
+inline plant_dclink_t dclink(double v_source_V, double r_source_ohm = 0.0, double c_F = 0.0,
+                             bool source_blocks = false)
+{
+    plant_dclink_t d{};
+    d.v_source_V = v_source_V;
+    d.r_source_ohm = r_source_ohm;
+    d.c_F = c_F;
+    d.source_blocks = source_blocks;
+    return d;
+}
+
 // IPM-1000 on an ideal inverter: no dead time, no drops, stiff link.
 inline plant_config_t ipm_1000()
 {
     plant_config_t c{};
     c.machine = {6.0, 46.3e-3, 76.9e-3, 105.0, 0.236, 3};
-    c.mech = {0.01, 1e-3, 0.0, false};
-    c.inverter = {10e3, 0.0, 0.0, 0.0, 0.0, counts};
-    c.dclink = {300.0, 0.0, 0.0, false};
+    c.mech.J_kgm2 = 0.01;
+    c.mech.B_Nms = 1e-3;
+    c.inverter = inverter(10e3, 0.0, 0.0, 0.0, 0.0);
+    c.dclink = dclink(300.0);
     c.sensor.i_full_scale_A = 10.0;
     c.sensor.v_full_scale_V = 450.0;
     return c;
@@ -33,8 +60,8 @@ inline plant_config_t ipm_1000()
 inline plant_config_t ipm_1000_real()
 {
     plant_config_t c = ipm_1000();
-    c.inverter = {10e3, 2e-6, 1.2, 0.9, 0.05, counts};
-    c.dclink = {300.0, 0.5, 470e-6, false};
+    c.inverter = inverter(10e3, 2e-6, 1.2, 0.9, 0.05);
+    c.dclink = dclink(300.0, 0.5, 470e-6);
     return c;
 }
 
@@ -51,14 +78,20 @@ inline plant_config_t spm_400_linear()
 inline plant_pwm_t pwm(double duty_a, double duty_b, double duty_c, uint32_t timer_counts = counts)
 {
     plant_pwm_t p{};
-    const double duty[PLANT_LEGS] = {duty_a, duty_b, duty_c};
-    for (int k = 0; k < PLANT_LEGS; k++) {
+    const double duty[3] = {duty_a, duty_b, duty_c};
+    for (int k = 0; k < 3; k++) {
         auto compare = static_cast<uint32_t>(std::lround(duty[k] * timer_counts));
         p.compare[k][0] = compare;
         p.compare[k][1] = compare;
         p.driven[k] = true;
     }
     return p;
+}
+
+// Currents of the three legs of a star.
+inline std::array<double, 3> currents(const plant_truth_t &t)
+{
+    return {t.i_A[0], t.i_A[1], t.i_A[2]};
 }
 
 inline plant_pwm_t all_off()

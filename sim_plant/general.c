@@ -1,0 +1,178 @@
+/* The rates of any circuit: what circuit_rates.h has inline for the plain machine. */
+#include "sim_plant/circuit_rates.h"
+#include "sim_plant/floating.h"
+#include "sim_plant/machine_rates.h"
+
+#include <string.h>
+
+/* The common shapes, for which the functions are compiled with constants; the rest are rare. */
+#define STAR   ((shape_t){2, 1, 3})
+#define OPEN   ((shape_t){3, 1, 6})
+#define DOUBLE ((shape_t){4, 2, 6})
+#define FOR_SHAPE(machine, call)                                                                             \
+    if ((machine)->winding.branch >= 0) {                                                                    \
+        call(machine_shape(machine));                                                                        \
+    } else if ((machine)->winding.zero >= 0) {                                                               \
+        call(OPEN);                                                                                          \
+    } else if ((machine)->winding.sets > 1) {                                                                \
+        call(DOUBLE);                                                                                        \
+    } else {                                                                                                 \
+        call(STAR);                                                                                          \
+    }
+
+/* Coordinates that leg k has a part in: of two stars without a fault branch only those of its own set. */
+INLINE int first_of_leg(shape_t shape, int k)
+{
+    return shape.active == 4 && shape.sets == 2 ? 2 * (k / 3) : 0;
+}
+
+INLINE int end_of_leg(shape_t shape, int k)
+{
+    return shape.active == 4 && shape.sets == 2 ? 2 * (k / 3) + 2 : shape.active;
+}
+
+INLINE void add_leg(const circuit_t *c, const point_t *p, int k, shape_t shape, circuit_legs_t *legs)
+{
+    const winding_t *w = &c->machine.winding;
+    const bridge_t *b = &c->bridge;
+    double v_dc_V = p->x[V_DC];
+    double i_A = 0.0;
+    for (int a = first_of_leg(shape, k); a < end_of_leg(shape, k); a++) {
+        i_A += w->axis[k][a] * p->i_A[a];
+    }
+    legs->i_leg_A[k] = i_A;
+    if (b->leg[k] == LEG_FLOATING) {
+        return;
+    }
+    double v_V;
+    if (b->leg[k] == LEG_SWINGING) {
+        v_V = p->x[V_LEG(k)];
+    } else if (b->leg[k] == LEG_SOURCE) {
+        v_V = b->v_source_V[k];
+        legs->in_W += v_V * i_A;
+    } else {
+        v_V = bridge_tied_V(b, k, i_A, v_dc_V);
+        legs->i_dc_A += b->upper[k] * i_A;
+        legs->device_W += (b->upper[k] * v_dc_V - v_V) * i_A;
+    }
+    legs->v_leg_V[k] = v_V;
+    for (int a = first_of_leg(shape, k); a < end_of_leg(shape, k); a++) {
+        legs->v_V[a] += w->share[k][a] * v_V;
+    }
+}
+
+INLINE void legs_n(const circuit_t *c, const point_t *p, shape_t shape, circuit_legs_t *legs)
+{
+    double v_dc_V = p->x[V_DC];
+    *legs = (circuit_legs_t){.i_dc_A = c->bridge.g_through_S * v_dc_V,
+                             .device_W = c->bridge.g_through_S * v_dc_V * v_dc_V};
+    for (int k = 0; k < shape.legs; k++) {
+        add_leg(c, p, k, shape, legs);
+    }
+    legs->in_W += v_dc_V * legs->i_dc_A;
+}
+
+void circuit_legs(const circuit_t *c, const point_t *p, circuit_legs_t *legs)
+{
+    legs_n(c, p, machine_shape(&c->machine), legs);
+}
+
+INLINE void shaft_rates(const circuit_t *c, const point_t *p, double rate[ELEMENTS])
+{
+    rate[OMEGA_LOAD] = 0.0;
+    rate[TWIST] = 0.0;
+    if (mechanics_plain(&c->mech)) {
+        rate[OMEGA_MECH] = mechanics_rate(&c->mech, p->x[OMEGA_MECH], p->torque_Nm);
+        return;
+    }
+    mechanics_motion_t motion = circuit_motion(c, p);
+    mechanics_motion_rate_t moved;
+    mechanics_rates(&c->mech, &motion, p->torque_Nm, &moved);
+    rate[OMEGA_MECH] = moved.omega_mech_rad_s2;
+    rate[OMEGA_LOAD] = moved.omega_load_rad_s2;
+    rate[TWIST] = moved.twist_rad_s;
+}
+
+INLINE double copper_W(const machine_t *m, const machine_state_t *s, const double i_A[ACTIVE], int n)
+{
+    double drop_V[ACTIVE];
+    double loss_W = 0.0;
+    machine_drop_n(m, i_A, drop_V, n);
+    for (int a = 0; a < n; a++) {
+        loss_W += m->winding.weight[a] * i_A[a] * drop_V[a];
+    }
+    for (int e = 0; e < 2 * PLANT_SETS && m->biased; e++) {
+        loss_W += 1.5 * m->R_eddy_ohm * s->eddy_A[e] * s->eddy_A[e];
+    }
+    return loss_W;
+}
+
+INLINE void swing_rates(const circuit_t *c, const circuit_legs_t *legs, double rate[ELEMENTS])
+{
+    for (int k = 0; k < PLANT_LEGS; k++) {
+        rate[V_LEG(k)] = 0.0;
+    }
+    for (int k = 0; k < c->bridge.legs && c->bridge.swinging > 0; k++) {
+        if (c->bridge.leg[k] == LEG_SWINGING) {
+            rate[V_LEG(k)] = -legs->i_leg_A[k] * c->bridge.inv_c_leg_1_F;
+        }
+    }
+}
+
+INLINE void general_n(const circuit_t *c, double t_s, point_t *p, shape_t shape, double rate[ELEMENTS])
+{
+    const machine_t *m = &c->machine;
+    machine_state_t state = circuit_machine_state(p);
+    machine_point_t point;
+    machine_rate_t moved;
+    circuit_legs_t legs;
+    bool floating = c->bridge.floating > 0;
+    double omega_e = m->pole_pairs * p->x[OMEGA_MECH];
+    machine_evaluate_n(m, &state, shape, floating || !m->loose, &point);
+    circuit_take(m, &point, p);
+    legs_n(c, p, shape, &legs);
+    memset(&rate[U], 0, (ACTIVE + 2 * PLANT_SETS) * sizeof rate[U]);
+    if (m->loose && !floating) {
+        machine_loose_rates_n(m, &point, omega_e, legs.v_V, shape, &rate[U]);
+    } else {
+        if (floating) {
+            floating_voltages(&c->bridge, m, &state, &point, omega_e, p->x[V_DC], legs.v_V, legs.v_leg_V,
+                              &moved);
+        } else {
+            machine_rates_n(m, &state, &point, omega_e, legs.v_V, shape, &moved);
+        }
+        memcpy(&rate[U], moved.u, (size_t)shape.active * sizeof rate[U]);
+        memcpy(&rate[EDDY], moved.eddy_A_s, 2 * (size_t)shape.sets * sizeof rate[U]);
+    }
+    swing_rates(c, &legs, rate);
+    rate[THETA_E] = omega_e;
+    shaft_rates(c, p, rate);
+    rate[V_DC] = dclink_rate(&c->link, p->x[V_DC], legs.i_dc_A, t_s);
+    rate[INT_V_ALPHA] = legs.v_V[0];
+    rate[INT_V_BETA] = legs.v_V[1];
+    rate[INT_IN] = legs.in_W;
+    rate[INT_COPPER] = copper_W(m, &state, point.i_A, shape.active);
+    rate[INT_DEVICE] = legs.device_W;
+    rate[INT_MECH] = p->torque_Nm * p->x[OMEGA_MECH];
+}
+
+void circuit_general(const circuit_t *c, double t_s, point_t *p, double rate[ELEMENTS]){
+#define CALL(shape) general_n(c, t_s, p, shape, rate)
+    FOR_SHAPE(&c->machine, CALL)
+#undef CALL
+}
+
+INLINE void currents_n(const circuit_t *c, point_t *p, shape_t shape)
+{
+    machine_state_t state = circuit_machine_state(p);
+    machine_point_t point;
+    machine_evaluate_n(&c->machine, &state, shape, false, &point);
+    circuit_take(&c->machine, &point, p);
+}
+
+void circuit_currents(const circuit_t *c, point_t *p)
+{
+#define CALL(shape) currents_n(c, p, shape)
+    FOR_SHAPE(&c->machine, CALL)
+#undef CALL
+}

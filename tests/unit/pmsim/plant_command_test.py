@@ -1,0 +1,112 @@
+"""`pmsim plant` as a user meets it: exit codes, files, messages with the line."""
+
+import csv
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+PMSIM = sys.argv[1]
+MACHINE = "sim_plant/machines/teknic_m2310p.yaml"
+ROWS = "t_s,va_V,vb_V,vc_V\n0,1,0,0\n1e-4,1,0,0\n2e-4,0,0,0\n"
+
+
+def pmsim(*arguments):
+    return subprocess.run([PMSIM, *map(str, arguments)], capture_output=True, text=True, check=False)
+
+
+def expect_exit(code, *arguments):
+    result = pmsim(*arguments)
+    assert result.returncode == code, f"{arguments}: exit {result.returncode}\n{result.stdout}{result.stderr}"
+    return result
+
+
+class Folder:
+    """Input and output of one run after the other; `refused` also sees that nothing was written."""
+
+    def __init__(self, folder):
+        self.input, self.out = folder / "in.csv", folder / "out.csv"
+
+    def run(self, text, machine=MACHINE, *more):
+        self.input.write_text(text)
+        expect_exit(0, "plant", machine, "--input", self.input, "--out", self.out, *more)
+        with self.out.open(encoding="ascii") as file:
+            return list(csv.DictReader(file))
+
+    def refused(self, text, message, machine=MACHINE, *more):
+        self.out.unlink(missing_ok=True)
+        self.input.write_text(text)
+        result = expect_exit(2, "plant", machine, "--input", self.input, "--out", self.out, *more)
+        assert message in result.stderr, f"{message}\nis not in\n{result.stderr}"
+        assert not self.out.exists(), "an output was written"
+
+
+def check_runs(folder):
+    rows = folder.run(ROWS)
+    assert [float(row["t_s"]) for row in rows] == [0, 1e-4, 2e-4], rows
+    assert list(rows[0]) == ["t_s", "ia_A", "ib_A", "ic_A", "theta_e_rad", "omega_mech_rad_s", "torque_Nm",
+                             "psi_d_Vs", "psi_q_Vs"], list(rows[0])
+    assert float(rows[1]["ia_A"]) > 0 and float(rows[0]["ia_A"]) == 0
+    turned = folder.run(ROWS, MACHINE, "--set", "start.theta_e_deg=90")
+    assert abs(float(turned[0]["theta_e_rad"]) - 1.5707963267948966) < 1e-15
+    again = folder.out.read_bytes()
+    folder.run(ROWS, MACHINE, "--set", "start.theta_e_deg=90")
+    assert folder.out.read_bytes() == again, "two runs differ"
+
+
+def check_table_errors(folder):
+    place = str(folder.input)
+    folder.refused(ROWS.replace("va_V", "va_mV"), f"{place}:1: unknown column \"va_mV\": wrong unit; did you mean "
+                   "\"va_V\"?")
+    folder.refused(ROWS.replace(",vc_V", ""), f"{place}:1: column \"vc_V\" is missing")
+    folder.refused(ROWS.replace("vb_V", "va_V"), f"{place}:1: column \"va_V\" stands here a second time")
+    folder.refused(ROWS.replace("t_s,", "t_s,speed,"), f"{place}:1: unknown column \"speed\"")
+    folder.refused(ROWS.replace("1e-4,1,0,0", "1e-4,1,0"), f"{place}:3: expected 4 values, found 3")
+    folder.refused(ROWS.replace("1e-4,1", "1e-4,one"), f"{place}:3: expected a number for va_V, found \"one\"")
+    folder.refused(ROWS.replace("2e-4,0", "2e-4,nan"), f"{place}:4: \"nan\" for va_V is not a finite number")
+    folder.refused(ROWS.replace("2e-4", "1e-4"), f"{place}:4: t_s must ascend")
+    folder.refused(ROWS.replace("0,1,0,0", "0,1e9,0,0"), f"{place}:2: va_V = 1e+09 is out of range")
+    folder.refused("", f"{place}: cannot be read, or is empty")
+    folder.refused("t_s,va_V,vb_V,vc_V\n", f"{place}: there are no rows")
+
+
+def check_other_errors(folder):
+    folder.refused(ROWS, "none.yaml: cannot be read", "none.yaml")
+    folder.refused(ROWS, "--set electrical.R_s_mohm", MACHINE, "--set", "electrical.R_s_mohm=1")
+    folder.refused(ROWS, "vx_V\" is missing", "sim_plant/machines/dtp_400.yaml")
+    folder.input.unlink()
+    result = expect_exit(2, "plant", MACHINE, "--input", folder.input, "--out", folder.out)
+    assert f"{folder.input}: cannot be read" in result.stderr, result.stderr
+    folder.input.write_text(ROWS)
+    nowhere = folder.out.parent / "none" / "out.csv"
+    result = expect_exit(2, "plant", MACHINE, "--input", folder.input, "--out", nowhere)
+    assert "there is no such folder" in result.stderr, result.stderr
+    result = expect_exit(2, "plant", MACHINE, "--input", folder.input, "--out", folder.input)
+    assert "is the input too" in result.stderr and folder.input.read_text() == ROWS, result.stderr
+    expect_exit(2, "plant", MACHINE, "--input", folder.input)
+
+
+def check_run_refuses(folder):
+    """The closed loop needs what the plant alone does not."""
+    for machine, why in (("dtp_400", "the drive cannot run two sets yet"),
+                         ("ow_400", "the drive cannot run an open winding yet"),
+                         ("bldc_fan", "drive.pole_pairs is missing")):
+        path = pathlib.Path(f"sim_plant/machines/{machine}.yaml").resolve()
+        scenario = folder.out.parent / "s.yaml"
+        scenario.write_text(f"title: t\nmachine: {path}\nstart: {{theta_e_deg: 0}}\nduration_s: 0.1\nprofile: []\n")
+        message = expect_exit(2, "run", scenario).stderr
+        assert f"{path}: {why}" in message, message
+
+
+def main():
+    assert "Example" in expect_exit(0, "plant", "--help").stdout
+    with tempfile.TemporaryDirectory() as name:
+        folder = Folder(pathlib.Path(name))
+        check_runs(folder)
+        check_table_errors(folder)
+        check_other_errors(folder)
+        check_run_refuses(folder)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,257 @@
+// Faults of switches, wires and windings through the plant, and bridges of six legs: currents against
+// Kirchhoff and Ohm, and every energy booked.
+#include "rig.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace
+{
+
+using rig::pi;
+
+// Events and integration: 1e-6 of the scales of the converter and the link.
+constexpr double closed_form = 1e-5;
+
+double residual_J(const plant_truth_t &t)
+{
+    return t.e_in_J - t.e_copper_J - t.e_device_J - t.e_mech_J - t.e_field_J;
+}
+
+plant_config_t locked_spm()
+{
+    plant_config_t c = rig::spm_400_linear();
+    c.mech.locked = true;
+    return c;
+}
+
+constexpr double R = 0.373, L = 3.24e-3;
+
+// Both switches of a leg in series across the link, beside what the motor draws.
+TEST(SwitchFault, ShootThroughDrawsTheLinkOverBothSwitches)
+{
+    plant_config_t config = locked_spm();
+    config.inverter = rig::inverter(10e3, 0.0, 0.0, 0.7, 0.05);
+    rig::Plant plant(config);
+    plant.run(rig::pwm(0, 0, 0), 3);
+    plant_set_leg_fault(plant, 0, PLANT_UPPER_SHORT);
+    plant_truth_t before = plant.truth();
+    EXPECT_NEAR(before.i_dc_A, 36.0 / 0.1, 1e-6);
+    plant.run(rig::pwm(0, 0, 0));
+    plant_truth_t after = plant.truth();
+    // the midpoint of the two lies at half the link, behind half of r_on: it drives A against B and C
+    EXPECT_NEAR(before.v_leg_V[0], 18.0, 1e-9);
+    double i_A = 12.0 / (R + 0.05) * -std::expm1(-(R + 0.05) / L * 1e-4);
+    EXPECT_NEAR(after.i_A[0], i_A, 0.01 * i_A); // A's own resistance is r_on/2, not r_on
+    double through_J = 36.0 * 36.0 / 0.1 * 1e-4;
+    EXPECT_NEAR(after.e_device_J - before.e_device_J, through_J, 1e-3 * through_J);
+    EXPECT_NEAR(residual_J(after), residual_J(before), 1e-6 * through_J);
+}
+
+TEST(SwitchFault, ShortedSwitchHoldsItsRail)
+{
+    rig::Plant plant(locked_spm());
+    plant.run(rig::all_off(), 2);
+    plant_set_leg_fault(plant, 1, PLANT_UPPER_SHORT);
+    plant.run(rig::all_off(), 2);
+    EXPECT_NEAR(plant.truth().v_leg_V[1], 36.0, 1e-9);
+    plant_set_leg_fault(plant, 1, PLANT_HEALTHY);
+    plant.run(rig::all_off(), 2);
+    EXPECT_NEAR(plant.truth().v_leg_V[1], 18.0, 1e-9) << "and lets go of it when it is well again";
+}
+
+// An upper switch that does not close: its half of the period belongs to the lower diode while current flows
+// out of the leg.
+TEST(SwitchFault, OpenSwitchLeavesTheDiode)
+{
+    plant_config_t config = locked_spm();
+    rig::Plant plant(config);
+    plant.run(rig::pwm(0.6, 0.4, 0.4), 300);
+    ASSERT_GT(plant.truth().i_A[0], 1.0);
+    plant_set_leg_fault(plant, 0, PLANT_UPPER_OPEN);
+    plant_truth_t middle = plant.at(50e-6); // the upper switch is commanded
+    EXPECT_GT(middle.i_A[0], 0.5);
+    EXPECT_NEAR(middle.v_leg_V[0], 0.0, 1e-9);
+    plant.run(rig::pwm(0.6, 0.4, 0.4), 300);
+    plant_truth_t t = plant.truth();
+    EXPECT_LT(t.i_A[0], 1e-6) << "no current out of a leg that cannot rise";
+    EXPECT_NEAR(residual_J(t), 0.0, 1e-6 * t.e_in_J);
+}
+
+TEST(WireFault, StopsTheCurrentAndBooksItsEnergy)
+{
+    plant_config_t config = locked_spm();
+    rig::Plant plant(config);
+    plant.run(rig::pwm(0.55, 0.48, 0.44), 1000);
+    plant_truth_t a = plant.truth();
+    ASSERT_GT(a.i_A[0], 1.0);
+    plant_set_leg_fault(plant, 0, PLANT_WIRE_OPEN);
+    plant_truth_t b = plant.truth();
+    // what is left is the current from B to C whose flux the coils of B and C keep: i_B - i_C
+    double i_BC = 0.5 * (a.i_A[1] - a.i_A[2]);
+    EXPECT_EQ(b.i_A[0], 0.0);
+    EXPECT_NEAR(b.i_A[1], i_BC, 1e-9);
+    EXPECT_NEAR(b.i_A[2], -i_BC, 1e-9);
+    double lost_J = 0.5 * L * 1.5 * a.i_A[0] * a.i_A[0]; // 3/2 L per amplitude along A
+    EXPECT_NEAR(b.e_device_J - a.e_device_J, lost_J, 1e-9 * lost_J + 1e-12);
+    EXPECT_NEAR(residual_J(b), residual_J(a), 1e-12);
+    plant.run(rig::pwm(0.55, 0.48, 0.44), 1000);
+    plant_truth_t c = plant.truth();
+    EXPECT_EQ(c.i_A[0], 0.0);
+    EXPECT_NEAR(c.i_A[1], 36.0 * 0.04 / (2 * R), 5e-3);
+    plant_set_leg_fault(plant, 0, PLANT_HEALTHY);
+    plant.run(rig::pwm(0.55, 0.48, 0.44), 1000);
+    EXPECT_NEAR(plant.truth().i_A[0], a.i_A[0], 1e-4);
+}
+
+// A motor with a terminal off shows its EMF there, however far beyond the rails: there are no diodes.
+TEST(WireFault, TerminalHasNoDiodes)
+{
+    plant_config_t config = rig::spm_400_linear();
+    rig::Plant plant(config, 0.4);
+    plant_set_speed(plant, 120.0);
+    plant_set_leg_fault(plant, 2, PLANT_WIRE_OPEN);
+    plant.run(rig::pwm(0, 0, 0)); // all off, so far
+    bool beyond = false;
+    for (int k = 0; k < 200; k++) {
+        plant.run(rig::pwm(0, 0, 0));
+        plant_truth_t t = plant.truth();
+        ASSERT_EQ(t.i_A[2], 0.0);
+        double e_C = -120.0 * 5 * 77.6e-3 * std::sin(t.theta_e_rad + 2 * pi / 3);
+        ASSERT_NEAR(t.v_leg_V[2], 1.5 * e_C, 1e-6);
+        beyond = beyond || t.v_leg_V[2] < -10.0;
+    }
+    EXPECT_TRUE(beyond);
+}
+
+TEST(Short, BetweenPhasesCarriesWhatOhmAsks)
+{
+    plant_config_t config = locked_spm();
+    rig::Plant plant(config);
+    plant_set_short(plant, 0, 1, 20.0);
+    plant.run(rig::pwm(1, 0, 0), 3000);
+    plant_truth_t t = plant.truth();
+    double winding_A = 24.0 / R, short_A = 36.0 / 20.0;
+    EXPECT_NEAR(t.i_A[0], winding_A + short_A, closed_form * winding_A);
+    EXPECT_NEAR(t.i_A[1], -0.5 * winding_A - short_A, closed_form * winding_A);
+    EXPECT_NEAR(t.i_A[2], -0.5 * winding_A, closed_form * winding_A);
+    EXPECT_NEAR(t.i_dc_A, t.i_A[0], 1e-9 * winding_A);
+    EXPECT_NEAR(residual_J(t), 0.0, 1e-6 * t.e_in_J);
+    plant_set_short(plant, 0, 1, -1.0);
+    EXPECT_NEAR(plant.truth().i_A[0], winding_A, closed_form * winding_A);
+    EXPECT_NEAR(residual_J(plant.truth()), residual_J(t), 1e-9 * t.e_in_J);
+    plant.run(rig::pwm(1, 0, 0), 10);
+    EXPECT_NEAR(plant.truth().i_A[1], -0.5 * winding_A, closed_form * winding_A);
+}
+
+// A floating terminal on the negative rail through a resistor: in series with the winding.
+TEST(Short, ToTheRailGivesAFloatingLegAPath)
+{
+    plant_config_t config = locked_spm();
+    rig::Plant plant(config);
+    plant_set_short(plant, 0, -1, 5.0);
+    plant_pwm_t pwm = rig::pwm(0, 1, 0);
+    pwm.driven[0] = pwm.driven[2] = false;
+    plant.run(pwm, 3000);
+    plant_truth_t t = plant.truth();
+    double i = 36.0 / (2 * R + 5.0);
+    EXPECT_NEAR(t.i_A[1], i, closed_form * i);
+    EXPECT_EQ(t.i_A[0], 0.0) << "not through the leg";
+    EXPECT_EQ(t.i_A[2], 0.0);
+    EXPECT_NEAR(t.v_leg_V[0], 5.0 * i, closed_form * 36.0);
+    EXPECT_NEAR(t.v_leg_V[2], 36.0 - R * i, closed_form * 36.0);
+    EXPECT_NEAR(residual_J(t), 0.0, 1e-6 * t.e_in_J);
+}
+
+TEST(Short, ToTheRailBesideADrivenLeg)
+{
+    plant_config_t config = locked_spm();
+    rig::Plant plant(config);
+    plant_set_short(plant, 0, -1, 12.0);
+    plant.run(rig::pwm(1, 1, 1), 3);
+    EXPECT_NEAR(plant.truth().i_A[0], 3.0, closed_form * 3.0);
+    EXPECT_NEAR(plant.truth().i_A[1], 0.0, 1e-9);
+}
+
+plant_pwm_t six(const double (&duty)[6])
+{
+    plant_pwm_t p{};
+    for (int k = 0; k < 6; k++) {
+        p.compare[k][0] = p.compare[k][1] = static_cast<uint32_t>(std::lround(duty[k] * rig::counts));
+        p.driven[k] = true;
+    }
+    return p;
+}
+
+TEST(SixLegs, TwoSetsHaveTheirOwnStars)
+{
+    plant_config_t config = locked_spm();
+    config.winding.sets = 2;
+    rig::Plant plant(config);
+    plant.run(six({1, 0, 0, 0, 1, 1}), 2000);
+    plant_truth_t t = plant.truth();
+    const double expected[] = {24.0, -12.0, -12.0, -24.0, 12.0, 12.0};
+    for (int k = 0; k < 6; k++) {
+        EXPECT_NEAR(t.i_A[k], expected[k] / R, closed_form * 24.0 / R) << k;
+    }
+    EXPECT_NEAR(t.v_neutral_V[0], 12.0, 1e-6);
+    EXPECT_NEAR(t.v_neutral_V[1], 24.0, 1e-6);
+    EXPECT_NEAR(t.i_dc_A, 48.0 / R, closed_form * 48.0 / R);
+    EXPECT_NEAR(residual_J(t), 0.0, 1e-6 * t.e_in_J);
+}
+
+// Each phase between two legs of its own: also what is common to all three drives current.
+TEST(SixLegs, OpenWindingHasThreeFreeCurrents)
+{
+    plant_config_t config = locked_spm();
+    config.winding.connection = PLANT_OPEN;
+    config.winding.L_0_H = 0.4e-3;
+    rig::Plant plant(config);
+    plant.run(six({1, 1, 1, 0, 1, 0}), 2000);
+    plant_truth_t t = plant.truth();
+    const double expected[] = {36.0, 0.0, 36.0};
+    for (int k = 0; k < 3; k++) {
+        EXPECT_NEAR(t.i_A[k], expected[k] / R, closed_form * 36.0 / R) << k;
+        EXPECT_NEAR(t.i_A[k + 3], -expected[k] / R, closed_form * 36.0 / R) << k;
+    }
+    EXPECT_NEAR(t.i_zero_A, 24.0 / R, closed_form * 36.0 / R);
+    EXPECT_NEAR(residual_J(t), 0.0, 1e-6 * t.e_in_J);
+}
+
+// L_0 alone limits what a common voltage drives.
+TEST(SixLegs, ZeroSequenceRisesWithItsOwnInductance)
+{
+    plant_config_t config = locked_spm();
+    config.winding.connection = PLANT_OPEN;
+    config.winding.L_0_H = 0.4e-3;
+    rig::Plant plant(config);
+    plant.run(six({1, 1, 1, 0, 0, 0}));
+    plant_run_period(plant);
+    plant_truth_t t = plant.truth();
+    EXPECT_NEAR(t.i_zero_A, 36.0 / R * -std::expm1(-R / 0.4e-3 * 1e-4), closed_form * 36.0 / R);
+    EXPECT_NEAR(t.i_d_A, 0.0, 1e-9);
+    EXPECT_NEAR(t.torque_Nm, 0.0, 1e-9);
+}
+
+// A phase of an open winding whose legs are both off, while the others go on.
+TEST(SixLegs, OnePhaseOfAnOpenWindingCanFloat)
+{
+    plant_config_t config = rig::spm_400_linear();
+    config.winding.connection = PLANT_OPEN;
+    config.winding.L_0_H = 1e-3;
+    rig::Plant plant(config, 0.3);
+    plant_set_speed(plant, 20.0);
+    plant_pwm_t pwm = six({0.7, 0.5, 0.4, 0.4, 0.5, 0.6});
+    pwm.driven[1] = pwm.driven[4] = false;
+    plant.run(pwm, 500);
+    plant_truth_t t = plant.truth();
+    EXPECT_EQ(t.i_A[1], 0.0);
+    EXPECT_EQ(t.i_A[4], 0.0);
+    EXPECT_GT(std::fabs(t.i_A[0]), 1.0);
+    EXPECT_NEAR(t.i_A[0], -t.i_A[3], 1e-9);
+    EXPECT_NEAR(t.v_leg_V[1] + t.v_leg_V[4], 36.0, 1e-9) << "centred";
+    EXPECT_NEAR(residual_J(t), 0.0, 1e-6 * t.e_in_J);
+}
+
+} // namespace
