@@ -339,16 +339,20 @@ static double arrival_s(const circuit_t *c, const double rate[], double h)
     return h;
 }
 
-static double next_step_s(const circuit_t *c, const double rate[], double left_s)
+/* last: its end is that of the segment, or an event, and nobody needs the rates there. */
+static double next_step_s(const circuit_t *c, const double rate[], double left_s, bool *last)
 {
-    double h = fmin(c->step_s, left_s);
+    double calm_s = c->bridge.swinging > 0 ? c->calm_swing_s : c->calm_s;
+    double h = fmin(larger(c->step_s, calm_s), left_s);
     double limit_rad =
         c->bridge.floating > 0 || c->bridge.diodes > 0 ? WATCHED_TURN_RAD : 0.9 * FRAME_TURN_MAX_RAD;
     double turn_rad = fabs(rate[THETA_E]) * h;
     if (turn_rad > limit_rad) {
         h *= limit_rad / turn_rad;
     }
-    h = arrival_s(c, rate, h);
+    double arrival = arrival_s(c, rate, h);
+    *last = arrival < h || h > 0.999 * left_s;
+    h = arrival < h ? arrival : h;
     return h > 0.999 * left_s ? left_s : h; /* no sliver at the end */
 }
 
@@ -381,8 +385,8 @@ INLINE double advance_once(circuit_t *c, double left_s, kind_t kind, double rate
 {
     point_t next;
     double rate_end[ELEMENTS];
-    double h = next_step_s(c, rate, left_s);
-    bool last = h >= left_s;
+    bool last;
+    double h = next_step_s(c, rate, left_s, &last);
     double error = step_kind(c, &h, rate, last, true, kind, &next, rate_end);
     while (error > 1.0 && h > 1e-9 * left_s) {
         h *= fmax(0.2, 0.9 / cbrt(error));

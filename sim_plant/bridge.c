@@ -27,26 +27,31 @@ void bridge_init(bridge_t *bridge, const plant_config_t *config, int legs)
     }
 }
 
-static void count(bridge_t *b, int k)
-{
-    leg_t leg = b->leg[k];
-    b->floating += leg == LEG_FLOATING;
-    b->swinging += leg == LEG_SWINGING;
-    b->diodes += bridge_is_diode(b, k);
-    b->inv_zone_1_A[k] = leg == LEG_LOW || leg == LEG_HIGH ? b->switched_1_A : 0.0;
-    b->upper[k] = leg == LEG_HIGH || leg == LEG_DIODE_HIGH ? 1.0 : (leg == LEG_BOTH ? 0.5 : 0.0);
-    b->g_through_S += leg == LEG_BOTH ? 0.5 / fmax(b->r_on_ohm, R_THROUGH_OHM) : 0.0;
-}
+/* What each kind of leg is */
+static const struct {
+    int floating, swinging, diode;
+    double upper;      /* tied to the upper rail */
+    double diode_drop; /* in units of v_diode, as it adds to the terminal's voltage */
+    double switched, both, source;
+} facts[] = {
+    [LEG_FLOATING] = {.floating = 1},
+    [LEG_SWINGING] = {.swinging = 1},
+    [LEG_LOW] = {.switched = 1.0},
+    [LEG_HIGH] = {.switched = 1.0, .upper = 1.0},
+    [LEG_BOTH] = {.both = 1.0, .upper = 0.5},
+    [LEG_DIODE_LOW] = {.diode = 1, .diode_drop = -1.0},
+    [LEG_DIODE_HIGH] = {.diode = 1, .diode_drop = 1.0, .upper = 1.0},
+    [LEG_SOURCE] = {.source = 1.0},
+};
 
 /* The usual three-phase star, which is all that many runs have */
 static void summarise_star(bridge_t *b)
 {
     abc_t upper, diode_V, source_V;
     for (int k = 0; k < 3; k++) {
-        leg_t leg = b->leg[k];
         upper.x[k] = b->upper[k];
-        diode_V.x[k] = leg == LEG_DIODE_HIGH ? b->v_diode_V : (leg == LEG_DIODE_LOW ? -b->v_diode_V : 0.0);
-        source_V.x[k] = leg == LEG_SOURCE ? b->v_source_V[k] : 0.0;
+        diode_V.x[k] = facts[b->leg[k]].diode_drop * b->v_diode_V;
+        source_V.x[k] = facts[b->leg[k]].source * b->v_source_V[k];
     }
     ab_t rail = frame_from_abc(upper);
     ab_t diode = frame_from_abc(diode_V);
@@ -61,14 +66,21 @@ static void summarise_star(bridge_t *b)
 
 void bridge_summarise(bridge_t *b, const winding_t *winding)
 {
+    double both = 0.0;
     b->floating = 0;
     b->swinging = 0;
     b->diodes = 0;
-    b->g_through_S = 0.0;
     b->r_series_ohm = b->leg[0] == LEG_SOURCE ? 0.0 : b->r_on_ohm;
     for (int k = 0; k < b->legs; k++) {
-        count(b, k);
+        leg_t leg = b->leg[k];
+        b->floating += facts[leg].floating;
+        b->swinging += facts[leg].swinging;
+        b->diodes += facts[leg].diode;
+        b->inv_zone_1_A[k] = facts[leg].switched * b->switched_1_A;
+        b->upper[k] = facts[leg].upper;
+        both += facts[leg].both;
     }
+    b->g_through_S = both > 0.0 ? 0.5 * both / fmax(b->r_on_ohm, R_THROUGH_OHM) : 0.0;
     if (winding->active == 2) {
         summarise_star(b);
     }

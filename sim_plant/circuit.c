@@ -12,14 +12,6 @@
 #define SLOPE_MARGIN  4.0   /* of v_dc / L: EMF, saturation */
 #define SMALL_CURRENT 1e-12 /* of the converter's full scale: nothing, for a floating leg */
 
-machine_state_t circuit_machine_state(const point_t *p)
-{
-    machine_state_t s = {.rotor = p->rotor, .theta_e_rad = p->x[THETA_E]};
-    memcpy(s.u, &p->x[U], sizeof s.u);
-    memcpy(s.eddy_A, &p->x[EDDY], sizeof s.eddy_A);
-    return s;
-}
-
 static void take_state(const machine_t *machine, const machine_state_t *s, const machine_point_t *m,
                        point_t *p)
 {
@@ -190,7 +182,7 @@ static bool high_side(leg_t leg)
 bool circuit_ignores(const circuit_t *c, const gates_t *gates, unsigned legs, double within_s)
 {
     const bridge_t *b = &c->bridge;
-    if (b->v_diode_V != b->v_switch_V || b->floating > 0 || b->swinging > 0 || !c->machine.loose) {
+    if (b->v_diode_V != b->v_switch_V || b->floating > 0 || b->swinging > 0) {
         return false;
     }
     double slope_A_s = SLOPE_MARGIN * c->machine.gamma_sum_1_H * fabs(c->now.x[V_DC]);
@@ -271,7 +263,7 @@ static bool start_diode(circuit_t *c)
         }
     }
     if (first >= 0) {
-        c->bridge.leg[first] = nodes.v_leg_V[first] > 0.5 * c->now.x[V_DC] ? LEG_DIODE_HIGH : LEG_DIODE_LOW;
+        set_leg(c, first, nodes.v_leg_V[first] > 0.5 * c->now.x[V_DC] ? LEG_DIODE_HIGH : LEG_DIODE_LOW);
         bridge_summarise(&c->bridge, &c->machine.winding);
     }
     return first >= 0;

@@ -24,6 +24,8 @@
 #include "sim_plant/mechanics.h"
 #include "sim_plant/probe.h"
 
+#include <string.h>
+
 /* Elements of the state vector. The INT_ do not act back: integrals since the start. What a plain machine has
  * lies in one piece; with swinging terminals it has three more before; the others have all. */
 enum {
@@ -124,6 +126,12 @@ void circuit_nodes(const circuit_t *circuit, const point_t *point, circuit_nodes
 /* Magnetic energy, and that of the output capacitances. */
 double circuit_field_J(const circuit_t *circuit);
 
-machine_state_t circuit_machine_state(const point_t *point);
+static inline machine_state_t circuit_machine_state(const point_t *p)
+{
+    machine_state_t s = {.rotor = p->rotor, .theta_e_rad = p->x[THETA_E]};
+    memcpy(s.u, &p->x[U], sizeof s.u);
+    memcpy(s.eddy_A, &p->x[EDDY], sizeof s.eddy_A);
+    return s;
+}
 
 #endif

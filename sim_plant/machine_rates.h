@@ -140,6 +140,24 @@ INLINE void inductance_matrix(const machine_state_t *s, const machine_point_t *p
     }
 }
 
+/* L x = b of two sets, in blocks of two: L = [A B; B' C], with the inverse of A and of C - B' A^-1 B. */
+INLINE void machine_eliminate_sets(double L[ACTIVE][ACTIVE], double x[ACTIVE])
+{
+    machine_tangent_t a = inverse((machine_tangent_t){L[0][0], L[0][1], L[1][1]});
+    dq_t first = times(a, (dq_t){L[0][2], L[1][2]});
+    dq_t second = times(a, (dq_t){L[0][3], L[1][3]});
+    machine_tangent_t rest = {L[2][2] - L[0][2] * first.d - L[1][2] * first.q,
+                              L[2][3] - L[0][2] * second.d - L[1][2] * second.q,
+                              L[3][3] - L[0][3] * second.d - L[1][3] * second.q};
+    dq_t y = {x[2] - first.d * x[0] - first.q * x[1], x[3] - second.d * x[0] - second.q * x[1]};
+    dq_t lower = times(inverse(rest), y);
+    dq_t upper = times(a, (dq_t){x[0], x[1]});
+    x[0] = upper.d - first.d * lower.d - second.d * lower.q;
+    x[1] = upper.q - first.q * lower.d - second.q * lower.q;
+    x[2] = lower.d;
+    x[3] = lower.q;
+}
+
 /* L x = b by elimination; positive definite, so without pivoting. */
 INLINE void machine_eliminate(int n, double L[ACTIVE][ACTIVE], double x[ACTIVE])
 {
@@ -236,7 +254,11 @@ INLINE void machine_rates_n(const machine_t *m, const machine_state_t *s, const 
     double x[ACTIVE];
     right_side(m, s, p, omega_e_rad_s, v_V, shape, x);
     inductance_matrix(s, p, shape, L);
-    machine_eliminate(shape.active, L, x);
+    if (shape.active == 4 && shape.sets == 2) {
+        machine_eliminate_sets(L, x);
+    } else {
+        machine_eliminate(shape.active, L, x);
+    }
     for (int set = 0; set < shape.sets; set++) {
         set_rates(m, s, p, omega_e_rad_s, set, of_set(x, set), rate);
     }

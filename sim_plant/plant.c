@@ -68,33 +68,28 @@ void plant_destroy(plant_t *plant)
     free(plant);
 }
 
-/* Whether the gates at their next edge change nothing but who carries the current: a diode or the switch
- * across it, with the same drop. Half of all edges do. Then nothing need wait for the edge. */
-static bool edge_is_neutral(const plant_t *plant, double edge_s, gates_t *after, unsigned *changed)
-{
-    *after = plant->gates;
-    *changed = gates_update(after, edge_s);
-    return circuit_ignores(&plant->circuit, after, *changed, edge_s - plant->t_s);
-}
-
-/* Advances to time t of the present period. */
+/* Advances to time t of the present period. Half of all edges change only whether a switch or the diode
+ * across it carries the current; where that makes no difference the circuit need not stop for them. */
 static void run_until(plant_t *plant, double t_s)
 {
     gates_t *gates = &plant->gates;
-    circuit_settle(&plant->circuit);
+    circuit_t *circuit = &plant->circuit;
+    if (plant->t_s >= t_s) {
+        return;
+    }
+    circuit_settle(circuit);
+    unsigned changed = gates_update(gates, plant->t_s);
     while (plant->t_s < t_s) {
-        unsigned changed = gates_update(gates, plant->t_s);
-        if (changed != 0u) {
-            circuit_switch(&plant->circuit, gates, changed);
-        }
-        double next_s = fmin(gates_next_s(gates, plant->t_s), t_s);
-        gates_t after;
-        while (next_s < t_s && edge_is_neutral(plant, next_s, &after, &changed)) {
-            *gates = after;
-            circuit_switch(&plant->circuit, gates, changed);
-            next_s = fmin(gates_next_s(gates, next_s), t_s);
-        }
-        circuit_advance(&plant->circuit, next_s - plant->t_s);
+        double next_s = plant->t_s;
+        do {
+            if (changed != 0u) {
+                circuit_switch(circuit, gates, changed);
+            }
+            next_s = gates_next_s(gates, next_s);
+            changed = next_s < t_s ? gates_update(gates, next_s) : 0u;
+        } while (next_s < t_s && circuit_ignores(circuit, gates, changed, next_s - plant->t_s));
+        next_s = next_s < t_s ? next_s : t_s;
+        circuit_advance(circuit, next_s - plant->t_s);
         plant->t_s = next_s;
     }
 }

@@ -5,7 +5,9 @@
 
 #include "tools/pmsim/commands.h"
 #include "tools/pmsim/loop.h"
+#include "tools/pmsim/machine_file.h"
 #include "tools/pmsim/notes.h"
+#include "tools/pmsim/open_loop_feed.h"
 #include "tools/pmsim/record_file.h"
 #include "tools/pmsim/settings_option.h"
 
@@ -77,24 +79,52 @@ void bench(const Options &options)
     std::printf("replay: %zu of %zu periods differ\n", different, periods.size());
 }
 
+// Machines that no firmware runs yet, fed open loop.
+void bench_six_legs(int repeat)
+{
+    const int periods = 20000;
+    std::printf(
+        "Six legs at 20 kHz, open loop at rated current and half speed: 1 s at %d Hz, one core, best of %d\n",
+        periods, repeat);
+    for (const char *machine : {"dtp_400", "ow_400"}) {
+        Setup setup = load_machine_file(std::string("sim_plant/machines/") + machine + ".yaml");
+        setup.plant.inverter.f_pwm_Hz = periods;
+        setup.plant.inverter.timer_counts = 4250; // of 170 MHz
+        const double wall_s = fastest_s(repeat, [&] {
+            OpenLoopFeed feed(setup);
+            for (int k = 0; k < periods; ++k) {
+                feed.step();
+            }
+        });
+        print_ratio(("plant alone, " + setup.name).c_str(), 1.0, wall_s, periods);
+    }
+}
+
 } // namespace
 
 void add_bench_command(CLI::App &app)
 {
     CLI::App *command = app.add_subcommand("bench", "Measure simulated seconds per wall second");
     auto options = std::make_shared<Options>();
-    command->add_option("scenario", options->scenario, "scenario file; of a sweep, its first run")
-        ->capture_default_str();
+    const CLI::Option *scenario =
+        command->add_option("scenario", options->scenario, "scenario file; of a sweep, its first run")
+            ->capture_default_str();
     command->add_option("--set", options->settings, settings_help())->allow_extra_args(false);
     command->add_option("--repeat", options->repeat, "goes, of which the fastest counts")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     command->footer(
-        "Plant and drive alone replay the recorded run, so that each does the same work as in it.\n\n"
+        "Plant and drive alone replay the recorded run, so that each does the same work as in it. Without\n"
+        "scenario and settings the machines with six legs follow, plant alone.\n\n"
         "Examples:\n"
         "  pmsim bench\n"
         "  pmsim bench tests/scenario/demo.yaml --set inverter.f_pwm_Hz=20000");
-    command->callback([options] { bench(*options); });
+    command->callback([options, scenario] {
+        bench(*options);
+        if (scenario->empty() && options->settings.empty()) {
+            bench_six_legs(options->repeat);
+        }
+    });
 }
 
 } // namespace pmsim

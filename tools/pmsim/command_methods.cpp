@@ -12,7 +12,7 @@ static void print_methods(bool implemented_only)
 {
     size_t count = 0;
     std::printf("%-4s %-9s %-48s %-12s %-22s %s\n", "row", "section", "method", "state", "parameter",
-                "scenario");
+                "shown by");
     for (const Method &method : methods()) {
         count += method.implemented ? 1 : 0;
         if (method.implemented || !implemented_only) {
@@ -32,8 +32,9 @@ void add_methods_command(CLI::App &app)
         app.add_subcommand("methods", "Print every method of the book: is it here, what selects it");
     auto implemented_only = std::make_shared<bool>(false);
     command->add_flag("--implemented", *implemented_only, "leave out what is not yet here");
-    command->footer(
-        "A method's scenario is tests/scenario/NAME.yaml; its parameter is explained by `pmsim params`.");
+    command->footer("A method is shown by tests/scenario/NAME.yaml, a model of the plant by "
+                    "tests/unit/FOLDER/NAME_test.cpp; its "
+                    "parameter is explained by `pmsim params`.");
     command->callback([implemented_only] { print_methods(*implemented_only); });
 }
 

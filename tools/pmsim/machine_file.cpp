@@ -1,6 +1,7 @@
 #include "tools/pmsim/machine_file.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "tools/pmsim/text.h"
@@ -9,6 +10,7 @@ namespace pmsim
 {
 
 static const double two_pi = 6.283185307179586;
+static const double fastest_1_s = 1e9; // 1e5 steps of the integrator in a PWM period; machines have 1e7
 
 Setup read_machine(const Value &value)
 {
@@ -42,6 +44,46 @@ static Setup read_machine_of(const Map &document)
     return load_machine_file(path.string());
 }
 
+// Ratio, and nothing where the denominator is: 0 means that there is no such part.
+static double rate_1_s(double a, double b)
+{
+    return b > 0.0 ? a / b : 0.0;
+}
+
+void check_time_constants(const Setup &setup)
+{
+    const plant_winding_t &w = setup.plant.winding;
+    const plant_machine_t &m = setup.plant.machine;
+    const plant_mech_t &mech = setup.plant.mech;
+    const plant_dclink_t &link = setup.plant.dclink;
+    const double L_H = setup.flux_map ? 0.0 : std::min(m.L_d0_H, m.L_q0_H);
+    const double R_ohm = m.R_s_ohm + setup.plant.inverter.r_on_ohm;
+    const double inv_J = rate_1_s(1.0, mech.J_kgm2) + rate_1_s(1.0, mech.J_load_kgm2);
+    const std::pair<const char *, double> rates_1_s[] = {
+        {"winding.L_eddy_d_H with R_eddy_ohm", rate_1_s(w.R_eddy_ohm, w.L_eddy_d_H)},
+        {"winding.L_eddy_q_H with R_eddy_ohm", rate_1_s(w.R_eddy_ohm, w.L_eddy_q_H)},
+        {"winding.L_eddy_d_H with R_s_ohm and r_on_ohm", rate_1_s(R_ohm, w.L_eddy_d_H)},
+        {"winding.L_eddy_q_H with R_s_ohm and r_on_ohm", rate_1_s(R_ohm, w.L_eddy_q_H)},
+        {"winding.L_0_H with R_s_ohm and r_on_ohm", rate_1_s(R_ohm, w.L_0_H)},
+        {"electrical.R_s_ohm with r_on_ohm, L_d0_H and L_q0_H", rate_1_s(R_ohm, L_H)},
+        {"electrical.c_A_Wb5 with psi_m_Wb and R_s_ohm", R_ohm * 5.0 * m.c_A_Wb5 * std::pow(m.psi_m_Wb, 4)},
+        {"inverter.c_leg_F with L_d0_H and L_q0_H",
+         std::sqrt(rate_1_s(1.0, L_H * setup.plant.inverter.c_leg_F))},
+        {"dclink.c_F with r_source_ohm", rate_1_s(1.0, link.r_source_ohm * link.c_F)},
+        {"dclink.c_F with r_chopper_ohm", rate_1_s(1.0, link.r_chopper_ohm * link.c_F)},
+        {"mechanics.J_kgm2 with B_Nms", rate_1_s(mech.B_Nms, mech.J_kgm2)},
+        {"mechanics.load_Nms with the inertia", mech.load_Nms * inv_J},
+        {"mechanics.d_shaft_Nms with J_kgm2 and J_load_kgm2", mech.d_shaft_Nms * inv_J},
+        {"mechanics.k_shaft_Nm with J_kgm2 and J_load_kgm2", std::sqrt(mech.k_shaft_Nm * inv_J)},
+    };
+    for (const auto &[what, rate] : rates_1_s) {
+        if (rate > fastest_1_s) {
+            refuse_plant(setup, std::string(what) + ": a time constant of " + format(1.0 / rate, 2) +
+                                    " s, which would take too long to integrate");
+        }
+    }
+}
+
 void apply_settings(Setup &setup, const Settings &settings)
 {
     const std::vector<std::string> &sections = setup_sections();
@@ -58,9 +100,11 @@ void apply_settings(Setup &setup, const Settings &settings)
 
 Setup read_layers(const Map &document, const Settings &settings)
 {
-    Setup setup = read_machine_of(document);
+    const auto other = setting_value(settings, "machine"); // as a path from where the program runs
+    Setup setup = other ? load_machine_file(other->text()) : read_machine_of(document);
     read_sections(setup, document, false);
     apply_settings(setup, settings);
+    check_time_constants(setup);
     return setup;
 }
 
@@ -76,6 +120,7 @@ std::optional<Value> setting_value(const Settings &settings, const std::string &
 
 void check_settings(const Settings &settings, std::vector<std::string> known)
 {
+    known.emplace_back("machine");
     const std::vector<std::string> parameters = parameter_names();
     known.insert(known.end(), parameters.begin(), parameters.end());
     for (const std::string &section : setup_sections()) {

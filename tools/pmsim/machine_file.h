@@ -22,6 +22,9 @@ Setup load_machine_file(const std::string &path);
 // `machine:` of a document, its other sections and the settings.
 Setup read_layers(const Map &document, const Settings &settings);
 
+// Refuses values, each within its limits, that together make the plant too stiff to be waited for.
+void check_time_constants(const Setup &setup);
+
 void apply_settings(Setup &setup, const Settings &settings);
 
 // The last one of this name.

@@ -47,6 +47,7 @@ PlantFile read_plant_file(const Value &document, const Settings &settings)
         check_settings(settings, known);
         file.setup = read_machine(document);
         apply_settings(file.setup, settings);
+        check_time_constants(file.setup);
         file.theta_e_rad = start_angle(Map(document), settings); // a machine file has no start, but --set may
         return file;
     }

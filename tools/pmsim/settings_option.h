@@ -13,7 +13,9 @@ namespace pmsim
 inline const char *settings_help()
 {
     return "name=value, may be repeated: a drive parameter in SI (flux_bandwidth=30), a key of a section "
-           "(inverter.dead_time_s=0), or a variable of the scenario's sweep (angle=35: that value only)";
+           "(inverter.dead_time_s=0), a variable of the scenario's sweep (angle=35: that value only), or "
+           "another machine "
+           "(machine=FILE)";
 }
 
 inline Settings parse_settings(const std::vector<std::string> &words)

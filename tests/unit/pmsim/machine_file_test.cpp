@@ -247,6 +247,32 @@ TEST(MachineFile, ErrorsNameThePlace)
     EXPECT_EQ(machine_error("small", "small"), "m.yaml:7:3: key \"R_s\" is missing"); // of drive:
 }
 
+// A machine of which each value is within its limits; `changes` are settings that together make it stiff.
+std::string stiffness_error(const Settings &changes)
+{
+    Setup setup = load_machine_file("sim_plant/machines/ipm_1000.yaml");
+    apply_settings(setup, changes);
+    try {
+        check_time_constants(setup);
+    } catch (const InputError &error) {
+        return error.what();
+    }
+    return "";
+}
+
+TEST(MachineFile, TimeConstantsTooShortToIntegrateAreRefused)
+{
+    EXPECT_THAT(stiffness_error({{"winding.L_eddy_d_H", "1e-8"}, {"winding.R_eddy_ohm", "20"}}),
+                HasSubstr("winding.L_eddy_d_H with R_eddy_ohm: a time constant of 5e-10 s"));
+    EXPECT_THAT(stiffness_error({{"mechanics.J_kgm2", "1e-9"}, {"mechanics.B_Nms", "10"}}),
+                HasSubstr("mechanics.J_kgm2 with B_Nms: a time constant of 1e-10 s"));
+    EXPECT_THAT(stiffness_error({{"dclink.c_F", "1e-9"}, {"dclink.r_source_ohm", "0.1"}}),
+                HasSubstr("dclink.c_F with r_source_ohm: a time constant of 1e-10 s"));
+    // Twice as long as what is refused.
+    EXPECT_EQ(stiffness_error({{"winding.L_eddy_d_H", "1e-8"}, {"winding.R_eddy_ohm", "5"}}), "");
+    EXPECT_EQ(stiffness_error({{"dclink.c_F", "1e-8"}, {"dclink.r_source_ohm", "0.2"}}), "");
+}
+
 TEST(MachineFile, BoardParametersFollowTheBoardUnlessGiven)
 {
     pmsim::Setup setup = load_machine_file("sim_plant/machines/ipm_1000.yaml");

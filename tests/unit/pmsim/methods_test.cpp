@@ -29,7 +29,10 @@ TEST(Methods, WhatIsImplementedHasItsParameterAndItsScenario)
             continue;
         }
         EXPECT_TRUE(method.parameter.empty() || find_parameter(method.parameter)) << method.row;
-        EXPECT_TRUE(std::filesystem::exists("tests/scenario/" + method.scenario + ".yaml")) << method.row;
+        const bool is_test = method.scenario.find('/') != std::string::npos;
+        const std::string proof = is_test ? "tests/unit/" + method.scenario + "_test.cpp"
+                                          : "tests/scenario/" + method.scenario + ".yaml";
+        EXPECT_TRUE(std::filesystem::exists(proof)) << method.row;
     }
 }
 

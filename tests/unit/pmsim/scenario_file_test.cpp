@@ -69,6 +69,14 @@ TEST(ScenarioFile, SeedDecidesTheRandomAngleAndTheNoise)
     EXPECT_EQ(other.setup.plant.sensor.seed, 6U);
 }
 
+TEST(ScenarioFile, AnotherMachineTakesThePlaceOfTheFiles)
+{
+    EXPECT_EQ(load(small_scenario()).setup.name, "IPM-1000");
+    const Scenario other = load(small_scenario(), {{"machine", "sim_plant/machines/spm_400.yaml"}});
+    EXPECT_EQ(other.setup.name, "SPM-400");
+    EXPECT_THROW(load(small_scenario(), {{"machine", "sim_plant/machines/none.yaml"}}), InputError);
+}
+
 TEST(ScenarioFile, ErrorsOfTheDocument)
 {
     EXPECT_EQ(error_with("title: small\n", ""), "s.yaml:1:1: key \"title\" is missing");

@@ -43,6 +43,7 @@ struct Seen {
         for (int k = 0; k < 3; k++) {
             for (Complex off : {leg_mean[k].value() - leg_dc.A[k], leg[k].value() - leg_ac.A[k],
                                 motor_mean[k].value() - motor_dc.A[k], motor[k].value() - motor_ac.A[k]}) {
+                EXPECT_TRUE(std::isfinite(std::abs(off)));
                 worst_A = std::max(worst_A, std::abs(off));
             }
             largest_A =

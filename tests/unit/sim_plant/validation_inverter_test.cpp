@@ -150,10 +150,10 @@ double swing_error_V(const Swing &swing, double i_A)
     return 1.5 * (swing.v_dc_V * duties(pwm) - mean_voltage(t)).real();
 }
 
-/* One of the two edges of a period waits for the current to move the terminal by dv/dt = i/C: the
- * voltage-time area it keeps is C V_dc^2 / 2 i if it arrives within the gap, and V_dc gap - i gap^2 / 2 C if
- * not. With I = C V_dc/gap this is, in parts of the loss without capacitance, i / 2 I        for i < I: slope
- * 1/2 I, 1 - I / 2 i    beyond. */
+/* One of the two edges of a period waits for the current to move the terminal by dv/dt = i/C. The
+ * voltage-time area that it keeps is C V_dc^2/(2 i) if it arrives within the gap, V_dc gap - i gap^2/(2 C) if
+ * not. In parts of the loss without capacitance, and with x = i gap/(C V_dc), what remains is x/2 below x = 1
+ * and 1 - 1/(2 x) beyond. */
 double swing_model(double x)
 {
     return std::fabs(x) < 1.0 ? 0.5 * x : sign(x) - 0.5 / x;
@@ -175,7 +175,9 @@ SwingFigures swing_figures(const Swing &swing)
         sum_xy += std::fabs(x) < 1.0 ? x * y : 0.0;
         sum_xx += std::fabs(x) < 1.0 ? x * x : 0.0;
     }
-    // 5.6.1.2 has slope 1/I_th; the threshold that gives its clip law the true slope is I_th = 2 C V_dc/gap.
+    // The clip law of 5.6.1.2, clip(i/I_th), has this slope with I_th = 2 C V_dc/gap, and is then up to 1/4
+    // too high at its corner; with half of that, which 5.6.1.2 gives as an estimate, it would be twice as
+    // steep.
     figures.slope = std::fabs(2.0 * sum_xy / sum_xx - 1.0);
     return figures;
 }

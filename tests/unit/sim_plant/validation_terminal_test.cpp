@@ -64,6 +64,7 @@ double node_deviation_V(const SixStep &drive, const plant_truth_t &t, double t_s
     double worst_V = std::fabs(t.v_neutral_V[0] - v_N_V);
     for (int k = 0; k < 3; k++) {
         double expected_V = carries[k] ? v_V[k] : v_N_V + emf_V(c, k, drive.omega_e, t.theta_e_rad);
+        EXPECT_TRUE(std::isfinite(t.v_leg_V[k]));
         worst_V = std::max(worst_V, std::fabs(t.v_leg_V[k] - expected_V));
     }
     return worst_V;
