@@ -5,7 +5,8 @@
 #include <math.h>
 #include <string.h>
 
-#define MAX_EVENTS 400 /* of a segment; more would be chatter */
+#define MAX_EVENTS                                                                                           \
+    10000 /* of a segment, as where a short rings with output capacitances; more would be chatter */
 
 /* While diodes may start or stop, a step is at most this turn: what begins and ends within it is missed, a
  * peak of EMF above the link of at most 5e-5. */
@@ -388,8 +389,8 @@ INLINE double advance_once(circuit_t *c, double left_s, kind_t kind, double rate
     bool last;
     double h = next_step_s(c, rate, left_s, &last);
     double error = step_kind(c, &h, rate, last, true, kind, &next, rate_end);
-    while (error > 1.0 && h > 1e-9 * left_s) {
-        h *= fmax(0.2, 0.9 / cbrt(error));
+    while (!(error <= 1.0) && h > 1e-9 * left_s) { /* NaN too */
+        h *= error > 1.0 ? fmax(0.2, 0.9 / cbrt(error)) : 0.2;
         c->step_s = h;
         error = step_kind(c, &h, rate, false, true, kind, &next, rate_end);
     }

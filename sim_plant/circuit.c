@@ -9,6 +9,7 @@
  * part of a swing of the winding with the output capacitance. Its error is then below 1e-7 of the change. */
 #define CALM          0.01
 #define SWING_SHARE   0.1
+#define DAMPED        0.2   /* what dies out by itself, as the link on its source, may do more */
 #define SLOPE_MARGIN  4.0   /* of v_dc / L: EMF, saturation */
 #define SMALL_CURRENT 1e-12 /* of the converter's full scale: nothing, for a floating leg */
 
@@ -292,11 +293,33 @@ void circuit_settle(circuit_t *c)
     dclink_settle(&c->link, c->now.x[V_DC]);
 }
 
+/* Of shaft, rotor in its field, and link with the windings: undamped they must not gain energy. */
+static double oscillation_1_s(const circuit_t *c)
+{
+    const plant_mech_t *m = &c->mech.parameters;
+    double inv_J = 1.0 / m->J_kgm2 + (m->J_load_kgm2 > 0.0 ? 1.0 / m->J_load_kgm2 : 0.0);
+    double psi_Wb = c->machine.pole_pairs * c->machine.psi_m_Wb;
+    double gamma_1_H = c->machine.gamma_sum_1_H;
+    double stiffness_Nm = m->k_shaft_Nm + 1.5 * psi_Wb * psi_Wb * gamma_1_H;
+    return sqrt(stiffness_Nm * inv_J) + sqrt(gamma_1_H * c->link.inv_C_1_F);
+}
+
+static double damping_1_s(const circuit_t *c)
+{
+    const plant_mech_t *m = &c->mech.parameters;
+    double inv_J = 1.0 / m->J_kgm2 + (m->J_load_kgm2 > 0.0 ? 1.0 / m->J_load_kgm2 : 0.0);
+    double omega = fabs(c->now.x[OMEGA_MECH]) + fabs(c->now.x[OMEGA_LOAD]);
+    double damping_Nms = m->B_Nms + m->d_shaft_Nms + m->load_Nms + 2.0 * m->load_Nms2 * omega;
+    return damping_Nms * inv_J + (c->link.g_source_S + c->link.g_chopper_S) * c->link.inv_C_1_F;
+}
+
+/* Longest steps of Heun's method, which checks nothing. */
 static void find_calm(circuit_t *c)
 {
     double gamma_1_H = c->machine.gamma_sum_1_H;
     double fastest_1_s = c->machine.fastest_1_s + gamma_1_H * c->bridge.r_on_ohm +
-                         c->machine.pole_pairs * fabs(c->now.x[OMEGA_MECH]);
+                         c->machine.pole_pairs * fabs(c->now.x[OMEGA_MECH]) + oscillation_1_s(c) +
+                         CALM / DAMPED * damping_1_s(c);
     c->calm_s = c->calm / fastest_1_s;
     c->calm_swing_s = c->calm / (fastest_1_s + SWING_SHARE * sqrt(gamma_1_H * c->bridge.inv_c_leg_1_F));
 }

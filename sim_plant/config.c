@@ -183,8 +183,9 @@ const char *config_fault(const plant_config_t *config)
     fault = fault ? fault : inverter_fault(&config->inverter);
     fault = fault ? fault : dclink_fault(&config->dclink);
     fault = fault ? fault : config_sensor_fault(&config->sensor, 1.0 / config->inverter.f_pwm_Hz);
-    if (!fault && !(config->tolerance >= 0.0 && config->tolerance <= 1e-2)) {
-        fault = "tolerance must be between 0 (default) and 0.01";
+    double tolerance = config->tolerance;
+    if (!fault && tolerance != 0.0 && !(tolerance >= 1e-12 && tolerance <= 1e-2)) {
+        fault = "tolerance must be 0 (default) or between 1e-12 and 0.01";
     }
     return fault;
 }

@@ -602,4 +602,30 @@ TEST(Mechanics, ImposedRampInThePlant)
     EXPECT_NEAR(plant.truth().omega_mech_rad_s, 5.0, 1e-12) << "starts where it is told to";
 }
 
+// Between two errors of the integrator, one that feeds an oscillation is the worse: an undamped shaft between
+// two free masses keeps its amplitude, whatever method takes the steps.
+TEST(Mechanics, UndampedShaftKeepsItsAmplitude)
+{
+    plant_config_t config = rig::spm_400_linear();
+    config.machine = {0.05, 1e-3, 1e-3, 0.0, 1e-5, 1};
+    config.mech.J_kgm2 = 1e-4;
+    config.mech.B_Nms = 0.0;
+    config.mech.J_load_kgm2 = 1e-3;
+    config.mech.k_shaft_Nm = 1e4; // 10500 rad/s
+    rig::Plant plant(config);
+    plant_set_load(plant, 100.0);
+    plant.run(rig::pwm(0.5, 0.5, 0.5));
+    plant_set_load(plant, 0.0);
+    double early = 0.0, late = 0.0;
+    for (int k = 0; k < 5000; k++) {
+        plant.run(rig::pwm(0.5, 0.5, 0.5));
+        plant_truth_t t = plant.truth();
+        double twisting = std::fabs(t.omega_mech_rad_s - t.omega_load_rad_s);
+        early = k < 500 ? std::fmax(early, twisting) : early;
+        late = k >= 4500 ? std::fmax(late, twisting) : late;
+    }
+    EXPECT_GT(early, 5.0);
+    EXPECT_NEAR(late, early, 0.03 * early); // 800 oscillations
+}
+
 } // namespace
