@@ -107,7 +107,7 @@ dq_t machine_flux_Wb(const machine_t *machine, const machine_state_t *state, con
 double machine_energy_J(const machine_t *machine, const machine_state_t *state, const machine_point_t *point);
 
 /* The voltage drop of the windings' resistance. */
-void machine_drop_V(const machine_t *machine, const double i_A[ACTIVE], double drop_V[ACTIVE]);
+void machine_drop_V(const machine_t *machine, const double i_A[ACTIVE], double v_V[ACTIVE]);
 
 static inline dq_t machine_current_A(const machine_t *m, dq_t psi_Wb)
 {

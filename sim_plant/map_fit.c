@@ -269,9 +269,9 @@ bool map_fit_nodes(const map_grid_t *grid, bool limit, double *psi_d_Wb, double 
         .edges = (n - 1) * m + n * (m - 1),
         .along_d = {n, m, grid->i_d_A},
         .along_q = {m, 1, grid->i_q_A},
-        .psi_d = psi_d_Wb,
-        .psi_q = psi_q_Wb,
     };
+    fit.psi_d = psi_d_Wb;
+    fit.psi_q = psi_q_Wb;
     bool allocated = allocate(&fit);
     if (allocated) {
         set_edges(&fit);

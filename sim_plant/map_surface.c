@@ -42,7 +42,8 @@ void map_surface_sum(const map_table_t *map, int cell_d, int cell_q, const map_s
         for (int layer = 1; layer < map->layers; layer += 2) {
             const double *cosine = patch + layer * MAP_PATCH + row, *sine = cosine + MAP_PATCH;
             double x = series->x[layer - 1], y = series->x[layer];
-            double order = map->theta_order * (layer / 2 + 1);
+            int harmonic = layer / 2 + 1;
+            double order = map->theta_order * harmonic;
             double x_theta = order * x, y_theta = order * y;
             for (int k = 0; k < 6; k++) {
                 sum[k] += x * cosine[k] + y * sine[k];

@@ -10,7 +10,8 @@
 
 static double phase_angle(int phase)
 {
-    return 2.0 * PI / 3.0 * (phase % 3) + PI / 6.0 * (phase / 3);
+    int set = phase / 3;
+    return 2.0 * PI / 3.0 * (phase % 3) + PI / 6.0 * set;
 }
 
 /* Component of coordinate c of its set along a phase */

@@ -121,7 +121,7 @@ std::optional<Value> setting_value(const Settings &settings, const std::string &
 void check_settings(const Settings &settings, std::vector<std::string> known)
 {
     known.emplace_back("machine");
-    const std::vector<std::string> parameters = parameter_names();
+    const std::vector<std::string> &parameters = parameter_names();
     known.insert(known.end(), parameters.begin(), parameters.end());
     for (const std::string &section : setup_sections()) {
         for (const std::string &key : section_keys(section)) {

@@ -25,6 +25,7 @@ const Limit limits[] = {{"t_s", 1e6}, {load_column, 1e6}, {speed_column, 1e6}};
 std::vector<std::string> leg_columns(const Setup &setup, const char *quantity, const char *unit)
 {
     std::vector<std::string> columns;
+    columns.reserve(static_cast<size_t>(leg_count(setup.plant)));
     for (int leg = 0; leg < leg_count(setup.plant); ++leg) {
         columns.push_back(quantity + leg_names()[static_cast<size_t>(leg)] + unit);
     }
