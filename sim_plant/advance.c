@@ -381,7 +381,8 @@ static void advance_probe(circuit_t *c, const point_t *to, double h)
 }
 
 /* Takes the step that the error control allows, at most left_s; *rate is that of the start, and on return
- * of the end. Returns the time advanced; *event when the kind of motion may have changed at its end. */
+ * of the end if nothing happened there. Returns the time advanced; *event when the kind of motion may have
+ * changed at its end. */
 INLINE double advance_once(circuit_t *c, double left_s, kind_t kind, double rate[], bool *event)
 {
     point_t next;
@@ -409,6 +410,9 @@ INLINE double advance_once(circuit_t *c, double left_s, kind_t kind, double rate
     }
     take_point(&next, kind, &c->now);
     c->t_s += h;
+    if (*event) {
+        return h; /* the rates will be those of another circuit */
+    }
     if (last && h < left_s) {
         rates_now(c, kind, rate);
     } else {

@@ -210,7 +210,8 @@ void circuit_sources(circuit_t *c, const double v_leg_V[])
     summarise(c);
 }
 
-void circuit_project(circuit_t *c)
+/* Moves the windings onto zero current of the floating legs. */
+static void project(circuit_t *c)
 {
     machine_state_t state = circuit_machine_state(&c->now);
     machine_point_t point;
@@ -279,7 +280,7 @@ void circuit_settle_legs(circuit_t *c)
         catch_swinging(c);
     }
     if (c->bridge.floating > 0) {
-        circuit_project(c);
+        project(c);
         for (int n = 0; n < PLANT_LEGS && start_diode(c); n++) {
         }
     }
@@ -294,20 +295,18 @@ void circuit_settle(circuit_t *c)
 }
 
 /* Of shaft, rotor in its field, and link with the windings: undamped they must not gain energy. */
-static double oscillation_1_s(const circuit_t *c)
+static double oscillation_1_s(const circuit_t *c, double inv_J)
 {
     const plant_mech_t *m = &c->mech.parameters;
-    double inv_J = 1.0 / m->J_kgm2 + (m->J_load_kgm2 > 0.0 ? 1.0 / m->J_load_kgm2 : 0.0);
     double psi_Wb = c->machine.pole_pairs * c->machine.psi_m_Wb;
     double gamma_1_H = c->machine.gamma_sum_1_H;
     double stiffness_Nm = m->k_shaft_Nm + 1.5 * psi_Wb * psi_Wb * gamma_1_H;
     return sqrt(stiffness_Nm * inv_J) + sqrt(gamma_1_H * c->link.inv_C_1_F);
 }
 
-static double damping_1_s(const circuit_t *c)
+static double damping_1_s(const circuit_t *c, double inv_J)
 {
     const plant_mech_t *m = &c->mech.parameters;
-    double inv_J = 1.0 / m->J_kgm2 + (m->J_load_kgm2 > 0.0 ? 1.0 / m->J_load_kgm2 : 0.0);
     double omega = fabs(c->now.x[OMEGA_MECH]) + fabs(c->now.x[OMEGA_LOAD]);
     double damping_Nms = m->B_Nms + m->d_shaft_Nms + m->load_Nms + 2.0 * m->load_Nms2 * omega;
     return damping_Nms * inv_J + (c->link.g_source_S + c->link.g_chopper_S) * c->link.inv_C_1_F;
@@ -316,10 +315,12 @@ static double damping_1_s(const circuit_t *c)
 /* Longest steps of Heun's method, which checks nothing. */
 static void find_calm(circuit_t *c)
 {
+    const plant_mech_t *m = &c->mech.parameters;
+    double inv_J = 1.0 / m->J_kgm2 + (m->J_load_kgm2 > 0.0 ? 1.0 / m->J_load_kgm2 : 0.0);
     double gamma_1_H = c->machine.gamma_sum_1_H;
     double fastest_1_s = c->machine.fastest_1_s + gamma_1_H * c->bridge.r_on_ohm +
-                         c->machine.pole_pairs * fabs(c->now.x[OMEGA_MECH]) + oscillation_1_s(c) +
-                         CALM / DAMPED * damping_1_s(c);
+                         c->machine.pole_pairs * fabs(c->now.x[OMEGA_MECH]) + oscillation_1_s(c, inv_J) +
+                         CALM / DAMPED * damping_1_s(c, inv_J);
     c->calm_s = c->calm / fastest_1_s;
     c->calm_swing_s = c->calm / (fastest_1_s + SWING_SHARE * sqrt(gamma_1_H * c->bridge.inv_c_leg_1_F));
 }
@@ -347,7 +348,7 @@ static void refresh(circuit_t *c)
 {
     circuit_align(c);
     circuit_currents(c, &c->now);
-    circuit_project(c);
+    project(c);
     reassign_diodes(c);
 }
 
@@ -367,7 +368,6 @@ void circuit_set_machine(circuit_t *c, const plant_config_t *config, double wind
     double R_ohm = branch >= 0 ? c->machine.winding.R_ohm[branch][branch] : -1.0;
     machine_set(&c->machine, config, winding_degC, magnet_degC);
     machine_set_branch(&c->machine, axis, R_ohm);
-    find_calm(c);
     bridge_summarise(&c->bridge, &c->machine.winding);
     refresh(c);
 }
@@ -378,7 +378,7 @@ void circuit_wire(circuit_t *c, int leg, bool off)
     c->bridge.off_wire[leg] = off;
     c->bridge.leg[leg] = LEG_FLOATING; /* back on: its gate or a diode takes it again */
     summarise(c);
-    circuit_project(c);
+    project(c);
     c->jump_device_J += before_J - circuit_field_J(c);
     reassign_diodes(c);
 }
@@ -397,7 +397,7 @@ void circuit_short(circuit_t *c, int leg_a, int leg_b, double R_ohm)
         c->now.x[U + a] = 0.0;
     }
     bridge_summarise(&c->bridge, &c->machine.winding);
-    circuit_project(c); /* a floating leg may have fed the branch that is gone */
+    project(c); /* a floating leg may have fed the branch that is gone */
     c->jump_device_J += before_J - circuit_field_J(c);
     reassign_diodes(c);
 }

@@ -39,9 +39,6 @@ void circuit_currents(const circuit_t *circuit, point_t *point);
 /* Brings the conduction of the legs into the state that belongs to the present point. */
 void circuit_settle_legs(circuit_t *circuit);
 
-/* Moves the windings onto zero current of the floating legs. */
-void circuit_project(circuit_t *circuit);
-
 /* A swinging terminal counts as arrived this close to a diode's threshold, relative to the link. */
 #define SNAP 1e-4
 

@@ -9,16 +9,6 @@
 #define STAR   ((shape_t){2, 1, 3})
 #define OPEN   ((shape_t){3, 1, 6})
 #define DOUBLE ((shape_t){4, 2, 6})
-#define FOR_SHAPE(machine, call)                                                                             \
-    if ((machine)->winding.branch >= 0) {                                                                    \
-        call(machine_shape(machine));                                                                        \
-    } else if ((machine)->winding.zero >= 0) {                                                               \
-        call(OPEN);                                                                                          \
-    } else if ((machine)->winding.sets > 1) {                                                                \
-        call(DOUBLE);                                                                                        \
-    } else {                                                                                                 \
-        call(STAR);                                                                                          \
-    }
 
 /* Coordinates that leg k has a part in: of two stars without a fault branch only those of its own set. */
 INLINE int first_of_leg(shape_t shape, int k)
@@ -156,10 +146,18 @@ INLINE void general_n(const circuit_t *c, double t_s, point_t *p, shape_t shape,
     rate[INT_MECH] = p->torque_Nm * p->x[OMEGA_MECH];
 }
 
-void circuit_general(const circuit_t *c, double t_s, point_t *p, double rate[ELEMENTS]){
-#define CALL(shape) general_n(c, t_s, p, shape, rate)
-    FOR_SHAPE(&c->machine, CALL)
-#undef CALL
+void circuit_general(const circuit_t *c, double t_s, point_t *p, double rate[ELEMENTS])
+{
+    const winding_t *w = &c->machine.winding;
+    if (w->branch >= 0) {
+        general_n(c, t_s, p, machine_shape(&c->machine), rate);
+    } else if (w->zero >= 0) {
+        general_n(c, t_s, p, OPEN, rate);
+    } else if (w->sets > 1) {
+        general_n(c, t_s, p, DOUBLE, rate);
+    } else {
+        general_n(c, t_s, p, STAR, rate);
+    }
 }
 
 INLINE void currents_n(const circuit_t *c, point_t *p, shape_t shape)
@@ -172,7 +170,14 @@ INLINE void currents_n(const circuit_t *c, point_t *p, shape_t shape)
 
 void circuit_currents(const circuit_t *c, point_t *p)
 {
-#define CALL(shape) currents_n(c, p, shape)
-    FOR_SHAPE(&c->machine, CALL)
-#undef CALL
+    const winding_t *w = &c->machine.winding;
+    if (w->branch >= 0) {
+        currents_n(c, p, machine_shape(&c->machine));
+    } else if (w->zero >= 0) {
+        currents_n(c, p, OPEN);
+    } else if (w->sets > 1) {
+        currents_n(c, p, DOUBLE);
+    } else {
+        currents_n(c, p, STAR);
+    }
 }

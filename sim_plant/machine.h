@@ -10,8 +10,9 @@
  * (map_table.h). i_f is the magnet's equivalent current. winding.h adds what is linear in the currents.
  *
  * State of a coordinate: core flux with the energy form, core current with a table, and the current itself
- * for a zero sequence or the fault branch. A plain machine, one star set of the energy form and nothing
- * added, has dpsi/dt = v - R i and is computed inline; machine_rates() does every other.
+ * for a zero sequence or the fault branch. A plain machine, one star set of the energy form with
+ * harmonics of the magnet at most, has dpsi_core/dt = v - R i - omega psi_x' and is computed inline;
+ * machine_rates() does every other.
  *
  * E19: a shorted circuit (L_eddy, R_eddy) on each rotor axis carries L_eddy di_e/dt = dpsi_core/dt - R_eddy
  * i_e beside the core current.
