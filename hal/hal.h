@@ -1,0 +1,149 @@
+/* What a port provides to the application, and what it calls up. One folder of hal/ per port, each with the
+ * same files: bridge.c, measure.c, can.c, store.c, system.c, console.c and port.h with struct hal.
+ *
+ * A port is thin: it moves numbers between registers and the structs of drive.h and knows nothing of motors.
+ * Only the application calls it; the control code does not know that it exists. tests/contract/hal runs the
+ * same checks on any port.
+ *
+ * Contexts, by falling priority:
+ *   control   the interrupt at the end of the current measurement, once per PWM period: app_control()
+ *   slow      an interrupt of lower priority, at 1 kHz, pended by control: app_slow()
+ *   thread    the main loop; may be interrupted by both
+ * "any" is all of them and the fault handlers. No function blocks but where it says so.
+ *
+ * Order: hal_init(), hal_start(), then the rest. From reset until hal_bridge_arm() the bridge is off. */
+#ifndef HAL_HAL_H
+#define HAL_HAL_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "firmware/drive/drive.h"
+
+typedef struct hal hal_t; /* the port's own, in its port.h */
+typedef struct app app_t; /* the application's, handed back to it */
+
+typedef enum {
+    HAL_RESET_POWER,
+    HAL_RESET_PIN,
+    HAL_RESET_SOFTWARE,
+    HAL_RESET_WATCHDOG,
+    HAL_RESET_OTHER,
+} hal_reset_t;
+
+/* What the application has to say about the hardware, from its parameters. */
+typedef struct {
+    uint16_t timer_counts; /* of half a PWM period */
+    uint16_t dead_time_ns; /* rounded up to what the timer has */
+    uint16_t break_level;  /* over-current comparators: code of a leg current above mid-scale; 0: most */
+    uint16_t can_kbit_s;   /* 125, 250, 500 or 1000 */
+} hal_config_t;
+
+typedef enum {
+    HAL_OK,
+    HAL_TIMER_COUNTS, /* outside what the timer has */
+    HAL_DEAD_TIME,
+    HAL_BREAK_LEVEL,
+    HAL_CAN_BIT_RATE,
+    HAL_CLOCK, /* the oscillator has not started: the port runs on, but the bridge cannot be armed */
+} hal_status_t;
+
+/* Why the last run ended, kept over the reset by the fault handlers. */
+typedef struct {
+    uint32_t cause; /* exception number, 0: there are none */
+    uint32_t pc, lr;
+    uint32_t status;  /* fault status register of the processor */
+    uint32_t address; /* that the faulty access went to */
+} hal_last_words_t;
+
+/* --- system.c ------------------------------------------------------------------------------------------ */
+
+/* thread, once, first: clocks, pins, peripherals; nothing runs yet. Blocks up to 20 ms. The configuration
+ * is checked here; a port that refuses it can still do CAN, console and store. */
+hal_status_t hal_init(hal_t *hal, const hal_config_t *config);
+
+/* thread, once: timer, converters and interrupts run; app_control() is called from now on. */
+void hal_start(hal_t *hal, app_t *app);
+
+const char *hal_board_name(const hal_t *hal);
+uint32_t hal_timer_Hz(const hal_t *hal); /* clock of the carrier: timer_counts = timer_Hz / (2 f_pwm) */
+void hal_unique_id(const hal_t *hal, uint32_t id[3]);
+hal_reset_t hal_reset_cause(const hal_t *hal);
+bool hal_take_last_words(hal_t *hal, hal_last_words_t *words); /* thread; false: none. Forgets them. */
+
+uint32_t hal_time_us(const hal_t *hal); /* any; wraps */
+void hal_pend_slow(hal_t *hal);         /* control; app_slow() follows when control has returned */
+void hal_lock(hal_t *hal);              /* thread: holds control and slow off, for at most 1 us; no nesting */
+void hal_unlock(hal_t *hal);
+void hal_idle(hal_t *hal);     /* thread: returns after the next interrupt, or at once */
+void hal_watchdog(hal_t *hal); /* slow: not called for 20 ms, the processor is reset and the bridge off */
+void hal_reset(hal_t *hal);    /* thread: bridge off, then restart; does not return on a processor */
+
+/* --- bridge.c ------------------------------------------------------------------------------------------ */
+
+/* control, budget 60 instructions: compare values take effect at the next update event, a change of the
+ * driven legs there or within 2 us after it; out->trip switches all off at once. Both halves of a period are
+ * equal on ports that say so in port.h. */
+void hal_bridge_write(hal_t *hal, const drive_out_t *out);
+
+/* thread: lets the outputs follow hal_bridge_write(). False, and still off, while the break input is active
+ * or the port has refused its configuration. */
+bool hal_bridge_arm(hal_t *hal);
+void hal_bridge_off(hal_t *hal); /* any, 0.2 us: all switches open until armed again */
+bool hal_bridge_armed(const hal_t *hal);
+
+/* --- measure.c ----------------------------------------------------------------------------------------- */
+
+/* control, budget 40 instructions: what was sampled at the centre of the zero vector of this period. */
+void hal_measure(hal_t *hal, drive_in_t *in);
+
+/* What changes slowly; the last conversion of each. */
+typedef struct {
+    int32_t temperature_dC;   /* 0.1 degC, hottest sensor */
+    uint16_t dial;            /* potentiometer, left-aligned; 0 where there is none */
+    bool button;              /* pressed */
+    bool temperature_missing; /* the sensor is broken off or shorted */
+} hal_slow_t;
+
+void hal_measure_slow(hal_t *hal, hal_slow_t *slow); /* slow */
+
+/* --- can.c: classic frames, 11-bit identifiers --------------------------------------------------------- */
+
+typedef struct {
+    uint16_t id;
+    uint8_t length; /* 0 ... 8 */
+    uint8_t data[8];
+} hal_can_frame_t;
+
+typedef enum { HAL_CAN_ACTIVE, HAL_CAN_PASSIVE, HAL_CAN_BUS_OFF } hal_can_state_t;
+
+bool hal_can_receive(hal_t *hal, hal_can_frame_t *frame);    /* thread; false: none waits */
+bool hal_can_send(hal_t *hal, const hal_can_frame_t *frame); /* thread; false: no room, try again */
+hal_can_state_t hal_can_state(const hal_t *hal);
+uint32_t hal_can_lost(const hal_t *hal); /* frames that found the receive ring full, since start */
+
+/* --- store.c: two pages of flash ----------------------------------------------------------------------- */
+
+#define HAL_STORE_PAGES     2
+#define HAL_STORE_PAGE_SIZE 2048U
+
+void hal_store_read(const hal_t *hal, uint32_t page, uint32_t offset, void *data, uint32_t size);
+
+/* thread, bridge off; these block, up to 30 ms, and stop the processor where code runs from the same flash.
+ * False: refused (bridge armed, outside) or not done; the page is then neither old nor new. Offset and size
+ * are multiples of 8. */
+bool hal_store_erase(hal_t *hal, uint32_t page);
+bool hal_store_write(hal_t *hal, uint32_t page, uint32_t offset, const void *data, uint32_t size);
+
+/* --- console.c ----------------------------------------------------------------------------------------- */
+
+uint32_t hal_console(hal_t *hal,
+                     const char *text); /* thread; characters taken: fewer when the ring is full */
+void hal_led(hal_t *hal, bool on);
+
+/* --- called up by the port, defined by the application (firmware/app) ---------------------------------- */
+
+void app_control(app_t *app); /* control, after every current measurement */
+void app_slow(app_t *app);    /* slow, after hal_pend_slow() */
+
+#endif

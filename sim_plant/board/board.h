@@ -1,0 +1,81 @@
+/* The emulated drive board: ST's B-G431B-ESC1 around a processor that runs the flashed image, closed on the
+ * plant. One PWM period after the other.
+ *
+ * TIM1 drives the legs, the converters sample at the instants that TIM1 triggers, the comparators act on the
+ * timer's break input without software. Shunts, amplifiers and dividers are those of the plant's sensor
+ * section: full scale there is full scale of the converter. What is not modelled is an error that names
+ * register and PC, never a guess. docs/board.md.
+ *
+ * Order of a period k: sample at t_k; processor until t_k+1; plant from t_k to t_k+1 with what the timer had.
+ */
+#ifndef BOARD_BOARD_H
+#define BOARD_BOARD_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "sim_plant/board/cpu.h"
+#include "sim_plant/plant.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct board board_t;
+
+/* NULL and a text on a file that is not an image for this processor. The plant stays the caller's. */
+board_t *board_create(const char *elf_path, plant_t *plant, char *error, size_t error_size);
+void board_destroy(board_t *board);
+
+/* Reset and run until the PWM timer counts, at most `most_s`. */
+bool board_boot(board_t *board, double most_s);
+
+/* One period of the carrier. False: stopped, board_error() says why. */
+bool board_run_period(board_t *board);
+const char *board_error(const board_t *board);
+
+cpu_t *board_cpu(board_t *board);
+uint32_t board_clock_Hz(const board_t *board); /* of the processor, now */
+double board_period_s(const board_t *board);   /* of the carrier */
+uint32_t board_resets(const board_t *board);   /* since board_boot() */
+bool board_bridge_on(const board_t *board);    /* TIM1's main output enable, and any leg driven */
+
+/* A variable of the image by its name; NULL when there is none or its size differs. */
+void *board_variable(board_t *board, const char *name, size_t size);
+
+/* Flash pages as the debugger sees them: for parameters that are there before the first boot. */
+void board_program(board_t *board, uint32_t address, const void *data, size_t size);
+void board_read_flash(const board_t *board, uint32_t address, void *data, size_t size);
+
+/* Bus and console */
+typedef struct {
+    uint16_t id;
+    uint8_t length;
+    uint8_t data[8];
+} board_frame_t;
+bool board_can_send(board_t *board, const board_frame_t *frame); /* to the image; false: not started */
+bool board_can_receive(board_t *board, board_frame_t *frame);    /* from it; false: none */
+void board_can_error(board_t *board, bool bus_off);
+const char *board_console(const board_t *board); /* all that the UART has said */
+bool board_led(const board_t *board);
+
+/* The outside world */
+void board_set_temperature(board_t *board, double temperature_degC);
+void board_set_dial(board_t *board, double fraction);
+void board_press_button(board_t *board, bool pressed);
+void board_hold_break(board_t *board, bool held); /* external break input */
+
+/* Faults of the board itself */
+void board_stick_converter(board_t *board, bool stuck); /* conversions never end */
+void board_stop_oscillator(board_t *board, bool stopped);
+void board_cut_flash(board_t *board, uint32_t after_words); /* power is lost then: the board resets */
+
+/* Deepest use of the main stack and of the process stack since reset, bytes: by painted memory. */
+uint32_t board_stack_used(const board_t *board);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

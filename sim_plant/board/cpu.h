@@ -1,0 +1,99 @@
+/* The processor of the emulated board: a Cortex-M4 whose instructions libunicorn executes, with exceptions,
+ * NVIC, SysTick, DWT, SCB, MPU and simulated time of our own. ARMv7-M Architecture Reference Manual, B1 and
+ * B3.
+ *
+ * Time is counted in processor cycles, estimated per instruction (cycles.h). Devices hang on the bus by
+ * address; an access that no device takes stops the run with an error that names address and PC.
+ *
+ * libunicorn is GPL-2: this folder is linked into pmsim-board alone. */
+#ifndef BOARD_CPU_H
+#define BOARD_CPU_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct cpu cpu_t;
+
+/* A block of registers. Accesses come as words with a mask of the bytes that are meant; read and write
+ * return false for a register that is not modelled. */
+typedef struct {
+    const char *name;
+    uint32_t base, size;
+    void *self;
+    bool (*read)(void *self, uint32_t offset, uint32_t *value);
+    bool (*write)(void *self, uint32_t offset, uint32_t value, uint32_t mask);
+} cpu_device_t;
+
+typedef struct {
+    const char *name;
+    uint32_t base, size;
+    bool executable, writable; /* by the processor */
+    uint32_t alias_of;         /* the same memory as that other base; 0: its own */
+} cpu_memory_t;
+
+/* Figures of one exception number, from entry to return, without what has preempted it. */
+typedef struct {
+    uint64_t count;
+    uint64_t instructions, instructions_least, instructions_most;
+    uint64_t cycles_low, cycles_typical, cycles_high; /* sums */
+    uint64_t cycles_most;                             /* typical, of one */
+    uint64_t latency_most;                            /* from pending to entry */
+} cpu_exception_stats_t;
+
+cpu_t *cpu_create(char *error, size_t error_size);
+void cpu_destroy(cpu_t *cpu);
+
+void cpu_add_memory(cpu_t *cpu, const cpu_memory_t *memory);
+void cpu_add_device(cpu_t *cpu, const cpu_device_t *device);        /* copied */
+uint8_t *cpu_memory(cpu_t *cpu, uint32_t address, uint32_t size);   /* the host's view, NULL: outside */
+void cpu_code_changed(cpu_t *cpu, uint32_t address, uint32_t size); /* flash was programmed or erased */
+
+/* Stack pointer and entry from the vector table; clears everything but memory and counters of time. */
+void cpu_reset(cpu_t *cpu, uint32_t vector_table);
+
+/* Runs until that cycle. False when stopped by an error: cpu_error(). A halted processor lets time pass. */
+bool cpu_run(cpu_t *cpu, uint64_t until_cycle);
+const char *cpu_error(const cpu_t *cpu);
+void cpu_fail(cpu_t *cpu, const char *format, ...); /* for devices: ends the run */
+void cpu_halt(cpu_t *cpu, bool halted);             /* as a debugger does */
+uint64_t cpu_now(const cpu_t *cpu);
+uint32_t cpu_pc(const cpu_t *cpu);
+uint32_t cpu_register(const cpu_t *cpu, int n); /* r0 to r15 */
+
+/* Interrupt request lines are levels: pending again after return while the line is high. */
+void cpu_irq(cpu_t *cpu, int irq, bool level);
+
+/* Calls back once `cycle` has been reached, between two blocks of instructions. One per owner: a later call
+ * replaces an earlier one; UINT64_MAX cancels. */
+typedef void (*cpu_alarm_t)(void *owner, uint64_t cycle);
+void cpu_alarm(cpu_t *cpu, void *owner, uint64_t cycle, cpu_alarm_t alarm);
+
+/* Called at entry (true) and return (false) of every exception. */
+typedef void (*cpu_trace_t)(void *owner, int exception, bool entry);
+void cpu_trace(cpu_t *cpu, void *owner, cpu_trace_t trace);
+
+/* Software reset (AIRCR) or lock-up: the run ends with true, cpu_reset_asked() tells. */
+bool cpu_reset_asked(const cpu_t *cpu);
+bool cpu_sleeping(const cpu_t *cpu);
+
+const cpu_exception_stats_t *cpu_exception_stats(const cpu_t *cpu, int exception);
+void cpu_clear_stats(cpu_t *cpu);
+uint64_t cpu_instructions(const cpu_t *cpu);
+uint64_t cpu_cycles_asleep(const cpu_t *cpu);
+uint64_t cpu_cycles_in_thread(const cpu_t *cpu);
+
+/* Executed blocks: address, size, instructions, times. For profiles and coverage. */
+typedef void (*cpu_block_visitor_t)(void *context, uint32_t address, uint32_t size, uint32_t instructions,
+                                    uint64_t hits);
+void cpu_visit_blocks(const cpu_t *cpu, cpu_block_visitor_t visit, void *context);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
