@@ -7,8 +7,9 @@
  *
  * Contexts, by falling priority:
  *   control   the interrupt at the end of the current measurement, once per PWM period: app_control()
- *   slow      an interrupt of lower priority, at 1 kHz, pended by control: app_slow()
- *   thread    the main loop; may be interrupted by both
+ *   monitor   an interrupt of a timer of its own, every millisecond, below control: app_monitor()
+ *   slow      the lowest interrupt, at 1 kHz, pended by control: app_slow()
+ *   thread    the main loop; may be interrupted by all
  * "any" is all of them and the fault handlers. No function blocks but where it says so.
  *
  * Order: hal_init(), hal_start(), then the rest. From reset until hal_bridge_arm() the bridge is off. */
@@ -58,6 +59,9 @@ typedef struct {
 
 /* --- system.c ------------------------------------------------------------------------------------------ */
 
+/* The one that a processor has; ports that make several, as sim, have none. */
+hal_t *hal_instance(void);
+
 /* thread, once, first: clocks, pins, peripherals; nothing runs yet. Blocks up to 20 ms. The configuration
  * is checked here; a port that refuses it can still do CAN, console and store. */
 hal_status_t hal_init(hal_t *hal, const hal_config_t *config);
@@ -73,10 +77,10 @@ bool hal_take_last_words(hal_t *hal, hal_last_words_t *words); /* thread; false:
 
 uint32_t hal_time_us(const hal_t *hal); /* any; wraps */
 void hal_pend_slow(hal_t *hal);         /* control; app_slow() follows when control has returned */
-void hal_lock(hal_t *hal);              /* thread: holds control and slow off, for at most 1 us; no nesting */
+void hal_lock(hal_t *hal);              /* thread: holds all interrupts off, for at most 1 us; no nesting */
 void hal_unlock(hal_t *hal);
 void hal_idle(hal_t *hal);     /* thread: returns after the next interrupt, or at once */
-void hal_watchdog(hal_t *hal); /* slow: not called for 20 ms, the processor is reset and the bridge off */
+void hal_watchdog(hal_t *hal); /* monitor: not called for 20 ms, the processor is reset and the bridge off */
 void hal_reset(hal_t *hal);    /* thread: bridge off, then restart; does not return on a processor */
 
 /* --- bridge.c ------------------------------------------------------------------------------------------ */
@@ -144,6 +148,7 @@ void hal_led(hal_t *hal, bool on);
 /* --- called up by the port, defined by the application (firmware/app) ---------------------------------- */
 
 void app_control(app_t *app); /* control, after every current measurement */
+void app_monitor(app_t *app); /* monitor, every millisecond after hal_start() */
 void app_slow(app_t *app);    /* slow, after hal_pend_slow() */
 
 #endif
