@@ -131,13 +131,15 @@ uint32_t hal_can_lost(const hal_t *hal); /* frames that found the receive ring f
 #define HAL_STORE_PAGES     2
 #define HAL_STORE_PAGE_SIZE 2048U
 
-void hal_store_read(const hal_t *hal, uint32_t page, uint32_t offset, void *data, uint32_t size);
+/* any, also before hal_init(): the page in place. A page whose writing was cut short reads as anything, but
+ * reading it does no harm. */
+const uint32_t *hal_store_page(const hal_t *hal, uint32_t page);
 
 /* thread, bridge off; these block, up to 30 ms, and stop the processor where code runs from the same flash.
  * False: refused (bridge armed, outside) or not done; the page is then neither old nor new. Offset and size
  * are multiples of 8. */
 bool hal_store_erase(hal_t *hal, uint32_t page);
-bool hal_store_write(hal_t *hal, uint32_t page, uint32_t offset, const void *data, uint32_t size);
+bool hal_store_write(hal_t *hal, uint32_t page, uint32_t offset, const uint32_t *data, uint32_t size);
 
 /* --- console.c ----------------------------------------------------------------------------------------- */
 
