@@ -47,10 +47,14 @@ bool app_save(hal_t *hal, const drive_params_t *params)
                                    .value = drive_param_get(params, (drive_param_id_t)id)};
     }
     const int32_t old = newest(hal);
-    const uint32_t page = old == 0 ? 1U : 0U;
-    const uint32_t sequence = old < 0 ? 1U : store_sequence(hal_store_page(hal, (uint32_t)old)) + 1U;
+    uint32_t page = 0;
+    uint32_t sequence = 1;
+    if (old >= 0) {
+        page = 1U - (uint32_t)old;
+        sequence += store_sequence(hal_store_page(hal, (uint32_t)old));
+    }
     const uint32_t used = store_make(words, sequence, pairs, (uint32_t)DRIVE_PARAM_COUNT);
-    return hal_store_erase(hal, page) &&
-           hal_store_write(hal, page, 0, words, used * (uint32_t)sizeof words[0]) &&
+    const uint32_t bytes = 4U * used;
+    return used > 0U && hal_store_erase(hal, page) && hal_store_write(hal, page, 0, words, bytes) &&
            newest(hal) == (int32_t)page;
 }

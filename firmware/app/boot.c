@@ -13,9 +13,9 @@ static const char *reset_text(hal_reset_t cause)
     case HAL_RESET_WATCHDOG:
         return "watchdog";
     case HAL_RESET_OTHER:
-        break;
+    default:
+        return "other";
     }
-    return "other";
 }
 
 static void say(hal_t *hal, const char *what, const char *value)
@@ -28,7 +28,9 @@ static void say(hal_t *hal, const char *what, const char *value)
 static void say_hex(hal_t *hal, const char *what, uint32_t value)
 {
     static const char digits[] = "0123456789abcdef";
-    char text[11] = "0x";
+    char text[11];
+    text[0] = '0';
+    text[1] = 'x';
     for (uint32_t n = 0; n < 8U; n++) {
         text[2U + n] = digits[(value >> (28U - 4U * n)) & 15U];
     }

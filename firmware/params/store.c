@@ -1,7 +1,5 @@
 #include "firmware/params/store.h"
 
-#include <assert.h>
-
 #define MAGIC      0x31504D50U /* "PMP1" */
 #define HEADER     4U
 #define FNV_OFFSET 2166136261U
@@ -71,7 +69,9 @@ store_pair_t store_pair(const uint32_t page[STORE_WORDS], uint32_t index)
 
 uint32_t store_make(uint32_t page[STORE_WORDS], uint32_t sequence, const store_pair_t pairs[], uint32_t count)
 {
-    assert(count <= STORE_PAIRS_MAX);
+    if (count > STORE_PAIRS_MAX) {
+        return 0;
+    }
     for (uint32_t n = 0; n < count; n++) {
         page[HEADER + 2U * n] = pairs[n].id;
         page[HEADER + 2U * n + 1U] = (uint32_t)pairs[n].value;

@@ -33,7 +33,7 @@ int32_t store_newest(const uint32_t first[STORE_WORDS], const uint32_t second[ST
 uint32_t store_sequence(const uint32_t page[STORE_WORDS]);
 store_pair_t store_pair(const uint32_t page[STORE_WORDS], uint32_t index);
 
-/* Fills a page. Returns its words, even: the rest is left alone. count is asserted. */
+/* Fills a page. Returns its words, even: the rest is left alone. 0: too many. */
 uint32_t store_make(uint32_t page[STORE_WORDS], uint32_t sequence, const store_pair_t pairs[],
                     uint32_t count);
 
