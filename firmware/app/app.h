@@ -17,9 +17,12 @@
 #include "hal/hal.h"
 
 struct app {
+    /* first what an observer of the memory wants to see, without anything whose size differs by machine */
     drive_t drive;
     drive_in_t in;
     drive_out_t out;
+    hal_slow_t slow;
+
     hal_t *hal;
     uint32_t slow_divider, slow_countdown; /* periods per app_slow(), and until the next */
     volatile uint32_t periods;             /* control interrupts since start */
@@ -29,7 +32,6 @@ struct app {
     uint32_t seen_periods;         /* by the monitor */
     volatile uint32_t turn_age_ms; /* since the main loop's last round */
 
-    hal_slow_t slow;
     remote_t remote;
     drive_fault_t shown_fault; /* on the console */
     bool hardware;             /* configured: control interrupts come */
@@ -39,6 +41,9 @@ struct app {
 /* Parameters of the newest valid page over the defaults; false: no page is valid. `unknown` counts the stored
  * names that this version does not have. */
 bool app_load(const hal_t *hal, drive_params_t *params, uint32_t *unknown);
+
+/* The page of all parameters, STORE_WORDS; returns the words that are used. */
+uint32_t app_page(const drive_params_t *params, uint32_t sequence, uint32_t words[]);
 
 /* Writes all of them to the older page, with the bridge off; false: not done, the other page still holds. */
 bool app_save(hal_t *hal, const drive_params_t *params);

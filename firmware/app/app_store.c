@@ -38,14 +38,19 @@ bool app_load(const hal_t *hal, drive_params_t *params, uint32_t *unknown)
     return true;
 }
 
-bool app_save(hal_t *hal, const drive_params_t *params)
+uint32_t app_page(const drive_params_t *params, uint32_t sequence, uint32_t words[])
 {
-    static uint32_t words[STORE_WORDS]; /* too large for the stack */
     store_pair_t pairs[DRIVE_PARAM_COUNT];
     for (int32_t id = 0; id < (int32_t)DRIVE_PARAM_COUNT; id++) {
         pairs[id] = (store_pair_t){.id = store_id(drive_param_table[id].name),
                                    .value = drive_param_get(params, (drive_param_id_t)id)};
     }
+    return store_make(words, sequence, pairs, (uint32_t)DRIVE_PARAM_COUNT);
+}
+
+bool app_save(hal_t *hal, const drive_params_t *params)
+{
+    static uint32_t words[STORE_WORDS]; /* too large for the stack */
     const int32_t old = newest(hal);
     uint32_t page = 0;
     uint32_t sequence = 1;
@@ -53,8 +58,7 @@ bool app_save(hal_t *hal, const drive_params_t *params)
         page = 1U - (uint32_t)old;
         sequence += store_sequence(hal_store_page(hal, (uint32_t)old));
     }
-    const uint32_t used = store_make(words, sequence, pairs, (uint32_t)DRIVE_PARAM_COUNT);
-    const uint32_t bytes = 4U * used;
-    return used > 0U && hal_store_erase(hal, page) && hal_store_write(hal, page, 0, words, bytes) &&
+    const uint32_t bytes = 4U * app_page(params, sequence, words);
+    return bytes > 0U && hal_store_erase(hal, page) && hal_store_write(hal, page, 0, words, bytes) &&
            newest(hal) == (int32_t)page;
 }
