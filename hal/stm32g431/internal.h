@@ -5,13 +5,14 @@
 #include "hal/stm32g431/port.h"
 #include "hal/stm32g431/registers/register.h"
 
-#define PORT_CLOCK_HZ     170000000U
+#define PORT_CLOCK_HZ 170000000U
+/* Of the upper four bits. Faults are at 0. */
 #define PORT_PRIO_CONTROL 0x10U
-#define PORT_PRIO_SLOW    0x20U
+#define PORT_PRIO_MONITOR 0x20U
 #define PORT_PRIO_IO      0x30U
+#define PORT_PRIO_SLOW    0x40U
 
-/* The one that was given to hal_init(), for the interrupts. */
-extern hal_t *port_hal;
+extern hal_t port_hal; /* the one there is */
 
 /* --- clock.c */
 bool clock_start(void); /* false: without the crystal. Starts the microseconds. */
@@ -39,17 +40,20 @@ void console_start(void);
 
 /* --- exceptions: the vector table is in startup.c */
 void port_control(void);
+void port_monitor(void);
 void port_slow(void);
 void port_can_received(void);
 void port_console_sent(void);
 
-/* --- startup.c */
+/* --- startup.c: faults, with the frame that the exception has stacked */
 typedef struct {
     uint32_t magic;
     hal_last_words_t words;
 } port_grave_t;
 extern port_grave_t port_grave; /* in memory that the start-up leaves alone */
-void port_nmi(const uint32_t *frame);
-void port_fault(const uint32_t *frame);
+void port_reset(void) __attribute__((noreturn));
+void port_fault(const uint32_t *frame, uint32_t exception);
+void port_nmi(void);
+void port_bury(const hal_last_words_t *words); /* does not return on a processor */
 
 #endif

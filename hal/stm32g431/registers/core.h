@@ -30,7 +30,9 @@ typedef struct {
 #define SCB_CFSR_BFARVALID    (1U << 15)
 #define SCB_AIRCR_KEY         0x05FAU
 
-#define SCB_SHPR_PENDSV 10U /* index */
+/* indices */
+#define SCB_SHPR_PENDSV  10U
+#define SCB_SHPR_SYSTICK 11U
 
 typedef struct {
     reg_t ISER[8];
@@ -56,6 +58,17 @@ typedef struct {
 #define MPU_RASR_AP         (7U << 24)
 #define MPU_RASR_XN         (1U << 28)
 
+typedef struct {
+    reg_t CSR;
+    reg_t RVR;
+    reg_t CVR;
+} systick_t;
+
+#define SYSTICK_CSR_ENABLE    (1U << 0)
+#define SYSTICK_CSR_TICKINT   (1U << 1)
+#define SYSTICK_CSR_CLKSOURCE (1U << 2) /* set: the processor's */
+
+extern systick_t SYSTICK;
 extern scb_t SCB;
 extern nvic_t NVIC;
 extern mpu_t MPU;
@@ -64,6 +77,7 @@ enum {
     IRQ_ADC1_2 = 18,
     IRQ_FDCAN1_IT0 = 21,
     IRQ_USART2 = 38,
+    IRQ_LAST = IRQ_USART2,
 };
 
 #endif
