@@ -96,7 +96,7 @@ class Image:
             if name not in (".text", ".rodata", ".ccm", ".data") or size == 0:
                 continue
             for line in run("arm-none-eabi-objdump", "-s", "-j", name, self.path).splitlines():
-                match = re.match(r" ([0-9a-f]{8}) ((?:[0-9a-f]{8} ){1,4})", line)
+                match = re.match(r" ([0-9a-f]{4,8}) ((?:[0-9a-f]{8} ){1,4})", line)
                 if match:
                     for n, word in enumerate(match[2].split()):
                         words[int(match[1], 16) + 4 * n] = int.from_bytes(bytes.fromhex(word), "little")
