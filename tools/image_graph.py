@@ -7,13 +7,19 @@ from pathlib import Path
 
 SYMBOL = re.compile(r"\s*\d+: ([0-9a-f]{8})\s+(\d+|0x[0-9a-f]+) (\w+)\s+(\w+)\s+\w+\s+(\w+) (\S+)")
 RELOCATION = re.compile(r"([0-9a-f]{8})\s+[0-9a-f]{8} (R_ARM_\w+)\s+([0-9a-f]{8})\s+(\S+)")
-SECTION = re.compile(r"\s*\[\s*\d+\] (\S+)\s+(\S+)\s+([0-9a-f]{8}) [0-9a-f]{6} ([0-9a-f]{6}) [0-9a-f]{2} (\S*)")
-FUNCTION = re.compile(r"([0-9a-f]{8}) <(.+)>:$")
+SECTION = re.compile(r"\s*\[\s*\d+\] (\S+)\s+\S+\s+([0-9a-f]{8}) [0-9a-f]{6} ([0-9a-f]{6})")
+VENEER = re.compile(r"__(.+)_veneer$")
+LOADED = (".vectors", ".ccm", ".text", ".rodata", ".data")
 INSTRUCTION = re.compile(r"\s*([0-9a-f]+):\t(?:[0-9a-f]{4,8} ?)+\s*\t(\S+)\s*(.*)")
 
 
 def run(*command):
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+
+
+class Section:
+    def __init__(self, address, size):
+        self.address, self.size = address, size
 
 
 class Item:
@@ -70,30 +76,27 @@ class Image:
         for line in run("arm-none-eabi-readelf", "-SW", self.path).splitlines():
             match = SECTION.match(line)
             if match:
-                self.sections[match[1]] = (int(match[3], 16), int(match[4], 16), match[5] if len(match.groups()) > 4 else "")
+                self.sections[match[1]] = Section(int(match[2], 16), int(match[3], 16))
         words = self._words()
         for line in run("arm-none-eabi-readelf", "-rW", self.path).splitlines():
             match = RELOCATION.match(line)
             if not match:
                 continue
-            place, kind, value, _ = int(match[1], 16), match[2], int(match[3], 16), match[4]
+            place, kind, value = int(match[1], 16), match[2], int(match[3], 16)
             user = self.at(place)
             if user is None:
                 continue
-            called = kind in ("R_ARM_THM_CALL", "R_ARM_THM_JUMP24", "R_ARM_THM_JUMP19")
             if kind == "R_ARM_ABS32":
                 value = words.get(place, value)
-            target = self.at(value - value % 2 if called else value) or self.at(value & ~1)
+            target = self.at(value & ~1)
             if target is not None and target is not user:
                 user.refers.add(target.address)
-                if called:
-                    user.calls.add(target.address)
 
     def _words(self):
         """address -> word, of what is loaded from flash."""
         words = {}
-        for name, (address, size, _) in self.sections.items():
-            if name not in (".text", ".rodata", ".ccm", ".data") or size == 0:
+        for name in LOADED:
+            if name not in self.sections or self.sections[name].size == 0:
                 continue
             for line in run("arm-none-eabi-objdump", "-s", "-j", name, self.path).splitlines():
                 match = re.match(r" ([0-9a-f]{4,8}) ((?:[0-9a-f]{8} ){1,4})", line)
@@ -103,31 +106,38 @@ class Image:
         return words
 
     def _read_code(self):
-        item = None
         for line in run("arm-none-eabi-objdump", "-d", self.path).splitlines():
-            head = FUNCTION.match(line)
-            if head:
-                item = self.items.get(int(head[1], 16), item)
-                continue
             match = INSTRUCTION.match(line)
-            if not match or item is None:
+            owner = self.at(int(match[1], 16)) if match else None
+            if owner is None or not owner.is_function:
                 continue
-            owner = self.at(int(match[1], 16))
-            if owner is not None:
-                read_instruction(owner, match[2], match[3])
+            read_instruction(owner, match[2], match[3])
+            branch = re.match(r"(?:r\d+, )?([0-9a-f]+) <([^+>]+)", match[3]) if match[2].startswith(("b", "cb")) else None
+            target = self._behind(int(branch[1], 16), branch[2]) if branch else None
+            if target is not None and (target is not owner or match[2] == "bl"):
+                owner.calls.add(target.address)
+                owner.refers.add(target.address)
 
-    def reachable(self, names, calls_only=False):
-        todo = [item for item in self.items.values() if set(item.names) & set(names)]
-        missing = set(names) - {name for item in todo for name in item.names}
-        if missing:
-            raise SystemExit(f"{self.path.name}: no function {', '.join(sorted(missing))}")
+    def _behind(self, address, name):
+        """The item that a branch goes to, if need be by way of a linker's veneer."""
+        veneer = VENEER.match(name)
+        return self.function(veneer[1]) if veneer else self.at(address)
+
+    def function(self, name):
+        for item in self.items.values():
+            if name in item.names:
+                return item
+        raise SystemExit(f"{self.path.name}: no function {name}")
+
+    def reachable(self, names):
+        """Every item that these functions call, or refer to, at any depth."""
+        todo = [self.function(name) for name in names]
         found = {}
         while todo:
             item = todo.pop()
-            if item.address in found:
-                continue
-            found[item.address] = item
-            todo.extend(self.items[address] for address in (item.calls if calls_only else item.refers))
+            if item.address not in found:
+                found[item.address] = item
+                todo.extend(self.items[address] for address in item.refers)
         return [found[address] for address in sorted(found)]
 
 

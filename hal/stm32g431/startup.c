@@ -101,14 +101,14 @@ static void set_vectors(void)
 /* Volatile: no call of memcpy, which may itself be among what is copied. */
 static void copy(volatile uint32_t *to, const uint32_t *end, const uint32_t *from)
 {
-    while (to < end) {
+    while ((uintptr_t)to < (uintptr_t)end) {
         *to++ = *from++;
     }
 }
 
 static void fill(volatile uint32_t *to, const uint32_t *end, uint32_t value)
 {
-    while (to < end) {
+    while ((uintptr_t)to < (uintptr_t)end) {
         *to++ = value;
     }
 }
