@@ -8,8 +8,6 @@ enum {
     READY_US = 1000,
     WAIT_STATES = 4,
 };
-/* values of PLLSRC, SW and HPRE */
-enum { PLL_FROM_HSI = 2, PLL_FROM_HSE = 3, SYSTEM_FROM_PLL = 3, HALF_SPEED = 8 };
 
 /* The wanted divider counts from the next update event on, which is made here. */
 static void count_microseconds(uint32_t clock_MHz)
@@ -49,13 +47,13 @@ static void supply_clocks(void)
     RCC.APB1ENR1 |= RCC_APB1ENR1_TIM2EN | RCC_APB1ENR1_USART2EN | RCC_APB1ENR1_FDCANEN | RCC_APB1ENR1_PWREN;
     RCC.APB2ENR |= RCC_APB2ENR_SYSCFGEN | RCC_APB2ENR_TIM1EN;
     (void)RCC.APB2ENR; /* a peripheral answers two cycles after its clock was switched on */
-    RCC.CCIPR = reg_field(RCC_CCIPR_FDCANSEL, 2U); /* PCLK1 */
+    RCC.CCIPR = reg_field(RCC_CCIPR_FDCANSEL, RCC_FDCANSEL_PCLK1);
 }
 
 /* 340 MHz from an input of 4 MHz, halved. */
 static void start_pll(bool crystal)
 {
-    RCC.PLLCFGR = reg_field(RCC_PLLCFGR_PLLSRC, crystal ? PLL_FROM_HSE : PLL_FROM_HSI) |
+    RCC.PLLCFGR = reg_field(RCC_PLLCFGR_PLLSRC, crystal ? RCC_PLLSRC_HSE : RCC_PLLSRC_HSI) |
                   reg_field(RCC_PLLCFGR_PLLM, crystal ? 1U : 3U) | reg_field(RCC_PLLCFGR_PLLN, 85U) |
                   RCC_PLLCFGR_PLLREN;
     RCC.CR |= RCC_CR_PLLON;
@@ -69,11 +67,11 @@ static void switch_to_pll(void)
     FLASH.ACR = (FLASH.ACR & ~FLASH_ACR_LATENCY) | reg_field(FLASH_ACR_LATENCY, WAIT_STATES) |
                 FLASH_ACR_PRFTEN | FLASH_ACR_ICEN | FLASH_ACR_DCEN;
     (void)clock_await(&FLASH.ACR, FLASH_ACR_LATENCY, WAIT_STATES, READY_US);
-    RCC.CFGR = reg_field(RCC_CFGR_HPRE, HALF_SPEED) | reg_field(RCC_CFGR_SW, SYSTEM_FROM_PLL);
-    (void)clock_await(&RCC.CFGR, RCC_CFGR_SWS, reg_field(RCC_CFGR_SWS, SYSTEM_FROM_PLL), READY_US);
+    RCC.CFGR = reg_field(RCC_CFGR_HPRE, RCC_HPRE_DIV_2) | reg_field(RCC_CFGR_SW, RCC_SW_PLL);
+    (void)clock_await(&RCC.CFGR, RCC_CFGR_SWS, reg_field(RCC_CFGR_SWS, RCC_SW_PLL), READY_US);
     count_microseconds(PORT_CLOCK_HZ / 2000000U);
     clock_delay(2U);
-    RCC.CFGR = reg_field(RCC_CFGR_SW, SYSTEM_FROM_PLL);
+    RCC.CFGR = reg_field(RCC_CFGR_SW, RCC_SW_PLL);
     count_microseconds(PORT_CLOCK_HZ / 1000000U);
 }
 

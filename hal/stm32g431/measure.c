@@ -47,7 +47,7 @@ void measure_start(void)
     start_amplifier(&OPAMP1);
     start_amplifier(&OPAMP2);
     start_amplifier(&OPAMP3);
-    ADC12_COMMON.CCR = reg_field(ADC_CCR_CKMODE, 3U); /* 42.5 MHz */
+    ADC12_COMMON.CCR = reg_field(ADC_CCR_CKMODE, ADC_CKMODE_DIV_4); /* 42.5 MHz */
     start_converter(&ADC1);
     start_converter(&ADC2);
     ADC1.SMPR1 = reg_field(ADC_SMPR1_SMP3, ADC_SMP_6_5) | reg_field(ADC_SMPR1_SMP5, ADC_SMP_247_5);

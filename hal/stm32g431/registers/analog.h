@@ -55,7 +55,9 @@ typedef struct {
     reg_t CCR;
 } adc_common_t;
 
-#define ADC_CCR_CKMODE (3U << 16) /* 3: processor clock / 4 */
+#define ADC_CCR_CKMODE (3U << 16)
+
+enum { ADC_CKMODE_DIV_4 = 3 }; /* of the processor's clock */
 
 typedef struct {
     reg_t CSR;

@@ -61,6 +61,9 @@ typedef struct {
 #define RCC_CSR_IWDGRSTF      (1U << 29)
 #define RCC_CSR_WWDGRSTF      (1U << 30)
 
+/* values of PLLSRC, SW, HPRE and FDCANSEL */
+enum { RCC_PLLSRC_HSI = 2, RCC_PLLSRC_HSE = 3, RCC_SW_PLL = 3, RCC_HPRE_DIV_2 = 8, RCC_FDCANSEL_PCLK1 = 2 };
+
 typedef struct {
     reg_t CR1;
     uint32_t reserved_4[31];
