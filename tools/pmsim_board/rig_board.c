@@ -30,9 +30,7 @@ struct rig {
     board_t *board;
     const watched_t *image; /* in the processor's memory */
     drive_t before;         /* at the entry of the interrupt that runs */
-    int before_exception;
     rig_scale_t scale;
-    rig_command_t command;
     drive_command_t sent;
     bool clear;
     uint32_t since_sent;
