@@ -9,6 +9,7 @@
 
 #include "tools/pmsim/run_command.h"
 #include "tools/pmsim/yaml_reader.h"
+#include "tools/pmsim_board/console.h"
 #include "tools/pmsim_board/figures_report.h"
 #include "tools/pmsim_board/rig_board.h"
 
@@ -18,8 +19,9 @@ namespace
 using namespace pmsim;
 
 struct BoardOptions {
-    std::string image, figures;
+    std::string image, figures, last;
     std::vector<std::string> limits;
+    double console_s = 0.0;
 };
 
 // NAME=MOST: a line like those of the expectations. Returns whether it holds.
@@ -54,6 +56,13 @@ bool check_limit(const std::string &limit, const figures_t &figures)
 
 int run(const RunOptions &options, const BoardOptions &board)
 {
+    if (board.console_s > 0.0) {
+        return board_show_console(board.image.c_str(), board.console_s,
+                                  board.last.empty() ? nullptr : board.last.c_str());
+    }
+    if (options.scenario.empty()) {
+        throw InputError("a scenario is wanted, or --console SECONDS");
+    }
     rig_board_image(board.image.c_str());
     int code = run_and_report(options);
     const figures_t figures = all_figures();
@@ -84,6 +93,12 @@ int main(int argc, char **argv)
     BoardOptions board;
     app.add_option("image", board.image, "image (ELF), e.g. out/build/stm32g431/pmdrive.elf")->required();
     add_run_options(app, options);
+    app.get_option("scenario")->required(false);
+    app.add_option(
+        "--console", board.console_s,
+        "no scenario: run the image for so many seconds and print what its UART says; exit 1 when a line "
+        "begins with FAIL");
+    app.add_option("--until", board.last, "with --console: end at a line that begins with this");
     app.add_option("--figures", board.figures,
                    "write instructions, cycles, stack and load to this file (JSON)");
     app.add_option("--limit", board.limits,
