@@ -10,7 +10,7 @@
 #include "sim_plant/plant.h"
 
 #define SIM_FRAMES  16
-#define SIM_CONSOLE 2048
+#define SIM_CONSOLE 4096
 
 typedef struct {
     hal_can_frame_t frame[SIM_FRAMES];
@@ -19,6 +19,7 @@ typedef struct {
 
 struct hal {
     plant_t *plant;
+    app_t *app;      /* since hal_start() */
     plant_adc_t adc; /* of the present period */
     uint32_t time_us, timer_Hz;
     bool armed, configured;

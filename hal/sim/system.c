@@ -23,8 +23,7 @@ hal_status_t hal_init(hal_t *hal, const hal_config_t *config)
 
 void hal_start(hal_t *hal, app_t *app)
 {
-    (void)hal;
-    (void)app;
+    hal->app = app;
 }
 
 const char *hal_board_name(const hal_t *hal)

@@ -100,7 +100,7 @@ hal_status_t bridge_start(hal_t *hal, const hal_config_t *config)
     hal->bridge = reg_field(TIM_BDTR_DTG, dead_time) | TIM_BDTR_OSSI | TIM_BDTR_OSSR | TIM_BDTR_BKE |
                   TIM_BDTR_BKP | reg_field(TIM_BDTR_BKF, BREAK_FILTER);
     /* Nothing but the main output enable can change after this, up to the next reset. */
-    TIM1.BDTR = hal->bridge | reg_field(TIM_BDTR_LOCK, 2U);
+    TIM1.BDTR = hal->bridge | (status == HAL_OK ? reg_field(TIM_BDTR_LOCK, 2U) : 0U);
     return status;
 }
 

@@ -40,20 +40,28 @@ void system_interrupt(uint32_t irq, uint8_t priority)
     NVIC.ISER[irq / 32U] = 1U << (irq % 32U);
 }
 
+/* What does not depend on the configuration, once: a refused one may be followed by another. */
+static void start_once(hal_t *hal)
+{
+    if (!hal->up) {
+        hal->up = true;
+        hal->crystal = clock_start();
+        hal->reset = take_reset_cause();
+        pins_start();
+        measure_start();
+        console_start();
+    }
+}
+
 hal_status_t hal_init(hal_t *hal, const hal_config_t *config)
 {
-    *hal = (hal_t){0};
-    const bool crystal = clock_start();
-    hal->reset = take_reset_cause();
-    pins_start();
-    measure_start();
+    start_once(hal);
     hal_status_t status = bridge_start(hal, config);
     const hal_status_t can = can_start(config);
-    console_start();
     if (status == HAL_OK) {
         status = can;
     }
-    if (!crystal) {
+    if (!hal->crystal) {
         status = HAL_CLOCK;
     }
     hal->refused = status != HAL_OK;
