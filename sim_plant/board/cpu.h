@@ -20,7 +20,9 @@ extern "C" {
 typedef struct cpu cpu_t;
 
 /* A block of registers. Accesses come as words with a mask of the bytes that are meant; read and write
- * return false for a register that is not modelled. */
+ * return false for a register that is not modelled. After cpu_fail() within one its own answer is of no matter.
+ * A device may lie on memory that the processor may not write: it gets the writes (and mask), reads stay
+ * memory. Flash is programmed so. */
 typedef struct {
     const char *name;
     uint32_t base, size;
@@ -61,11 +63,15 @@ bool cpu_run(cpu_t *cpu, uint64_t until_cycle);
 const char *cpu_error(const cpu_t *cpu);
 void cpu_fail(cpu_t *cpu, const char *format, ...); /* for devices: ends the run */
 void cpu_halt(cpu_t *cpu, bool halted);             /* as a debugger does */
+/* Whatever the processor fetches from or loads of that memory until then waits. From within a device's write. */
+void cpu_stall(cpu_t *cpu, uint32_t base, uint64_t until_cycle);
 uint64_t cpu_now(const cpu_t *cpu);
 uint32_t cpu_pc(const cpu_t *cpu);
 uint32_t cpu_register(const cpu_t *cpu, int n); /* r0 to r15 */
 
-/* Interrupt request lines are levels: pending again after return while the line is high. */
+/* Interrupt request lines are levels: pending again after return while the line is high. CPU_NMI is one of
+ * them. */
+#define CPU_NMI (-14)
 void cpu_irq(cpu_t *cpu, int irq, bool level);
 
 /* Calls back once `cycle` has been reached, between two blocks of instructions. One per owner: a later call
