@@ -22,11 +22,19 @@ void gates_load(gates_t *gates, const plant_pwm_t *pwm)
     double half_s = 0.5 * gates->period_s;
     gates->edge_s -= gates->period_s;
     for (int k = 0; k < gates->legs; k++) {
-        gates->leg[k].driven = pwm->driven[k];
         gates->leg[k].rise_s = (1.0 - duty(gates, pwm->compare[k][0])) * half_s;
         gates->leg[k].fall_s = (1.0 + duty(gates, pwm->compare[k][1])) * half_s;
         gates->leg[k].on_s -= gates->period_s;
         gates->leg[k].off_s -= gates->period_s;
+    }
+    gates_drive(gates, pwm->driven, pwm->driven_after_s);
+}
+
+void gates_drive(gates_t *gates, const bool driven[], double t_s)
+{
+    gates->drive_s = t_s;
+    for (int k = 0; k < gates->legs; k++) {
+        gates->leg[k].to_drive = driven[k];
     }
 }
 
@@ -34,6 +42,7 @@ void gates_off(gates_t *gates)
 {
     for (int k = 0; k < gates->legs; k++) {
         gates->leg[k].driven = false;
+        gates->leg[k].to_drive = false;
         gates->leg[k].command = GATE_OFF;
         gates->leg[k].gate = GATE_OFF;
         gates->leg[k].opening = false;
@@ -52,6 +61,9 @@ static bool update_leg(gates_t *gates, int k, double t_s)
 {
     double late_s = t_s + gates->coincident_s;
     gate_t before = gates->leg[k].gate;
+    if (late_s >= gates->drive_s) {
+        gates->leg[k].driven = gates->leg[k].to_drive;
+    }
     gate_t command = command_at(gates, k, late_s);
     if (command != gates->leg[k].command) {
         gates->leg[k].command = command;
@@ -112,6 +124,9 @@ double gates_next_s(const gates_t *gates, double t_s)
 {
     double next_s = gates->period_s;
     double after_s = t_s + gates->coincident_s;
+    if (gates->drive_s > after_s && gates->drive_s < next_s) {
+        next_s = gates->drive_s;
+    }
     for (int k = 0; k < gates->legs; k++) {
         double rise_s = gates->leg[k].rise_s;
         double fall_s = gates->leg[k].fall_s;

@@ -6,7 +6,8 @@
  *
  * A command edge opens the conducting switch turn_off_s later; the other closes dead_time_s + turn_on_s after
  * the edge. An edge before that starts it anew, so a pulse shorter than the dead time never reaches its
- * switch, as in a timer with a dead-time generator. A leg that becomes driven also waits.
+ * switch, as in a timer with a dead-time generator. A leg that becomes driven also waits. Which legs are
+ * driven changes once in a period, by default at its start.
  *
  * A faulty switch stays as it is whatever its gate says. Edges closer than 1e-9 T are one event. Times are
  * relative to the start of the period. Tests: gates_test.cpp. */
@@ -25,9 +26,10 @@ typedef struct {
     double coincident_s;
     uint32_t timer_counts;
     int legs;
-    double edge_s; /* the last change of any gate */
+    double edge_s;  /* the last change of any gate */
+    double drive_s; /* when `driven` becomes `to_drive` */
     struct {
-        bool driven;
+        bool driven, to_drive;
         double rise_s, fall_s; /* command edges of this period */
         gate_t command;        /* before dead time */
         gate_t gate;           /* of healthy switches */
@@ -45,6 +47,9 @@ void gates_load(gates_t *gates, const plant_pwm_t *pwm);
 
 /* All switches open, now. */
 void gates_off(gates_t *gates);
+
+/* From time t on these legs are driven. */
+void gates_drive(gates_t *gates, const bool driven[], double t_s);
 
 /* Brings the gates to time t; the legs of which one has changed, bit k for leg k. */
 unsigned gates_update(gates_t *gates, double t_s);

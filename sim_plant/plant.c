@@ -1,6 +1,7 @@
 #include "sim_plant/plant.h"
 
 #include "sim_plant/circuit.h"
+#include "sim_plant/comparator.h"
 #include "sim_plant/config.h"
 #include "sim_plant/gates.h"
 #include "sim_plant/sensor.h"
@@ -31,6 +32,10 @@ struct plant {
     double v_mean_alpha_V, v_mean_beta_V;
     double field_base_J; /* field energy at init, less what was put in by hand since */
     double slip_J;       /* work of plant_turn_rotor() */
+    comparator_t comparator;
+    bool has_break, broke;
+    double broke_s;         /* when it did, in its period */
+    double break_s, trip_s; /* when comparators and caller open the bridge, in this period */
 };
 
 plant_t *plant_create(const plant_config_t *config, double theta_e_rad, const char **error)
@@ -50,6 +55,8 @@ plant_t *plant_create(const plant_config_t *config, double theta_e_rad, const ch
     plant->known = config->machine;
     plant->winding_degC = AMBIENT_DEGC;
     plant->magnet_degC = AMBIENT_DEGC;
+    plant->break_s = (double)INFINITY;
+    plant->trip_s = (double)INFINITY;
     noise_seed(&plant->noise, config->sensor.seed);
     circuit_init(&plant->circuit, config, theta_e_rad);
     gates_init(&plant->gates, &config->inverter, plant->circuit.bridge.legs);
@@ -68,15 +75,46 @@ void plant_destroy(plant_t *plant)
     free(plant);
 }
 
-/* Advances to time t of the present period. Half of all edges change only whether a switch or the diode
- * across it carries the current; where that makes no difference the circuit need not stop for them. */
-static void run_until(plant_t *plant, double t_s)
+static void open_bridge(plant_t *plant)
+{
+    memset(&plant->queued, 0, sizeof plant->queued);
+    gates_off(&plant->gates);
+    circuit_switch(&plant->circuit, &plant->gates, ~0u);
+}
+
+static bool any_on(const gates_t *gates)
+{
+    bool any = false;
+    for (int k = 0; k < gates->legs; k++) {
+        any = any || gates->leg[k].gate != GATE_OFF;
+    }
+    return any;
+}
+
+/* To time t without a change of gates, or to where the comparators open the bridge. */
+static void advance_until(plant_t *plant, double t_s)
+{
+    bool watched = plant->has_break && !isfinite(plant->break_s) && any_on(&plant->gates);
+    double duration_s = t_s - plant->t_s;
+    if (watched && comparator_advance(&plant->comparator, &plant->circuit, &duration_s)) {
+        plant->t_s += duration_s;
+        plant->break_s = plant->t_s + plant->comparator.levels.delay_s;
+        t_s = fmin(t_s, plant->break_s);
+        watched = false;
+    }
+    if (!watched && t_s > plant->t_s) {
+        circuit_advance(&plant->circuit, t_s - plant->t_s);
+    }
+    plant->t_s = t_s;
+}
+
+/* Advances to time t of the present period, or to where the bridge opens before. Half of all edges change
+ * only whether a switch or the diode across it carries the current; where that makes no difference the
+ * circuit need not stop for them. */
+static void run_closed(plant_t *plant, double t_s)
 {
     gates_t *gates = &plant->gates;
     circuit_t *circuit = &plant->circuit;
-    if (plant->t_s >= t_s) {
-        return;
-    }
     circuit_settle(circuit);
     unsigned changed = gates_update(gates, plant->t_s);
     while (plant->t_s < t_s) {
@@ -88,9 +126,25 @@ static void run_until(plant_t *plant, double t_s)
             next_s = gates_next_s(gates, next_s);
             changed = next_s < t_s ? gates_update(gates, next_s) : 0u;
         } while (next_s < t_s && circuit_ignores(circuit, gates, changed, next_s - plant->t_s));
-        next_s = next_s < t_s ? next_s : t_s;
-        circuit_advance(circuit, next_s - plant->t_s);
-        plant->t_s = next_s;
+        advance_until(plant, fmin(next_s, t_s));
+        t_s = fmin(t_s, plant->break_s);
+    }
+}
+
+static void run_until(plant_t *plant, double t_s)
+{
+    while (plant->t_s < t_s) {
+        run_closed(plant, fmin(t_s, fmin(plant->break_s, plant->trip_s)));
+        if (plant->t_s >= plant->break_s) {
+            plant->broke = true;
+            plant->broke_s = plant->break_s;
+            plant->break_s = (double)INFINITY;
+            open_bridge(plant);
+        }
+        if (plant->t_s >= plant->trip_s) {
+            plant->trip_s = (double)INFINITY;
+            open_bridge(plant);
+        }
     }
 }
 
@@ -175,6 +229,7 @@ static void finish_period(plant_t *plant)
     plant->v_mean_alpha_V = (x[INT_V_ALPHA] - plant->start[INT_V_ALPHA]) / T;
     plant->v_mean_beta_V = (x[INT_V_BETA] - plant->start[INT_V_BETA]) / T;
     plant->periods++;
+    plant->break_s -= T;
     gates_load(&plant->gates, &plant->queued);
     start_period(plant);
 }
@@ -211,6 +266,13 @@ void plant_sample(plant_t *plant, plant_adc_t *adc)
     sensor_convert(&plant->config.sensor, &plant->noise, &plant->sampled, adc);
 }
 
+void plant_sample_at(plant_t *plant, double after_s, plant_adc_t *adc)
+{
+    plant_move(plant, after_s);
+    capture(plant, &plant->sampled);
+    sensor_convert(&plant->config.sensor, &plant->noise, &plant->sampled, adc);
+}
+
 void plant_set_instants(plant_t *plant, const double after_s[], int count)
 {
     assert(count >= 0 && count <= PLANT_INSTANTS);
@@ -242,9 +304,47 @@ void plant_set_pwm(plant_t *plant, const plant_pwm_t *pwm)
 
 void plant_trip(plant_t *plant)
 {
-    memset(&plant->queued, 0, sizeof plant->queued);
-    gates_off(&plant->gates);
-    circuit_switch(&plant->circuit, &plant->gates, ~0u);
+    open_bridge(plant);
+}
+
+void plant_trip_after(plant_t *plant, double after_s)
+{
+    assert(after_s >= 0.0 && after_s <= plant->gates.period_s);
+    plant->trip_s = after_s;
+}
+
+void plant_drive(plant_t *plant, const bool driven[])
+{
+    gates_drive(&plant->gates, driven, plant->t_s);
+}
+
+void plant_move(plant_t *plant, double after_s)
+{
+    run_until(plant, fmin(after_s, plant->gates.period_s));
+}
+
+void plant_set_break(plant_t *plant, const plant_break_t *comparators)
+{
+    plant->has_break = comparators != NULL;
+    plant->break_s = (double)INFINITY;
+    if (comparators) {
+        assert(comparators->delay_s >= 0.0 && comparators->delay_s < plant->gates.period_s);
+        plant->comparator.levels = *comparators;
+        plant->comparator.in_line = plant->config.sensor.shunt == PLANT_IN_LINE;
+    }
+}
+
+bool plant_broke(plant_t *plant, double *after_s)
+{
+    bool broke = plant->broke;
+    plant->broke = false;
+    *after_s = plant->broke_s;
+    return broke;
+}
+
+bool plant_break_held(const plant_t *plant)
+{
+    return plant->has_break && comparator_sees(&plant->comparator, &plant->circuit, 1.0);
 }
 
 void plant_run_voltages(plant_t *plant, const double v_leg_V[], double rate_rad_s2, double duration_s)
@@ -335,6 +435,11 @@ plant_machine_t *plant_machine(plant_t *plant)
 plant_sensor_t *plant_sensor(plant_t *plant)
 {
     return &plant->config.sensor;
+}
+
+const plant_inverter_t *plant_inverter(const plant_t *plant)
+{
+    return &plant->config.inverter;
 }
 
 void plant_turn_rotor(plant_t *plant, double angle_e_rad)

@@ -6,7 +6,10 @@
  * section: full scale there is full scale of the converter. What is not modelled is an error that names
  * register and PC, never a guess. docs/board.md.
  *
- * Order of a period k: sample at t_k; processor until t_k+1; plant from t_k to t_k+1 with what the timer had.
+ * A period k runs from one update event of TIM1 to the next: processor until t_k+1, the plant behind it,
+ * moved on where something happens in it: samples, legs switched on or off, t_k+1. A break by the comparators
+ * acts in the plant at its instant; the processor sees it at its next look at TIM1, or from t_k+1 on. Until
+ * TIM1 counts, and after a reset, periods go by the clock and the bridge is off.
  */
 #ifndef BOARD_BOARD_H
 #define BOARD_BOARD_H
@@ -46,7 +49,7 @@ void *board_variable(board_t *board, const char *name, size_t size);
 
 /* Flash pages as the debugger sees them: for parameters that are there before the first boot. */
 void board_program(board_t *board, uint32_t address, const void *data, size_t size);
-void board_read_flash(const board_t *board, uint32_t address, void *data, size_t size);
+void board_read_flash(board_t *board, uint32_t address, void *data, size_t size);
 
 /* Bus and console */
 typedef struct {
@@ -55,10 +58,10 @@ typedef struct {
     uint8_t data[8];
 } board_frame_t;
 bool board_can_send(board_t *board, const board_frame_t *frame); /* to the image; false: not started */
-bool board_can_receive(board_t *board, board_frame_t *frame);    /* from it; false: none */
+bool board_can_receive(board_t *board, board_frame_t *frame);    /* from it, the last 256; false: none */
 void board_can_error(board_t *board, bool bus_off);
-const char *board_console(const board_t *board); /* all that the UART has said */
-bool board_led(const board_t *board);
+const char *board_console(board_t *board); /* all that the UART has said */
+bool board_led(board_t *board);
 
 /* The outside world */
 void board_set_temperature(board_t *board, double temperature_degC);
@@ -67,9 +70,13 @@ void board_press_button(board_t *board, bool pressed);
 void board_hold_break(board_t *board, bool held); /* external break input */
 
 /* Faults of the board itself */
+void board_halt(board_t *board,
+                bool halted); /* by the debugger: DBGMCU's freeze bits act, unlike cpu_halt() */
 void board_stick_converter(board_t *board, bool stuck); /* conversions never end */
 void board_stop_oscillator(board_t *board, bool stopped);
-void board_cut_flash(board_t *board, uint32_t after_words); /* power is lost then: the board resets */
+/* Power is lost in the midst of the n-th double word or page erase from now on: the board resets. 0: never.
+ */
+void board_cut_flash(board_t *board, uint32_t after_words);
 
 /* Deepest use of the main stack and of the process stack since reset, bytes: by painted memory. */
 uint32_t board_stack_used(const board_t *board);

@@ -20,7 +20,9 @@ extern "C" {
 typedef struct cpu cpu_t;
 
 /* A block of registers. Accesses come as words with a mask of the bytes that are meant; read and write
- * return false for a register that is not modelled. */
+ * return false for a register that is not modelled. After cpu_fail() within one its own answer is of no
+ * matter. A device may lie on memory that the processor may not write: it gets the writes (and mask), reads
+ * stay memory. Flash is programmed so. */
 typedef struct {
     const char *name;
     uint32_t base, size;
@@ -48,10 +50,18 @@ typedef struct {
 cpu_t *cpu_create(char *error, size_t error_size);
 void cpu_destroy(cpu_t *cpu);
 
-void cpu_add_memory(cpu_t *cpu, const cpu_memory_t *memory);
+void cpu_add_memory(cpu_t *cpu, const cpu_memory_t *memory);        /* base and size in whole KiB */
 void cpu_add_device(cpu_t *cpu, const cpu_device_t *device);        /* copied */
 uint8_t *cpu_memory(cpu_t *cpu, uint32_t address, uint32_t size);   /* the host's view, NULL: outside */
 void cpu_code_changed(cpu_t *cpu, uint32_t address, uint32_t size); /* flash was programmed or erased */
+
+/* Fetches from that memory wait as STM32G4's flash does at these wait states (cycles.h); 0 after creation. */
+void cpu_set_wait_states(cpu_t *cpu, uint32_t base, unsigned wait_states);
+
+/* Names in errors come from there; the image stays the caller's. */
+typedef struct elf_image elf_image_t;
+void cpu_set_symbols(cpu_t *cpu, const elf_image_t *image);
+bool cpu_load_image(cpu_t *cpu, const elf_image_t *image); /* false: not all of it is in memory */
 
 /* Stack pointer and entry from the vector table; clears everything but memory and counters of time. */
 void cpu_reset(cpu_t *cpu, uint32_t vector_table);
@@ -61,11 +71,16 @@ bool cpu_run(cpu_t *cpu, uint64_t until_cycle);
 const char *cpu_error(const cpu_t *cpu);
 void cpu_fail(cpu_t *cpu, const char *format, ...); /* for devices: ends the run */
 void cpu_halt(cpu_t *cpu, bool halted);             /* as a debugger does */
+/* Whatever the processor fetches from or loads of that memory until then waits. From within a device's write.
+ */
+void cpu_stall(cpu_t *cpu, uint32_t base, uint64_t until_cycle);
 uint64_t cpu_now(const cpu_t *cpu);
 uint32_t cpu_pc(const cpu_t *cpu);
 uint32_t cpu_register(const cpu_t *cpu, int n); /* r0 to r15 */
 
-/* Interrupt request lines are levels: pending again after return while the line is high. */
+/* Interrupt request lines are levels: pending again after return while the line is high. CPU_NMI is one of
+ * them. */
+#define CPU_NMI (-14)
 void cpu_irq(cpu_t *cpu, int irq, bool level);
 
 /* Calls back once `cycle` has been reached, between two blocks of instructions. One per owner: a later call
@@ -77,13 +92,26 @@ void cpu_alarm(cpu_t *cpu, void *owner, uint64_t cycle, cpu_alarm_t alarm);
 typedef void (*cpu_trace_t)(void *owner, int exception, bool entry);
 void cpu_trace(cpu_t *cpu, void *owner, cpu_trace_t trace);
 
-/* Software reset (AIRCR) or lock-up: the run ends with true, cpu_reset_asked() tells. */
+/* Called before the block at that address is executed: the entry of a function, or where a call returns to.
+ * Cost in time only where it is called. A later call for an address replaces; NULL cancels. */
+typedef void (*cpu_watch_t)(void *owner, uint32_t address);
+void cpu_watch(cpu_t *cpu, uint32_t address, void *owner, cpu_watch_t watch);
+
+/* A BKPT is an error without this. True: it has been served, go on behind it; false: the run ends. */
+typedef bool (*cpu_breakpoint_t)(void *owner, uint8_t number);
+void cpu_on_breakpoint(cpu_t *cpu, void *owner, cpu_breakpoint_t breakpoint);
+void cpu_set_register(cpu_t *cpu, int n, uint32_t value);
+
+/* Software reset (AIRCR) or lock-up: the run ends with true, these tell. Both last until cpu_reset(). */
 bool cpu_reset_asked(const cpu_t *cpu);
+bool cpu_locked_up(const cpu_t *cpu);
 bool cpu_sleeping(const cpu_t *cpu);
 
 const cpu_exception_stats_t *cpu_exception_stats(const cpu_t *cpu, int exception);
 void cpu_clear_stats(cpu_t *cpu);
 uint64_t cpu_instructions(const cpu_t *cpu);
+uint64_t cpu_cycles_low(const cpu_t *cpu); /* as cpu_now(), by the most favourable reading of the manual */
+uint64_t cpu_cycles_high(const cpu_t *cpu);
 uint64_t cpu_cycles_asleep(const cpu_t *cpu);
 uint64_t cpu_cycles_in_thread(const cpu_t *cpu);
 

@@ -1,0 +1,63 @@
+#include "sim_plant/board/board_misc.h"
+
+enum { SYSCFG_CFGR2 = 0x1C, DBGMCU_APB1FZR1 = 0x08, DBGMCU_APB2FZR = 0x10 };
+enum { FREEZE_IWDG = 0x1000, FREEZE_TIM1 = 0x800 };
+
+static const board_register_t syscfg_list[] = {{SYSCFG_CFGR2, "CFGR2", 0, 0x9u, 0}};
+static const board_register_t debug_list[] = {
+    {DBGMCU_APB1FZR1, "APB1FZR1", 0, FREEZE_IWDG, 0},
+    {DBGMCU_APB2FZR, "APB2FZR", 0, FREEZE_TIM1, 0},
+};
+static const board_register_t identity_list[] = {
+    {0x0, "UID0", 0x00280043u, 0, 0},
+    {0x4, "UID1", 0x594E5004u, 0, 0},
+    {0x8, "UID2", 0x20373358u, 0, 0},
+};
+
+void board_misc_init(board_misc_t *misc, cpu_t *cpu)
+{
+    board_registers_init(&misc->syscfg, cpu, "SYSCFG", syscfg_list, 1);
+    board_registers_init(&misc->debug, cpu, "DBGMCU", debug_list, 2);
+    board_registers_init(&misc->identity, cpu, "UID", identity_list, 3);
+}
+
+/* DBGMCU keeps its bits but for a power-on reset. */
+void board_misc_reset(board_misc_t *misc)
+{
+    board_registers_reset(&misc->syscfg);
+}
+
+bool board_misc_freezes_iwdg(const board_misc_t *misc)
+{
+    return (misc->debug.value[DBGMCU_APB1FZR1 / 4] & FREEZE_IWDG) != 0u;
+}
+
+bool board_misc_freezes_tim1(const board_misc_t *misc)
+{
+    return (misc->debug.value[DBGMCU_APB2FZR / 4] & FREEZE_TIM1) != 0u;
+}
+
+static bool read_any(void *self, uint32_t offset, uint32_t *value)
+{
+    return board_registers_read(self, offset, value);
+}
+
+static bool write_any(void *self, uint32_t offset, uint32_t value, uint32_t mask)
+{
+    return board_registers_write(self, offset, value, mask);
+}
+
+cpu_device_t board_misc_syscfg(board_misc_t *misc)
+{
+    return (cpu_device_t){"SYSCFG", 0x40010000u, 0x30u, &misc->syscfg, read_any, write_any};
+}
+
+cpu_device_t board_misc_debug(board_misc_t *misc)
+{
+    return (cpu_device_t){"DBGMCU", 0xE0042000u, 0x400u, &misc->debug, read_any, write_any};
+}
+
+cpu_device_t board_misc_identity(board_misc_t *misc)
+{
+    return (cpu_device_t){"UID", 0x1FFF7590u, 0xCu, &misc->identity, read_any, write_any};
+}

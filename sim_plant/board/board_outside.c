@@ -1,0 +1,109 @@
+/* Of board.h: what is not the chip. */
+#include "sim_plant/board/board.h"
+
+#include "sim_plant/board/board_inside.h"
+
+#include <string.h>
+
+void board_program(board_t *board, uint32_t address, const void *data, size_t size)
+{
+    uint8_t *to = cpu_memory(board_cpu(board), address, (uint32_t)size);
+    if (!to || address - FLASH_BASE >= FLASH_SIZE) {
+        cpu_fail(board_cpu(board), "board_program: 0x%08x is not flash", (unsigned)address);
+        return;
+    }
+    memcpy(to, data, size);
+    cpu_code_changed(board_cpu(board), address, (uint32_t)size);
+}
+
+void board_read_flash(board_t *board, uint32_t address, void *data, size_t size)
+{
+    const uint8_t *from = cpu_memory(board_cpu(board), address, (uint32_t)size);
+    if (from) {
+        memcpy(data, from, size);
+    }
+}
+
+bool board_can_send(board_t *board, const board_frame_t *frame)
+{
+    fdcan_frame_t out = {.id = frame->id, .length = frame->length};
+    memcpy(out.data, frame->data, sizeof out.data);
+    return fdcan_put(&board_chip(board)->fdcan, &out);
+}
+
+bool board_can_receive(board_t *board, board_frame_t *frame)
+{
+    fdcan_frame_t in;
+    if (!fdcan_take(&board_chip(board)->fdcan, &in)) {
+        return false;
+    }
+    *frame = (board_frame_t){.id = in.id, .length = in.length};
+    memcpy(frame->data, in.data, sizeof in.data);
+    return true;
+}
+
+void board_can_error(board_t *board, bool bus_off)
+{
+    fdcan_error(&board_chip(board)->fdcan, bus_off);
+}
+
+const char *board_console(board_t *board)
+{
+    return board_chip(board)->usart.text;
+}
+
+bool board_led(board_t *board)
+{
+    return gpio_drives_high(&board_chip(board)->gpio, PORT_C, 6);
+}
+
+void board_set_temperature(board_t *board, double temperature_degC)
+{
+    board_chip(board)->wiring.temperature_degC = temperature_degC;
+}
+
+void board_set_dial(board_t *board, double fraction)
+{
+    board_chip(board)->wiring.dial = fraction;
+}
+
+void board_press_button(board_t *board, bool pressed)
+{
+    board_chip(board)->wiring.button = pressed;
+}
+
+void board_hold_break(board_t *board, bool held)
+{
+    board_chip(board)->wiring.break_held = held;
+    tim1_check_break(&board_chip(board)->tim1);
+}
+
+void board_halt(board_t *board, bool halted)
+{
+    board_chip_t *chip = board_chip(board);
+    cpu_halt(board_cpu(board), halted);
+    if (board_misc_freezes_iwdg(&chip->misc)) {
+        iwdg_freeze(&chip->iwdg, halted);
+    }
+    if (board_misc_freezes_tim1(&chip->misc)) {
+        tim1_freeze(&chip->tim1, halted);
+    }
+}
+
+void board_stick_converter(board_t *board, bool stuck)
+{
+    board_chip_t *chip = board_chip(board);
+    chip->wiring.converter_stuck = stuck;
+    adc_release(&chip->adc);
+}
+
+void board_stop_oscillator(board_t *board, bool stopped)
+{
+    board_chip(board)->wiring.oscillator_stopped = stopped;
+    rcc_oscillator(&board_chip(board)->rcc, stopped);
+}
+
+void board_cut_flash(board_t *board, uint32_t after_words)
+{
+    board_chip(board)->flash.cut_after = after_words;
+}

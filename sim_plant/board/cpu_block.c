@@ -1,0 +1,113 @@
+#include "sim_plant/board/cpu_state.h"
+
+#include <stdlib.h>
+
+cpu_block_t *cpu_block_at(cpu_t *cpu, uint32_t address, uint32_t size)
+{
+    cpu_region_t *region = cpu_region_of(cpu, address);
+    if (region == NULL || address - region->is.base + size > region->is.size) {
+        return NULL;
+    }
+    cpu_block_t **place = &region->block[(address - region->is.base) / 2];
+    cpu_block_t *block = *place;
+    if (block != NULL && block->size == size) {
+        return block;
+    }
+    if (block == NULL) {
+        block = calloc(1, sizeof *block);
+        if (block == NULL) {
+            return NULL;
+        }
+        *place = block;
+    }
+    /* The same start with another length: the newest counts, its hits go on. */
+    block->address = address;
+    block->size = size;
+    block->region = region;
+    block->attention = true;
+    cycles_of_block(&block->cost, region->host + (address - region->is.base), size);
+    return block;
+}
+
+/* Calls `act` for every block there is. */
+static void for_all(const cpu_t *cpu, void (*act)(cpu_block_t *block))
+{
+    for (unsigned i = 0; i < cpu->regions; i++) {
+        const cpu_region_t *region = &cpu->region[i];
+        for (uint32_t k = 0; k < region->is.size / 2; k++) {
+            if (region->block[k] != NULL) {
+                act(region->block[k]);
+            }
+        }
+    }
+}
+
+static void needs_attention(cpu_block_t *block)
+{
+    block->attention = true;
+}
+
+void cpu_block_all_need_attention(cpu_t *cpu)
+{
+    for_all(cpu, needs_attention);
+}
+
+void cpu_free_blocks(cpu_region_t *region)
+{
+    for (uint32_t k = 0; k < region->is.size / 2; k++) {
+        free(region->block[k]);
+    }
+    free(region->block);
+}
+
+void cpu_forget_blocks(cpu_t *cpu, uint32_t address, uint32_t size)
+{
+    for (unsigned i = 0; i < cpu->regions; i++) {
+        cpu_region_t *region = &cpu->region[i];
+        for (uint32_t k = 0; k < region->is.size / 2; k++) {
+            cpu_block_t *block = region->block[k];
+            if (block != NULL && block->address < address + size && address < block->address + block->size) {
+                block->size = 0; /* decoded anew when it is next executed; its hits stay */
+            }
+        }
+    }
+}
+
+void cpu_visit_blocks(const cpu_t *cpu, cpu_block_visitor_t visit, void *context)
+{
+    for (unsigned i = 0; i < cpu->regions; i++) {
+        const cpu_region_t *region = &cpu->region[i];
+        for (uint32_t k = 0; k < region->is.size / 2; k++) {
+            const cpu_block_t *block = region->block[k];
+            if (block != NULL && block->hits != 0) {
+                visit(context, block->address, block->size, block->cost.instructions, block->hits);
+            }
+        }
+    }
+}
+
+void cpu_watch(cpu_t *cpu, uint32_t address, void *owner, cpu_watch_t watch)
+{
+    address &= ~1U;
+    unsigned i = 0;
+    while (i < cpu->watches && cpu->watch[i].address != address) {
+        i++;
+    }
+    if (watch == NULL) {
+        if (i < cpu->watches) {
+            cpu->watches--;
+            cpu->watch[i] = cpu->watch[cpu->watches];
+        }
+        return;
+    }
+    if (i == CPU_WATCHES) {
+        cpu_fail(cpu, "more than %d watched addresses", CPU_WATCHES);
+        return;
+    }
+    cpu->watch[i] = (cpu_watch_entry_t){address, owner, watch};
+    cpu->watches = i == cpu->watches ? i + 1 : cpu->watches;
+    cpu_region_t *region = cpu_region_of(cpu, address);
+    if (region != NULL && region->block[(address - region->is.base) / 2] != NULL) {
+        region->block[(address - region->is.base) / 2]->attention = true;
+    }
+}

@@ -1,0 +1,232 @@
+/* unicorn tells the address of a bad access and leaves the registers as they were before the instruction, but
+ * not where that is: within the present block it is the load or store whose address agrees. */
+#include "sim_plant/board/cpu_state.h"
+#include "sim_plant/board/exceptions.h"
+
+#include "sim_plant/board/cpu_insn.h"
+
+#include <string.h>
+
+bool cpu_is_urgent(const cpu_t *cpu)
+{
+    return nvic_active(&cpu->nvic, EXCEPTION_HARD_FAULT) || nvic_active(&cpu->nvic, EXCEPTION_NMI) ||
+           (cpu_get(cpu, UC_ARM_REG_FAULTMASK) & 1U) != 0;
+}
+
+static bool touches(const insn_t *insn, uint32_t pc, const uint32_t registers[16], uint32_t address,
+                    bool write)
+{
+    const bool load = insn->kind == INSN_LOAD || insn->kind == INSN_LOADS;
+    const bool store = insn->kind == INSN_STORE || insn->kind == INSN_STORES;
+    return (write ? store : load) &&
+           address - insn_address(insn, pc, registers) < (uint32_t)insn->size * insn->count;
+}
+
+/* The state of an IT block as the next instruction sees it: B1.4, A7.3. */
+static uint32_t it_advance(uint32_t it)
+{
+    return (it & 7U) == 0 ? 0 : (it & 0xE0U) | (it << 1 & 0x1FU);
+}
+
+uint32_t cpu_access_pc(cpu_t *cpu, uint32_t address, bool write, uint32_t *it)
+{
+    const cpu_block_t *block = cpu->block;
+    uint32_t registers[16], state = 0;
+    cpu_get_core(cpu, registers);
+    *it = 0;
+    if (block == NULL) {
+        return registers[15];
+    }
+    const uint8_t *code = block->region->host + (block->address - block->region->is.base);
+    for (uint32_t at = 0; at + 2 <= block->size;) {
+        const uint16_t first = (uint16_t)(code[at] | code[at + 1] << 8);
+        const uint16_t second = at + 4 <= block->size ? (uint16_t)(code[at + 2] | code[at + 3] << 8) : 0;
+        insn_t insn;
+        insn_decode(&insn, first, second);
+        if (touches(&insn, block->address + at, registers, address, write)) {
+            *it = state;
+            return block->address + at;
+        }
+        state = insn.kind == INSN_IT ? insn.it : it_advance(state);
+        at += insn.length;
+    }
+    return block->address;
+}
+
+static void give_fault(cpu_t *cpu, uint32_t address, bool write, bool fetch, bool protection)
+{
+    cpu->fault.address = address;
+    cpu->fault.write = write;
+    cpu->fault.fetch = fetch;
+    cpu->fault.protection = protection;
+}
+
+static bool to_flash(cpu_t *cpu, uint32_t address, unsigned size, uint32_t value)
+{
+    const cpu_device_t *device = bus_find(&cpu->bus, address);
+    uint8_t *place = cpu_memory(cpu, address, size);
+    if (device == NULL || place == NULL) {
+        give_fault(cpu, address, true, false, false);
+        return false;
+    }
+    if (cpu->flash_writes == CPU_FLASH_WRITES) {
+        cpu_fail(cpu, "more than %d writes to flash in a row", CPU_FLASH_WRITES);
+        return false;
+    }
+    cpu_flash_write_t *write = &cpu->flash_write[cpu->flash_writes];
+    cpu->flash_writes++;
+    *write = (cpu_flash_write_t){.address = address, .value = value, .size = size};
+    memcpy(&write->old, place, size);
+    cpu->want_stop = true;
+    return true;
+}
+
+static void wait_for(cpu_t *cpu, uint64_t cycle)
+{
+    if (cycle > cpu->total.typical) {
+        const uint32_t wait = (uint32_t)(cycle - cpu->total.typical);
+        cpu_spend(cpu, (cycles_t){wait, wait, wait});
+    }
+}
+
+bool cpu_on_bad_memory(uc_engine *uc, uc_mem_type type, uint64_t where, int size, int64_t value, void *user)
+{
+    (void)uc;
+    cpu_t *cpu = user;
+    const uint32_t address = (uint32_t)where;
+    if (type == UC_MEM_FETCH_UNMAPPED || type == UC_MEM_FETCH_PROT) {
+        give_fault(cpu, address, false, true,
+                   !mpu_allows(&cpu->mpu, address, MPU_EXECUTE, cpu_is_urgent(cpu)));
+        return false;
+    }
+    const bool write = type == UC_MEM_WRITE_UNMAPPED || type == UC_MEM_WRITE_PROT;
+    if (cpu->fault.unaligned) {
+        return false;
+    }
+    if (!mpu_allows(&cpu->mpu, address, write ? MPU_WRITE : MPU_READ, cpu_is_urgent(cpu))) {
+        give_fault(cpu, address, write, false, true);
+        return false;
+    }
+    const cpu_region_t *region = cpu_region_of(cpu, address);
+    if (region == NULL) {
+        give_fault(cpu, address, write, false, false);
+        return false;
+    }
+    wait_for(cpu, region->original->stalled_until);
+    if (write && !region->is.writable) {
+        return to_flash(cpu, address, (unsigned)size, (uint32_t)value);
+    }
+    /* Allowed after all: unicorn's finest grain is a page. It may now remember a read as allowed everywhere
+     * in the page: mapping anew makes it forget. */
+    cpu->remap = true;
+    cpu->want_stop = true;
+    return true;
+}
+
+/* While alignment is enforced every access comes by. Taking the page's rights away ends a bad one cleanly. */
+void cpu_on_any_memory(uc_engine *uc, uc_mem_type type, uint64_t where, int size, int64_t value, void *user)
+{
+    (void)value;
+    cpu_t *cpu = user;
+    const uint32_t address = (uint32_t)where;
+    if (address % (uint32_t)size == 0) {
+        return;
+    }
+    cpu_region_t *region = cpu_region_of(cpu, address);
+    if (region != NULL) {
+        give_fault(cpu, address, type == UC_MEM_WRITE, false, false);
+        cpu->fault.unaligned = true;
+        cpu->remap = true;
+        (void)uc_mem_protect(uc, address & ~(uint64_t)(CPU_PAGE - 1), CPU_PAGE, UC_PROT_NONE);
+    }
+}
+
+/* Instructions of the block behind the one that failed were counted but not executed. Their time stays: it
+ * must not run backwards. */
+static void take_back_after(cpu_t *cpu, uint32_t pc)
+{
+    const cpu_block_t *block = cpu->block;
+    if (block == NULL || pc - block->address >= block->size) {
+        return;
+    }
+    cycles_block_t done;
+    cycles_of_block(&done, block->region->host + (block->address - block->region->is.base),
+                    pc - block->address);
+    cpu->total.instructions -= block->cost.instructions - done.instructions;
+    cpu->block = NULL;
+}
+
+static void data_fault(cpu_t *cpu)
+{
+    uint32_t it;
+    const uint32_t pc = cpu_access_pc(cpu, cpu->fault.address, cpu->fault.write, &it);
+    take_back_after(cpu, pc);
+    const uint32_t xpsr = cpu_get(cpu, UC_ARM_REG_XPSR) & ~UINT32_C(0x0600FC00);
+    cpu_set(cpu, UC_ARM_REG_XPSR, xpsr | (it & 3U) << 25 | (it & 0xFCU) << 8);
+    cpu_set(cpu, UC_ARM_REG_PC, pc | 1U);
+    if (cpu->fault.unaligned) {
+        cpu->fault.unaligned = false;
+        exceptions_raise_usage(cpu, CFSR_UNALIGNED);
+    } else if (cpu->fault.protection) {
+        cpu->system.cfsr |= CFSR_DACCVIOL | CFSR_MMARVALID;
+        cpu->system.mmfar = cpu->fault.address;
+        exceptions_raise(cpu, EXCEPTION_MEM_MANAGE);
+    } else {
+        cpu->system.cfsr |= CFSR_PRECISERR | CFSR_BFARVALID;
+        cpu->system.bfar = cpu->fault.address;
+        exceptions_raise(cpu, EXCEPTION_BUS_FAULT);
+    }
+}
+
+static void fetch_fault(cpu_t *cpu, bool protection)
+{
+    cpu->system.cfsr |= protection ? CFSR_IACCVIOL : CFSR_IBUSERR;
+    exceptions_raise(cpu, protection ? EXCEPTION_MEM_MANAGE : EXCEPTION_BUS_FAULT);
+}
+
+/* WFE is unknown to unicorn 2.0.1: it ends as an invalid instruction, with the PC behind it. */
+static bool was_wait_for_event(cpu_t *cpu, uint32_t pc)
+{
+    const cpu_block_t *block = cpu->block;
+    if (block == NULL || block->address + block->size != pc) {
+        return false;
+    }
+    const uint8_t *narrow = cpu_memory(cpu, pc - 2, 2), *wide = cpu_memory(cpu, pc - 4, 4);
+    return (narrow != NULL && narrow[0] == 0x20 && narrow[1] == 0xBF) ||
+           (wide != NULL && block->size >= 4 && memcmp(wide, "\xAF\xF3\x02\x80", 4) == 0);
+}
+
+static void invalid_instruction(cpu_t *cpu)
+{
+    const uint32_t pc = cpu_get(cpu, UC_ARM_REG_PC) & ~1U;
+    if (was_wait_for_event(cpu, pc)) {
+        cpu->sleeping_for_event = !cpu->event;
+        cpu->event = false;
+        return;
+    }
+    take_back_after(cpu, pc);
+    const bool thumb = (cpu_get(cpu, UC_ARM_REG_XPSR) & UINT32_C(0x01000000)) != 0;
+    exceptions_raise_usage(cpu, thumb ? CFSR_UNDEFINSTR : CFSR_INVSTATE);
+}
+
+void cpu_take_error(cpu_t *cpu, uc_err error)
+{
+    switch (error) {
+    case UC_ERR_READ_UNMAPPED:
+    case UC_ERR_WRITE_UNMAPPED:
+    case UC_ERR_READ_PROT:
+    case UC_ERR_WRITE_PROT:
+        data_fault(cpu);
+        break;
+    case UC_ERR_FETCH_UNMAPPED:
+    case UC_ERR_FETCH_PROT:
+        fetch_fault(cpu, cpu->fault.protection);
+        break;
+    case UC_ERR_INSN_INVALID:
+        invalid_instruction(cpu);
+        break;
+    default:
+        cpu_fail_at(cpu, cpu_get(cpu, UC_ARM_REG_PC), "%s", uc_strerror(error));
+        break;
+    }
+}

@@ -1,0 +1,157 @@
+/* Inside of the processor, for its own files: cpu.c runs it, cpu_memory.c maps, cpu_faults.c finds out what
+ * went wrong, exceptions.c enters and returns, system_block.c is what the image sees of all this. */
+#ifndef BOARD_CPU_STATE_H
+#define BOARD_CPU_STATE_H
+
+#include <unicorn/unicorn.h>
+
+#include "sim_plant/board/alarms.h"
+#include "sim_plant/board/bus.h"
+#include "sim_plant/board/cpu.h"
+#include "sim_plant/board/cpu_mpu.h"
+#include "sim_plant/board/cycles.h"
+#include "sim_plant/board/elf_image.h"
+#include "sim_plant/board/nvic.h"
+#include "sim_plant/board/system_block.h"
+
+enum { CPU_MEMORIES = 8, CPU_RUNS = 64, CPU_PAGE = 1024, CPU_WATCHES = 32, CPU_FLASH_WRITES = 64 };
+
+typedef struct cpu_region cpu_region_t;
+
+/* A run of instructions that the processor executes as one; from its address to the first branch. */
+typedef struct {
+    uint32_t address, size;
+    cycles_block_t cost;
+    cpu_region_t *region;
+    uint64_t hits;
+    bool attention; /* look before executing: new, watched, or the MPU has changed */
+} cpu_block_t;
+
+struct cpu_region {
+    cpu_memory_t is;
+    uint8_t *host;
+    cpu_region_t *original; /* of an alias; else itself */
+    cpu_block_t **block;    /* by half-word; those of an original only hold its own addresses */
+    cycles_flash_t fetch;
+    uint64_t stalled_until;
+    struct {
+        uint32_t base, size, permissions;
+    } run[CPU_RUNS]; /* as mapped in unicorn */
+    unsigned runs;
+};
+
+typedef struct {
+    uint64_t instructions, low, typical, high, asleep;
+} cpu_counters_t;
+
+/* An exception being served. */
+typedef struct {
+    int exception;
+    cpu_counters_t own;
+} cpu_frame_t;
+
+typedef struct {
+    uint32_t address, value, old;
+    unsigned size;
+} cpu_flash_write_t;
+
+typedef struct {
+    uint32_t address;
+    void *owner;
+    cpu_watch_t call;
+} cpu_watch_entry_t;
+
+struct cpu {
+    uc_engine *uc;
+    nvic_t nvic;
+    bus_t bus;
+    alarms_t alarms;
+    mpu_t mpu;
+    system_block_t system;
+    cpu_region_t region[CPU_MEMORIES];
+    unsigned regions;
+
+    cpu_counters_t total; /* total.typical is the time */
+    uint64_t stop_at;
+    bool want_stop; /* before the next block */
+    bool stopped;   /* by the block hook, before the block at stop_pc */
+    uint32_t stop_pc;
+    int interrupt; /* unicorn's number, -1: none */
+    bool divided_by_zero;
+    uint32_t division_pc;
+
+    bool failed, reset_asked, locked_up, halted, sleeping, sleeping_for_event, event;
+    bool remap; /* access rights have changed */
+    char error[256];
+
+    cpu_block_t *block; /* present or last */
+    uint32_t block_end;
+    uint32_t hooked[256]; /* divisions with a hook */
+    unsigned hooks;
+    uint64_t wait_until; /* the next block cannot be fetched before */
+
+    struct {
+        uint32_t address;
+        bool write, fetch, protection, unaligned;
+    } fault; /* the access that ended the run of unicorn */
+    cpu_flash_write_t flash_write[CPU_FLASH_WRITES];
+    unsigned flash_writes;
+    uc_hook alignment_hook;
+    bool aligned_only;
+
+    cpu_frame_t frame[NVIC_EXCEPTIONS];
+    unsigned frames;
+    cpu_counters_t mark; /* total when the present frame began to run */
+    cpu_counters_t thread;
+    cpu_exception_stats_t stats[NVIC_EXCEPTIONS];
+
+    const elf_image_t *symbols;
+    cpu_watch_entry_t watch[CPU_WATCHES];
+    unsigned watches;
+    struct {
+        void *owner;
+        cpu_trace_t call;
+    } trace;
+    struct {
+        void *owner;
+        cpu_breakpoint_t call;
+    } breakpoint;
+};
+
+/* cpu.c */
+uint32_t cpu_get(const cpu_t *cpu, int unicorn_register);
+void cpu_set(cpu_t *cpu, int unicorn_register, uint32_t value);
+void cpu_get_core(const cpu_t *cpu, uint32_t registers[16]);
+void cpu_spend(cpu_t *cpu, cycles_t cycles);
+bool cpu_hook(cpu_t *cpu, uc_hook *hook, int type, void (*call)(void), uint64_t begin, uint64_t end);
+void cpu_fail_at(cpu_t *cpu, uint32_t pc, const char *format, ...);
+
+/* cpu_memory.c */
+cpu_region_t *cpu_region_of(cpu_t *cpu, uint32_t address);
+bool cpu_load(cpu_t *cpu, uint32_t address, uint32_t *value); /* by the processor itself; no checks */
+bool cpu_store(cpu_t *cpu, uint32_t address, uint32_t value);
+void cpu_map(cpu_t *cpu, cpu_region_t *region); /* as the MPU and stalls have it */
+void cpu_map_all(cpu_t *cpu);
+void cpu_flush_flash_writes(cpu_t *cpu);
+void cpu_forget_blocks(cpu_t *cpu, uint32_t address, uint32_t size);
+void cpu_free_memory(cpu_t *cpu);
+
+/* cpu_block.c */
+cpu_block_t *cpu_block_at(cpu_t *cpu, uint32_t address, uint32_t size);
+void cpu_block_all_need_attention(cpu_t *cpu);
+void cpu_free_blocks(cpu_region_t *region);
+
+/* cpu_faults.c */
+bool cpu_on_bad_memory(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value,
+                       void *user);
+void cpu_on_any_memory(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value,
+                       void *user);
+void cpu_take_error(cpu_t *cpu, uc_err error);
+uint32_t cpu_access_pc(cpu_t *cpu, uint32_t address, bool write, uint32_t *it);
+bool cpu_is_urgent(const cpu_t *cpu); /* in HardFault, NMI or with FAULTMASK */
+
+/* cpu_stats.c */
+void cpu_stats_enter(cpu_t *cpu, int exception);
+void cpu_stats_leave(cpu_t *cpu, int exception);
+
+#endif

@@ -1,0 +1,22 @@
+/* Over-current comparators: the circuit's advance that stops where one of them sees too much.
+ *
+ * Checks the ends of a segment, and every WATCH_S once a current is beyond half of its level; the instant is
+ * then found by halving to FOUND_S. A current that leaves half of the level, passes the level and is back
+ * below half within one segment is missed. Tests: comparator_test.cpp. */
+#ifndef PLANT_COMPARATOR_H
+#define PLANT_COMPARATOR_H
+
+#include "sim_plant/circuit.h"
+
+typedef struct {
+    plant_break_t levels;
+    bool in_line; /* shunts see their currents always */
+} comparator_t;
+
+/* Whether one sees more than that share of its level. */
+bool comparator_sees(const comparator_t *comparator, const circuit_t *circuit, double share);
+
+/* By *duration_s, or less when a comparator acts: then *duration_s is what was taken, and true. */
+bool comparator_advance(const comparator_t *comparator, circuit_t *circuit, double *duration_s);
+
+#endif
