@@ -230,7 +230,7 @@ bool board_bridge_on(const board_t *board)
 void *board_variable(board_t *board, const char *name, size_t size)
 {
     elf_symbol_t symbol;
-    bool found = elf_image_find(board->image, name, &symbol) && symbol.size == size;
+    bool found = elf_image_find(board->image, name, &symbol) && symbol.size >= size;
     return found ? cpu_memory(board->cpu, symbol.address, symbol.size) : NULL;
 }
 
