@@ -43,6 +43,8 @@ FIELDS = {
 }
 # Masks of one bit less than the crate's field: the fourth bit of OCxM stands elsewhere.
 SPLIT = {"TIM_CCMR1_OC1M", "TIM_CCMR1_OC2M", "TIM_CCMR2_OC3M", "TIM_CCMR2_OC4M"}
+# Where the crate is wrong: macro -> what it says, what RM0440 says (position, width).
+ERRORS = {"PWR_CR5_R1MODE": ((0, 1), (8, 1))}
 # enumerator -> fieldset, field, variant
 VALUES = {
     "TIM_CMS_CENTRE": ("timer.v2.Cr1Gp16", "cms", "CENTER_ALIGNED1"),
@@ -203,6 +205,10 @@ class Check:
             if found is None:
                 self.unknown.append(macro)
                 continue
+            if macro in ERRORS:
+                says, found = ERRORS[macro][0], ERRORS[macro][1]
+                if says != find(self.facts.fields, fieldset, field, None):
+                    self.messages.append(f"{macro}: the crate has changed, look again")
             position, width = found
             self.expect(macro, ((1 << width) - 1) << position, macro)
 

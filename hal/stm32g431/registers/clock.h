@@ -70,7 +70,7 @@ typedef struct {
     reg_t CR5;
 } pwr_t;
 
-#define PWR_CR5_R1MODE (1U << 0) /* set: no boost */
+#define PWR_CR5_R1MODE (1U << 8) /* set: no boost */
 
 typedef struct {
     reg_t ACR;
