@@ -48,8 +48,8 @@ static inline int32_t pm_mulh_sub(int32_t c, int32_t a, int32_t b)
 
 #else
 
-/* (a b + 2^31 - less) / 2^32, rounded down; less is 0 or 1. From four products of halves where a product of 32 bits
- * is the longest there is; no sum overflows, with the largest halves the first reaches 2^31 - 1. */
+/* (a b + 2^31 - less) / 2^32, rounded down; less is 0 or 1. From four products of halves where a product of
+ * 32 bits is the longest there is; no sum overflows, with the largest halves the first reaches 2^31 - 1. */
 static inline int32_t pm_mulh_halves(int32_t a, int32_t b, uint32_t less)
 {
     const uint32_t a0 = (uint32_t)a & 0xFFFFU, b0 = (uint32_t)b & 0xFFFFU;

@@ -65,5 +65,8 @@ int main(int argc, char **argv)
         printf(" %s", argv[i]);
     }
     printf("\n");
+    if (argc > 1 && strcmp(argv[1], "fault") == 0) {
+        __builtin_trap();
+    }
     return argc > 1 && strcmp(argv[1], "fail") == 0 ? 7 : 0;
 }

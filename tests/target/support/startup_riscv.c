@@ -14,17 +14,18 @@ void pm_start(void) __attribute__((noreturn, used));
 void pm_trap(void) __attribute__((used));
 void _exit(int status) __attribute__((noreturn));
 
-/* The machine begins at the start of its memory. Relaxed, `la gp` would be relative to gp itself. */
+/* The machine begins at the start of its memory. Relaxed, `la gp` would be relative to gp itself. The
+ * instruction in numbers is `csrw mtvec, t0`, which some assemblers have only under another name of the same
+ * processor. */
 __asm(".section .text.init.enter, \"ax\"\n"
       ".global _start\n"
       ".type _start, %function\n"
       "_start:\n"
       ".option push\n"
       ".option norelax\n"
-      ".option arch, +zicsr\n"
       " la gp, __global_pointer$\n"
       " la t0, pm_trap_entry\n"
-      " csrw mtvec, t0\n"
+      " .insn i 0x73, 1, zero, t0, 0x305\n"
       ".option pop\n"
       " la sp, __stack\n"
       " la tp, __tls_base\n"
