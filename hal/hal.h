@@ -7,8 +7,9 @@
  *
  * Contexts, by falling priority:
  *   control   the interrupt at the end of the current measurement, once per PWM period: app_control()
- *   slow      an interrupt of lower priority, at 1 kHz, pended by control: app_slow()
- *   thread    the main loop; may be interrupted by both
+ *   monitor   an interrupt of a timer of its own, every millisecond, below control: app_monitor()
+ *   slow      the lowest interrupt, at 1 kHz, pended by control: app_slow()
+ *   thread    the main loop; may be interrupted by all
  * "any" is all of them and the fault handlers. No function blocks but where it says so.
  *
  * Order: hal_init(), hal_start(), then the rest. From reset until hal_bridge_arm() the bridge is off. */
@@ -58,6 +59,9 @@ typedef struct {
 
 /* --- system.c ------------------------------------------------------------------------------------------ */
 
+/* The one that a processor has; ports that make several, as sim, have none. */
+hal_t *hal_instance(void);
+
 /* thread, once, first: clocks, pins, peripherals; nothing runs yet. Blocks up to 20 ms. The configuration
  * is checked here; a port that refuses it can still do CAN, console and store. */
 hal_status_t hal_init(hal_t *hal, const hal_config_t *config);
@@ -73,10 +77,10 @@ bool hal_take_last_words(hal_t *hal, hal_last_words_t *words); /* thread; false:
 
 uint32_t hal_time_us(const hal_t *hal); /* any; wraps */
 void hal_pend_slow(hal_t *hal);         /* control; app_slow() follows when control has returned */
-void hal_lock(hal_t *hal);              /* thread: holds control and slow off, for at most 1 us; no nesting */
+void hal_lock(hal_t *hal);              /* thread: holds all interrupts off, for at most 1 us; no nesting */
 void hal_unlock(hal_t *hal);
 void hal_idle(hal_t *hal);     /* thread: returns after the next interrupt, or at once */
-void hal_watchdog(hal_t *hal); /* slow: not called for 20 ms, the processor is reset and the bridge off */
+void hal_watchdog(hal_t *hal); /* monitor: not called for 20 ms, the processor is reset and the bridge off */
 void hal_reset(hal_t *hal);    /* thread: bridge off, then restart; does not return on a processor */
 
 /* --- bridge.c ------------------------------------------------------------------------------------------ */
@@ -127,13 +131,15 @@ uint32_t hal_can_lost(const hal_t *hal); /* frames that found the receive ring f
 #define HAL_STORE_PAGES     2
 #define HAL_STORE_PAGE_SIZE 2048U
 
-void hal_store_read(const hal_t *hal, uint32_t page, uint32_t offset, void *data, uint32_t size);
+/* any, also before hal_init(): the page in place. A page whose writing was cut short reads as anything, but
+ * reading it does no harm. */
+const uint32_t *hal_store_page(const hal_t *hal, uint32_t page);
 
 /* thread, bridge off; these block, up to 30 ms, and stop the processor where code runs from the same flash.
  * False: refused (bridge armed, outside) or not done; the page is then neither old nor new. Offset and size
  * are multiples of 8. */
 bool hal_store_erase(hal_t *hal, uint32_t page);
-bool hal_store_write(hal_t *hal, uint32_t page, uint32_t offset, const void *data, uint32_t size);
+bool hal_store_write(hal_t *hal, uint32_t page, uint32_t offset, const uint32_t *data, uint32_t size);
 
 /* --- console.c ----------------------------------------------------------------------------------------- */
 
@@ -144,6 +150,7 @@ void hal_led(hal_t *hal, bool on);
 /* --- called up by the port, defined by the application (firmware/app) ---------------------------------- */
 
 void app_control(app_t *app); /* control, after every current measurement */
+void app_monitor(app_t *app); /* monitor, every millisecond after hal_start() */
 void app_slow(app_t *app);    /* slow, after hal_pend_slow() */
 
 #endif

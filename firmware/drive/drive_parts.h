@@ -6,9 +6,6 @@
 
 /* protection.c */
 
-/* Latches the first fault with the values of the moment. The step that runs next, or this one, opens the
- * bridge. */
-void drive_trip(drive_t *drive, drive_fault_t fault);
 void protection_step(drive_t *drive, const drive_in_t *in); /* each period: currents, DC link, break input */
 void protection_slow(drive_t *drive); /* 1 kHz: temperature, speed, position, stall, sum */
 

@@ -1,27 +1,23 @@
-/* Port `sim`: the drive closed on the plant, one control period at a time.
- *
- * The only place that knows both. Converter codes go from plant to drive and timer counts back unchanged, so
- * what runs here is what runs on the target. */
-#ifndef SIM_LOOP_H
-#define SIM_LOOP_H
+/* Application and plant as one loop, a control period at a time: what the interrupts of a processor do. */
+#ifndef HAL_SIM_SIM_LOOP_H
+#define HAL_SIM_SIM_LOOP_H
 
-#include "firmware/drive/drive_state.h"
-#include "sim_plant/plant.h"
+#include "firmware/app/app.h"
+#include "hal/sim/port.h"
 
 typedef struct {
-    drive_t drive;
-    plant_t *plant;
-    drive_in_t in;
-    drive_out_t out;
-    int32_t temperature_dC; /* what the temperature sensor says */
-    bool hw_fault;          /* held break input: a scenario injects it */
-    double i_break_A;       /* over-current comparator of the board; 0: none */
-    uint32_t periods;       /* run so far */
-    uint32_t slow_divider;  /* periods per drive_slow() */
+    app_t app;
+    hal_t hal;
+    double period_us, time_us;
 } sim_loop_t;
 
-/* The plant stays the caller's. Returns the drive's own verdict on its parameters. */
+/* The plant stays the caller's; the timer's clock is what the parameters want. Returns the drive's own
+ * verdict on its parameters. */
 drive_result_t sim_loop_init(sim_loop_t *loop, plant_t *plant, const drive_params_t *params);
+
+/* The same from the store, as after power-on; loop->hal is set up by sim_hal_init() before. */
+void sim_loop_boot(sim_loop_t *loop);
+
 void sim_loop_step(sim_loop_t *loop);
 
 #endif

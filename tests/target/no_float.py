@@ -1,6 +1,6 @@
-"""No floating point in cross-built libraries: refuses soft-float helpers and FPU instructions.
+"""No floating point in cross-built libraries and images: refuses soft-float helpers and FPU instructions.
 
-Usage: no_float.py LIBRARY_OR_OBJECT...   Prints member, function and what was found; exit status 1 if anything was.
+Usage: no_float.py LIBRARY_OBJECT_OR_IMAGE...   Prints member, function and what was found; exit status 1 if anything was.
 Also lists, as information, who divides 64-bit numbers: __aeabi_ldivmod takes hundreds of instructions.
 """
 import re
@@ -35,6 +35,8 @@ def findings(archive):
         if match:
             function = match.group(1)
             yield member, function, "function", ""
+            if HELPER.match(function):  # linked in
+                yield member, function, "float", function
             continue
         match = RELOCATION.match(line)
         if match:

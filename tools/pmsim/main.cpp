@@ -14,6 +14,7 @@ int main(int argc, char **argv)
     app.footer("`pmsim COMMAND --help` explains a command. File formats: docs/pmsim.md");
     int exit_code = 0;
     pmsim::add_run_command(app, exit_code);
+    pmsim::add_board_command(app);
     pmsim::add_plant_command(app);
     pmsim::add_params_command(app);
     pmsim::add_metrics_command(app);

@@ -1,7 +1,8 @@
 /* The test rig: drive and plant as one thing in SI units, for the runner.
  *
- * A thin C layer over hal/sim: it converts the drive's per-unit status to SI with the drive's own bases and
- * pairs it with the plant's truth of the same sample instant. Called once per control period. */
+ * Two of them: rig.c, a thin layer over hal/sim, and tools/pmsim_board, the emulated board. The drive's
+ * per-unit status is converted to SI with the drive's own bases and paired with the plant's truth of the same
+ * sample instant. Called once per control period. */
 #ifndef PMSIM_RIG_H
 #define PMSIM_RIG_H
 

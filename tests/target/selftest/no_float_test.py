@@ -50,6 +50,18 @@ class NoFloat(unittest.TestCase):
         self.assertEqual(result.returncode, 1, result.stdout)
         self.assertIn("vadd.f32", result.stdout)
 
+    def test_helpers_are_found_in_an_image(self):
+        for name, source, status in (("float", "int f(float a); int main(void) { return f(1); }"
+                                               "int f(float a) { return (int)(a * 3.0f + a); }", 1),
+                                     ("integer", "int main(void) { return 0; }", 0)):
+            with self.subTest(name), tempfile.TemporaryDirectory() as folder:
+                c, elf = Path(folder) / "x.c", Path(folder) / "x.elf"
+                c.write_text(source + "\n")
+                subprocess.run(["arm-none-eabi-gcc", *SOFT, "-fno-inline", "-fno-ipa-cp", "-nostdlib", "-e", "main", c,
+                                "-lgcc", "-o", elf], check=True)
+                result = subprocess.run([sys.executable, CHECK, elf], capture_output=True, text=True)
+                self.assertEqual(result.returncode, status, result.stdout + result.stderr)
+
     def test_integer_code_passes(self):
         for name, source in CLEAN.items():
             with self.subTest(name):

@@ -48,27 +48,27 @@ class Closed
         c.enable = enable;
         c.mode = mode;
         c.speed_mrad_s = static_cast<int32_t>(std::lround(1000 * speed_rad_s));
-        drive_command(&loop.drive, &c);
+        drive_command(&loop.app.drive, &c);
     }
 
     void run_ms(int ms)
     {
         for (int k = 0; k < 10 * ms; ++k) {
             sim_loop_step(&loop);
-            const bool driven = loop.out.driven[0] || loop.out.driven[1] || loop.out.driven[2];
+            const bool driven = loop.app.out.driven[0] || loop.app.out.driven[1] || loop.app.out.driven[2];
             const drive_state_t s = state();
             if (states.empty() || states.back() != s) {
                 states.push_back(s);
             }
             if (s == DRIVE_OFF || s == DRIVE_CALIBRATING || s == DRIVE_FAULT) {
-                driven_while_off += driven && loop.periods % 10 != 1 ? 1 : 0; // it changes after this step
+                driven_while_off += driven && loop.app.periods % 10 != 1 ? 1 : 0; // it changes after this step
             }
         }
     }
 
     drive_state_t state() const
     {
-        return drive_status(&loop.drive)->state;
+        return drive_status(&loop.app.drive)->state;
     }
 
     plant_truth_t truth() const
@@ -106,7 +106,7 @@ TEST(Drive, GoesThroughItsStates)
                                                     DRIVE_RUNNING, DRIVE_STOPPING, DRIVE_OFF}));
     EXPECT_EQ(x.driven_while_off, 0);
     EXPECT_NEAR(x.truth().omega_mech_rad_s, 0, 1.0);
-    EXPECT_EQ(drive_status(&x.loop.drive)->fault, DRIVE_FAULT_NONE);
+    EXPECT_EQ(drive_status(&x.loop.app.drive)->fault, DRIVE_FAULT_NONE);
 }
 
 TEST(Drive, EnableTakenBackStopsTheStart)
@@ -176,9 +176,9 @@ TEST(Drive, SpeedReferenceIsHeldToItsLimit)
     x.command(true, 500);
     x.run_ms(1400);
     ASSERT_EQ(x.state(), DRIVE_RUNNING);
-    EXPECT_NEAR(real(drive_status(&x.loop.drive)->omega_ref) * 540 / 3, 150, 0.1);
-    EXPECT_NE(drive_status(&x.loop.drive)->limits & DRIVE_LIMIT_SPEED, 0U);
-    EXPECT_EQ(drive_status(&x.loop.drive)->fault, DRIVE_FAULT_NONE);
+    EXPECT_NEAR(real(drive_status(&x.loop.app.drive)->omega_ref) * 540 / 3, 150, 0.1);
+    EXPECT_NE(drive_status(&x.loop.app.drive)->limits & DRIVE_LIMIT_SPEED, 0U);
+    EXPECT_EQ(drive_status(&x.loop.app.drive)->fault, DRIVE_FAULT_NONE);
 }
 
 TEST(Drive, EstimateIsTheRotor)
@@ -192,7 +192,7 @@ TEST(Drive, EstimateIsTheRotor)
         // the status belongs to the sample one period ago
         const plant_truth_t t = x.truth();
         const double theta = t.theta_e_rad - t.omega_mech_rad_s * 3 * 1e-4;
-        const double error = bench::wrapped(theta - bench::rad(drive_status(&x.loop.drive)->theta));
+        const double error = bench::wrapped(theta - bench::rad(drive_status(&x.loop.app.drive)->theta));
         worst = std::max(worst, std::abs(error) / bench::kDegree);
     }
     EXPECT_LE(worst, kPosition_deg);
@@ -210,7 +210,7 @@ TEST(Drive, LockedRotorIsAStall)
     for (; x.state() != DRIVE_FAULT && ms < 3000; ++ms) {
         x.run_ms(1);
     }
-    EXPECT_EQ(drive_status(&x.loop.drive)->fault, DRIVE_FAULT_STALL);
+    EXPECT_EQ(drive_status(&x.loop.app.drive)->fault, DRIVE_FAULT_STALL);
     EXPECT_EQ(x.driven_while_off, 0);
 }
 
@@ -226,7 +226,7 @@ TEST(Drive, RunningAwayIsOverSpeed)
         plant_set_speed(x.plant(), speed);
         x.run_ms(1);
     }
-    EXPECT_EQ(drive_status(&x.loop.drive)->fault, DRIVE_FAULT_OVER_SPEED);
+    EXPECT_EQ(drive_status(&x.loop.app.drive)->fault, DRIVE_FAULT_OVER_SPEED);
     EXPECT_NEAR(speed, 180, 4);
 }
 
@@ -252,7 +252,7 @@ TEST(Drive, ClearWithoutAFaultChangesNothing)
     x.command(false, 0);
     x.run_ms(5);
     ASSERT_EQ(x.state(), DRIVE_STOPPING);
-    drive_clear_fault(&x.loop.drive);
+    drive_clear_fault(&x.loop.app.drive);
     x.run_ms(2);
     EXPECT_EQ(x.state(), DRIVE_STOPPING);
 }

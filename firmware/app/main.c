@@ -1,0 +1,14 @@
+/* Entry of an image; a host program has its own. */
+#include "firmware/app/app.h"
+
+app_t app_instance; /* by this name a debugger, and the emulated board, find it */
+
+int main(void)
+{
+    hal_t *hal = hal_instance();
+    app_boot(&app_instance, hal);
+    for (;;) {
+        app_turn(&app_instance);
+        hal_idle(hal);
+    }
+}

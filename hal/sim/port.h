@@ -1,0 +1,48 @@
+/* Port `sim`: the hardware is the plant. As many as wanted; nothing runs by itself: sim_loop.h calls.
+ *
+ * Converter codes go from plant to application and timer counts back unchanged, so what runs here is what
+ * runs on the target. The temperature is the plant user's to set; flash is memory; frames go to two queues.
+ */
+#ifndef HAL_SIM_PORT_H
+#define HAL_SIM_PORT_H
+
+#include "hal/hal.h"
+#include "sim_plant/plant.h"
+
+#define SIM_FRAMES  16
+#define SIM_CONSOLE 4096
+
+typedef struct {
+    hal_can_frame_t frame[SIM_FRAMES];
+    uint32_t first, count;
+} sim_queue_t;
+
+struct hal {
+    plant_t *plant;
+    app_t *app;      /* since hal_start() */
+    plant_adc_t adc; /* of the present period */
+    uint32_t time_us, timer_Hz;
+    bool armed, configured;
+    bool slow_pending;
+
+    /* for whoever holds the loop */
+    int32_t temperature_dC; /* what the sensor says */
+    bool hw_fault;          /* held break input */
+    double i_break_A;       /* over-current comparators; 0: none */
+    bool temperature_missing;
+    sim_queue_t received, sent; /* seen from the application */
+    hal_can_state_t can_state;
+    uint32_t can_lost, watchdog_fed;
+    uint32_t store[HAL_STORE_PAGES][HAL_STORE_PAGE_SIZE / sizeof(uint32_t)];
+    uint32_t store_words_left; /* flash loses power after so many words; UINT32_MAX: never */
+    char console[SIM_CONSOLE];
+    bool led, reset;
+};
+
+/* Erased store, everything well; the timer's clock of the drive board. */
+void sim_hal_init(hal_t *hal, plant_t *plant);
+
+bool sim_queue_put(sim_queue_t *queue, const hal_can_frame_t *frame); /* false: full */
+bool sim_queue_take(sim_queue_t *queue, hal_can_frame_t *frame);
+
+#endif

@@ -1,0 +1,95 @@
+#include "hal/sim/port.h"
+
+#include <string.h>
+
+#define TIMER_HZ 170000000U
+
+void sim_hal_init(hal_t *hal, plant_t *plant)
+{
+    memset(hal, 0, sizeof *hal);
+    hal->plant = plant;
+    hal->timer_Hz = TIMER_HZ;
+    hal->temperature_dC = 250;
+    hal->store_words_left = UINT32_MAX;
+    memset(hal->store, 0xFF, sizeof hal->store);
+}
+
+hal_status_t hal_init(hal_t *hal, const hal_config_t *config)
+{
+    hal->armed = false;
+    hal->configured = config->timer_counts > 0U;
+    return hal->configured ? HAL_OK : HAL_TIMER_COUNTS;
+}
+
+void hal_start(hal_t *hal, app_t *app)
+{
+    hal->app = app;
+}
+
+const char *hal_board_name(const hal_t *hal)
+{
+    (void)hal;
+    return "simulated board";
+}
+
+uint32_t hal_timer_Hz(const hal_t *hal)
+{
+    return hal->timer_Hz;
+}
+
+void hal_unique_id(const hal_t *hal, uint32_t id[3])
+{
+    (void)hal;
+    id[0] = 0;
+    id[1] = 0;
+    id[2] = 0;
+}
+
+hal_reset_t hal_reset_cause(const hal_t *hal)
+{
+    (void)hal;
+    return HAL_RESET_POWER;
+}
+
+bool hal_take_last_words(hal_t *hal, hal_last_words_t *words)
+{
+    (void)hal;
+    (void)words;
+    return false;
+}
+
+uint32_t hal_time_us(const hal_t *hal)
+{
+    return hal->time_us;
+}
+
+void hal_pend_slow(hal_t *hal)
+{
+    hal->slow_pending = true;
+}
+
+void hal_lock(hal_t *hal)
+{
+    (void)hal; /* one thing at a time */
+}
+
+void hal_unlock(hal_t *hal)
+{
+    (void)hal;
+}
+
+void hal_idle(hal_t *hal)
+{
+    (void)hal;
+}
+
+void hal_watchdog(hal_t *hal)
+{
+    hal->watchdog_fed++;
+}
+
+void hal_reset(hal_t *hal)
+{
+    hal_bridge_off(hal);
+    hal->reset = true;
+}

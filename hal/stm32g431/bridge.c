@@ -1,0 +1,160 @@
+#include "hal/stm32g431/internal.h"
+#include "hal/stm32g431/processor.h"
+#include "hal/stm32g431/registers/analog.h"
+#include "hal/stm32g431/registers/clock.h"
+#include "hal/stm32g431/registers/tim.h"
+
+enum {
+    COUNTS_LEAST = 2125, /* 40 kHz: the control interrupt needs its time */
+    COUNTS_SAFE = 4250,  /* instead of a refused number: everything else goes by this clock */
+    DEAD_TIME_LEAST_ns = 300,
+    BREAK_FILTER = 12, /* of BKF: 8 samples at 1/16 of the clock, 0.75 us */
+    BREAK_LEVEL_MOST = 0x7FFF,
+};
+
+#define LEG_U  (TIM_CCER_CC1E | TIM_CCER_CC1NE)
+#define LEG_V  (TIM_CCER_CC2E | TIM_CCER_CC2NE)
+#define LEG_W  (TIM_CCER_CC3E | TIM_CCER_CC3NE)
+#define BREAKS (TIM_SR_BIF | TIM_SR_SBIF)
+
+/* DTG counts in four ranges, of 1, 2, 8 and 16 clocks; the ranges begin at 0, 64, 32 and 32 of their unit. */
+static bool dead_time_code(uint32_t dead_time_ns, uint32_t *code)
+{
+    static const struct {
+        uint32_t unit, least, count, prefix;
+    } range[] = {{1, 0, 128, 0x00}, {2, 64, 64, 0x80}, {8, 32, 32, 0xC0}, {16, 32, 32, 0xE0}};
+    const uint32_t clocks = (dead_time_ns * 17U + 99U) / 100U; /* of 170 MHz */
+    for (uint32_t n = 0; n < sizeof range / sizeof range[0]; ++n) {
+        const uint32_t units = (clocks + range[n].unit - 1U) / range[n].unit;
+        const uint32_t least = units > range[n].least ? units : range[n].least;
+        if (least < range[n].least + range[n].count) {
+            *code = range[n].prefix + least - range[n].least;
+            return dead_time_ns >= DEAD_TIME_LEAST_ns;
+        }
+    }
+    *code = 0xFFU;
+    return false;
+}
+
+static void configure_timer(uint32_t counts)
+{
+    TIM1.CR1 = reg_field(TIM_CR1_CMS, TIM_CMS_CENTRE) | TIM_CR1_ARPE;
+    TIM1.CR2 = reg_field(TIM_CR2_MMS2, TIM_MMS2_OC4REF);
+    TIM1.ARR = counts;
+    TIM1.CCMR1 = reg_field(TIM_CCMR1_OC1M, TIM_OCM_PWM1) | TIM_CCMR1_OC1PE |
+                 reg_field(TIM_CCMR1_OC2M, TIM_OCM_PWM1) | TIM_CCMR1_OC2PE;
+    TIM1.CCMR2 = reg_field(TIM_CCMR2_OC3M, TIM_OCM_PWM1) | TIM_CCMR2_OC3PE |
+                 reg_field(TIM_CCMR2_OC4M, TIM_OCM_PWM2) | TIM_CCMR2_OC4PE;
+    TIM1.CCR1 = 0U;
+    TIM1.CCR2 = 0U;
+    TIM1.CCR3 = 0U;
+    TIM1.CCR4 = counts - 1U; /* the converters start at the centre of the zero vector */
+    TIM1.CCER = 0U;
+    TIM1.AF1 = TIM_AF1_BKINE | TIM_AF1_BKCMP1E | TIM_AF1_BKCMP2E | TIM_AF1_BKCMP4E;
+    TIM1.RCR = 0U;
+    TIM1.EGR = TIM_EGR_UG;
+    SYSCFG.CFGR2 |= SYSCFG_CFGR2_CLL | SYSCFG_CFGR2_ECCL;
+    DBGMCU.APB2FZR |= DBGMCU_APB2FZR_TIM1; /* a halted processor must not leave a voltage applied */
+}
+
+/* The amplifier makes 16 times the voltage that the comparator sees; its 16 bits are 12 of the reference. */
+static void configure_comparators(uint32_t level)
+{
+    const uint32_t code = (0x8000U + level) / (16U * 16U);
+    const uint32_t comparator =
+        reg_field(COMP_CSR_INMSEL, COMP_INM_DAC3) | reg_field(COMP_CSR_HYST, COMP_HYST_10_MV) | COMP_CSR_EN;
+    DAC3.MCR = reg_field(DAC_MCR_MODE1, DAC_MODE_INTERNAL) | reg_field(DAC_MCR_MODE2, DAC_MODE_INTERNAL) |
+               reg_field(DAC_MCR_HFSEL, DAC_HFSEL_160_MHZ);
+    DAC3.DHR12R1 = code;
+    DAC3.DHR12R2 = code;
+    DAC3.CR = DAC_CR_EN1 | DAC_CR_EN2;
+    clock_delay(20U); /* until the references have settled */
+    COMP1.CSR = comparator;
+    COMP2.CSR = comparator;
+    COMP4.CSR = comparator;
+    clock_delay(20U);
+}
+
+hal_status_t bridge_start(hal_t *hal, const hal_config_t *config)
+{
+    hal_status_t status = HAL_OK;
+    uint32_t dead_time = 0;
+    if (!dead_time_code(config->dead_time_ns, &dead_time)) {
+        status = HAL_DEAD_TIME;
+    }
+    uint32_t level = config->break_level;
+    if (level > BREAK_LEVEL_MOST) {
+        status = HAL_BREAK_LEVEL;
+    }
+    if (level == 0U || level > BREAK_LEVEL_MOST) {
+        level = BREAK_LEVEL_MOST;
+    }
+    uint32_t counts = config->timer_counts;
+    if (counts < COUNTS_LEAST) {
+        status = HAL_TIMER_COUNTS;
+        counts = COUNTS_SAFE;
+    }
+    configure_comparators(level);
+    configure_timer(counts);
+    hal->legs = 0U;
+    hal->bridge = reg_field(TIM_BDTR_DTG, dead_time) | TIM_BDTR_OSSI | TIM_BDTR_OSSR | TIM_BDTR_BKE |
+                  TIM_BDTR_BKP | reg_field(TIM_BDTR_BKF, BREAK_FILTER);
+    /* Nothing but the main output enable can change after this, up to the next reset. */
+    TIM1.BDTR = hal->bridge | (status == HAL_OK ? reg_field(TIM_BDTR_LOCK, 2U) : 0U);
+    return status;
+}
+
+/* RM0440: the odd repetition count decides between overflow and underflow by being written before or after
+ * the counter is started. After: the update event is at the overflow, the centre of the zero vector. */
+void bridge_run(void)
+{
+    TIM1.CR1 |= TIM_CR1_CEN;
+    TIM1.RCR = 1U;
+}
+
+void hal_bridge_write(hal_t *hal, const drive_out_t *out)
+{
+    TIM1.CCR1 = out->compare[0][0];
+    TIM1.CCR2 = out->compare[1][0];
+    TIM1.CCR3 = out->compare[2][0];
+    uint32_t legs = 0U;
+    if (out->driven[0]) {
+        legs |= LEG_U;
+    }
+    if (out->driven[1]) {
+        legs |= LEG_V;
+    }
+    if (out->driven[2]) {
+        legs |= LEG_W;
+    }
+    if (out->trip) {
+        TIM1.BDTR = hal->bridge;
+        legs = 0U;
+    }
+    hal->legs = legs;
+}
+
+bool hal_bridge_arm(hal_t *hal)
+{
+    if (hal->refused) {
+        return false;
+    }
+    processor_lock();
+    TIM1.SR = ~BREAKS; /* stays set while the cause lasts */
+    if ((TIM1.SR & BREAKS) == 0U) {
+        TIM1.BDTR = hal->bridge | TIM_BDTR_MOE;
+    }
+    processor_unlock();
+    return hal_bridge_armed(hal);
+}
+
+void hal_bridge_off(hal_t *hal)
+{
+    TIM1.BDTR = hal->bridge;
+}
+
+bool hal_bridge_armed(const hal_t *hal)
+{
+    (void)hal;
+    return (TIM1.BDTR & TIM_BDTR_MOE) != 0U;
+}

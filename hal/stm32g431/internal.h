@@ -1,0 +1,59 @@
+/* Between the files of this port. */
+#ifndef STM32G431_INTERNAL_H
+#define STM32G431_INTERNAL_H
+
+#include "hal/stm32g431/port.h"
+#include "hal/stm32g431/registers/register.h"
+
+#define PORT_CLOCK_HZ 170000000U
+/* Of the upper four bits. Faults are at 0. */
+#define PORT_PRIO_CONTROL 0x10U
+#define PORT_PRIO_MONITOR 0x20U
+#define PORT_PRIO_IO      0x30U
+#define PORT_PRIO_SLOW    0x40U
+
+extern hal_t port_hal; /* the one there is */
+
+/* --- clock.c */
+bool clock_start(void); /* false: without the crystal. Starts the microseconds. */
+uint32_t clock_us(void);
+void clock_delay(uint32_t time_us);
+/* Until the bits have that value; false when time is up. */
+bool clock_await(const reg_t *word, uint32_t mask, uint32_t value, uint32_t most_us);
+
+/* --- pins.c */
+void pins_start(void);
+bool pins_button(void);
+void pins_led(bool on);
+
+/* --- system.c */
+void system_interrupt(uint32_t irq, uint8_t priority);
+void system_watchdog_period(uint32_t time_ms);
+
+/* --- by peripheral: configured, not running */
+hal_status_t bridge_start(hal_t *hal, const hal_config_t *config);
+void bridge_run(void);
+void measure_start(void);
+void measure_run(void);
+hal_status_t can_start(const hal_config_t *config);
+void console_start(void);
+
+/* --- exceptions: the vector table is in startup.c */
+void port_control(void);
+void port_monitor(void);
+void port_slow(void);
+void port_can_received(void);
+void port_console_sent(void);
+
+/* --- startup.c: faults, with the frame that the exception has stacked */
+typedef struct {
+    uint32_t magic;
+    hal_last_words_t words;
+} port_grave_t;
+extern port_grave_t port_grave; /* in memory that the start-up leaves alone */
+void port_reset(void) __attribute__((noreturn));
+void port_fault(const uint32_t *frame, uint32_t exception);
+void port_nmi(void);
+void port_bury(const hal_last_words_t *words); /* does not return on a processor */
+
+#endif

@@ -1,0 +1,22 @@
+/* What runs when: the vector table in startup.c names these. Legs are applied before anything else, so that
+ * they change at the same instant of every period. */
+#include "hal/stm32g431/internal.h"
+#include "hal/stm32g431/registers/analog.h"
+#include "hal/stm32g431/registers/tim.h"
+
+void port_control(void)
+{
+    TIM1.CCER = port_hal.legs;
+    ADC1.ISR = ADC_ISR_JEOS;
+    app_control(port_hal.app);
+}
+
+void port_monitor(void)
+{
+    app_monitor(port_hal.app);
+}
+
+void port_slow(void)
+{
+    app_slow(port_hal.app);
+}

@@ -1,0 +1,108 @@
+#include "hal/stm32g431/internal.h"
+#include "hal/stm32g431/ntc.h"
+#include "hal/stm32g431/registers/analog.h"
+#include "hal/stm32g431/registers/tim.h"
+
+/* inputs of the converters */
+enum {
+    ADC1_PHASE_U = 3,
+    ADC1_PHASE_W = 12,
+    ADC1_TEMPERATURE = 5,
+    ADC1_DIAL = 11,
+    ADC2_PHASE_V = 3,
+    ADC2_V_BUS = 1,
+};
+
+#define BREAKS (TIM_SR_BIF | TIM_SR_SBIF)
+
+static void start_converter(adc_t *adc)
+{
+    adc->CR = 0U; /* out of deep power-down */
+    adc->CR = ADC_CR_ADVREGEN;
+    clock_delay(20U);
+    adc->CR = ADC_CR_ADVREGEN | ADC_CR_ADCAL;
+    (void)clock_await(&adc->CR, ADC_CR_ADCAL, 0U, 1000U);
+    clock_delay(1U); /* four cycles of the converter */
+    adc->CR = ADC_CR_ADVREGEN | ADC_CR_ADEN;
+    (void)clock_await(&adc->ISR, ADC_ISR_ADRDY, ADC_ISR_ADRDY, 1000U);
+    adc->CFGR = ADC_CFGR_JQDIS | ADC_CFGR_OVRMOD;
+}
+
+static uint32_t sequence_of(uint32_t first, uint32_t second)
+{
+    return reg_field(ADC_JSQR_JL, 1U) | reg_field(ADC_JSQR_JEXTSEL, ADC_JEXTSEL_TIM1_TRGO2) |
+           reg_field(ADC_JSQR_JEXTEN, ADC_JEXTEN_RISING) | reg_field(ADC_JSQR_JSQ1, first) |
+           reg_field(ADC_JSQR_JSQ2, second);
+}
+
+static void start_amplifier(opamp_t *opamp)
+{
+    /* Sixteenfold with the board's bias network at VINM0, input VINP0. */
+    opamp->CSR = OPAMP_CSR_OPAEN | OPAMP_CSR_OPAHSM | reg_field(OPAMP_CSR_VM_SEL, OPAMP_VM_PGA) |
+                 reg_field(OPAMP_CSR_PGA_GAIN, OPAMP_GAIN_16_BIAS_VINM0);
+}
+
+void measure_start(void)
+{
+    start_amplifier(&OPAMP1);
+    start_amplifier(&OPAMP2);
+    start_amplifier(&OPAMP3);
+    ADC12_COMMON.CCR = reg_field(ADC_CCR_CKMODE, ADC_CKMODE_DIV_4); /* 42.5 MHz */
+    start_converter(&ADC1);
+    start_converter(&ADC2);
+    ADC1.SMPR1 = reg_field(ADC_SMPR1_SMP3, ADC_SMP_6_5) | reg_field(ADC_SMPR1_SMP5, ADC_SMP_247_5);
+    ADC1.SMPR2 = reg_field(ADC_SMPR2_SMP11, ADC_SMP_247_5) | reg_field(ADC_SMPR2_SMP12, ADC_SMP_6_5);
+    ADC2.SMPR1 = reg_field(ADC_SMPR1_SMP1, ADC_SMP_6_5) | reg_field(ADC_SMPR1_SMP3, ADC_SMP_6_5);
+    ADC1.JSQR = sequence_of(ADC1_PHASE_U, ADC1_PHASE_W);
+    ADC2.JSQR = sequence_of(ADC2_PHASE_V, ADC2_V_BUS);
+}
+
+void measure_run(void)
+{
+    ADC1.ISR = ADC_ISR_JEOS;
+    ADC1.IER = ADC_IER_JEOSIE;
+    ADC2.CR = ADC_CR_ADVREGEN | ADC_CR_JADSTART;
+    ADC1.CR = ADC_CR_ADVREGEN | ADC_CR_JADSTART;
+    ADC1.SQR1 = reg_field(ADC_SQR1_SQ1, ADC1_TEMPERATURE);
+    ADC1.CR = ADC_CR_ADVREGEN | ADC_CR_ADSTART;
+}
+
+/* The shunt is between leg and ground: a current into the motor makes the code fall. */
+static uint16_t current_code(uint32_t converted)
+{
+    const uint32_t code = 0x10000U - converted * 16U;
+    return (uint16_t)(code > 0xFFFFU ? 0xFFFFU : code);
+}
+
+void hal_measure(hal_t *hal, drive_in_t *in)
+{
+    (void)hal;
+    in->i_leg[0] = current_code(ADC1.JDR1);
+    in->i_leg[1] = current_code(ADC2.JDR1);
+    in->i_leg[2] = current_code(ADC1.JDR2);
+    in->v_dc = (uint16_t)(ADC2.JDR2 * 16U);
+    const uint32_t breaks = TIM1.SR & BREAKS;
+    in->hw_fault = breaks != 0U;
+    if (breaks != 0U) {
+        TIM1.SR = ~breaks; /* once reported; set again while the cause lasts */
+    }
+}
+
+/* One regular conversion per call, of the two inputs in turn; the injected ones interrupt it. */
+void hal_measure_slow(hal_t *hal, hal_slow_t *slow)
+{
+    if ((ADC1.ISR & ADC_ISR_EOC) != 0U) {
+        const uint16_t code = (uint16_t)ADC1.DR; /* clears the flag */
+        if (hal->dial_next) {
+            hal->dial = code;
+        } else {
+            hal->temperature = code;
+        }
+        hal->dial_next = !hal->dial_next;
+        ADC1.SQR1 = reg_field(ADC_SQR1_SQ1, hal->dial_next ? ADC1_DIAL : ADC1_TEMPERATURE);
+        ADC1.CR = ADC_CR_ADVREGEN | ADC_CR_ADSTART;
+    }
+    slow->temperature_missing = !ntc_temperature(hal->temperature, &slow->temperature_dC);
+    slow->dial = (uint16_t)(hal->dial * 16U);
+    slow->button = pins_button();
+}

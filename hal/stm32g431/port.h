@@ -1,0 +1,41 @@
+/* Port for ST's B-G431B-ESC1 (STM32G431CB, 170 MHz): what the application has to allocate.
+ *
+ * Both halves of a carrier period are equal: compare[leg][0] serves both (HAL_EQUAL_HALVES). New compare
+ * values take effect at the centre of the zero vector, a change of the driven legs about 1 us later.
+ * docs/board.md has wiring and bench checks, README.md here the registers that are used. */
+#ifndef STM32G431_PORT_H
+#define STM32G431_PORT_H
+
+#include "hal/hal.h"
+
+#define HAL_EQUAL_HALVES 1
+
+#define PORT_CONSOLE_SIZE 256U /* powers of two */
+#define PORT_CAN_FRAMES   16U
+
+/* Written by one context and read by another; the counts run freely. */
+typedef struct {
+    char text[PORT_CONSOLE_SIZE];
+    volatile uint32_t put, taken;
+} port_console_t;
+
+typedef struct {
+    hal_can_frame_t frame[PORT_CAN_FRAMES];
+    volatile uint32_t put, taken;
+    volatile uint32_t lost;
+} port_can_t;
+
+struct hal {
+    app_t *app;
+    bool up, crystal;
+    uint32_t legs;   /* CCER of the coming period */
+    uint32_t bridge; /* BDTR with everything but the main output enable */
+    bool refused;    /* the bridge cannot be armed */
+    hal_reset_t reset;
+    uint16_t temperature, dial; /* last codes of 12 bits */
+    bool dial_next;             /* the running conversion is the dial's */
+    port_can_t can;
+    port_console_t console;
+};
+
+#endif

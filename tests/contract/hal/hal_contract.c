@@ -1,0 +1,256 @@
+#include "tests/contract/hal/hal_contract.h"
+
+#include <stddef.h>
+
+#define COUNT_OF(array) (sizeof(array) / sizeof((array)[0]))
+#define MID_SCALE       32768
+
+/* Defined here: the contract is the application. */
+struct app {
+    hal_t *hal;
+    drive_in_t in;
+    drive_out_t out;
+    volatile uint32_t controls, slows, monitors;
+    volatile uint32_t slow_in_control; /* slow that has run before control returned */
+    volatile bool in_control, pend;
+    volatile bool feed;
+    hal_slow_t slow;
+};
+
+static struct app the_app;
+
+void app_control(app_t *app)
+{
+    app->in_control = true;
+    hal_measure(app->hal, &app->in);
+    hal_bridge_write(app->hal, &app->out);
+    app->controls++;
+    if (app->pend) {
+        hal_pend_slow(app->hal);
+    }
+    app->in_control = false;
+}
+
+void app_slow(app_t *app)
+{
+    app->slow_in_control += app->in_control ? 1U : 0U;
+    hal_measure_slow(app->hal, &app->slow);
+    app->slows++;
+}
+
+void app_monitor(app_t *app)
+{
+    app->monitors++;
+    if (app->feed) {
+        hal_watchdog(app->hal);
+    }
+}
+
+typedef struct {
+    hal_t *hal;
+    const hal_contract_t *contract;
+    int checks, failed;
+} run_t;
+
+static void say(hal_t *hal, const char *text)
+{
+    while (*text != '\0') {
+        text += hal_console(hal, text); /* the ring empties meanwhile */
+    }
+}
+
+static void say_number(hal_t *hal, int32_t number)
+{
+    char digits[12];
+    size_t at = sizeof digits - 1;
+    uint32_t rest = number < 0 ? 0U - (uint32_t)number : (uint32_t)number;
+    digits[at] = '\0';
+    do {
+        digits[--at] = (char)('0' + rest % 10U);
+        rest /= 10U;
+    } while (rest > 0U);
+    if (number < 0) {
+        digits[--at] = '-';
+    }
+    say(hal, &digits[at]);
+}
+
+static void check(run_t *run, const char *name, bool holds, int32_t seen)
+{
+    run->checks++;
+    run->failed += holds ? 0 : 1;
+    say(run->hal, holds ? "PASS " : "FAIL ");
+    say(run->hal, name);
+    if (!holds) {
+        say(run->hal, ": ");
+        say_number(run->hal, seen);
+    }
+    say(run->hal, "\r\n");
+}
+
+static void wait_us(run_t *run, uint32_t us)
+{
+    const uint32_t since = hal_time_us(run->hal);
+    while (hal_time_us(run->hal) - since < us) {
+        run->contract->idle(run->hal);
+    }
+}
+
+/* Floating legs */
+static void float_all(struct app *app)
+{
+    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        app->out.driven[leg] = false;
+        app->out.compare[leg][0] = 0;
+        app->out.compare[leg][1] = 0;
+    }
+    app->out.trip = false;
+}
+
+static void check_refusals(run_t *run)
+{
+    const hal_config_t good = run->contract->config;
+    hal_config_t bad = good;
+    bad.timer_counts = 0;
+    check(run, "no timer counts refused", hal_init(run->hal, &bad) == HAL_TIMER_COUNTS, 0);
+    check(run, "not armed on refusal", !hal_bridge_arm(run->hal), 0);
+    check(run, "configuration taken", hal_init(run->hal, &good) == HAL_OK, 0);
+    check(run, "off after init", !hal_bridge_armed(run->hal), 0);
+    check(run, "a name", hal_board_name(run->hal)[0] != '\0', 0);
+    const uint32_t carrier_us = (uint32_t)(2000000ULL * good.timer_counts / hal_timer_Hz(run->hal));
+    const int32_t off_us = (int32_t)(carrier_us - run->contract->period_us);
+    check(run, "timer clock makes the period", off_us >= -1 && off_us <= 1, off_us);
+}
+
+static void check_interrupts(run_t *run)
+{
+    struct app *app = &the_app;
+    wait_us(run, 2000);
+    const uint32_t controls = app->controls;
+    const uint32_t monitors = app->monitors;
+    const uint32_t slows = app->slows;
+    wait_us(run, 100000);
+    const int32_t expected = (int32_t)(100000U / run->contract->period_us);
+    const int32_t seen = (int32_t)(app->controls - controls);
+    check(run, "control once per period", seen >= expected - 2 && seen <= expected + 2, seen);
+    const int32_t ticks = (int32_t)(app->monitors - monitors);
+    check(run, "monitor every millisecond", ticks >= 98 && ticks <= 102, ticks);
+    check(run, "slow only when pended", app->slows == slows, (int32_t)(app->slows - slows));
+    app->pend = true;
+    const uint32_t from = app->controls;
+    const uint32_t slow_from = app->slows;
+    wait_us(run, 20000);
+    app->pend = false;
+    wait_us(run, 1000);
+    const int32_t missed = (int32_t)((app->controls - from) - (app->slows - slow_from));
+    check(run, "slow after each pending", missed >= 0 && missed <= 12, missed);
+    check(run, "slow never within control", app->slow_in_control == 0U, (int32_t)app->slow_in_control);
+}
+
+static void check_lock(run_t *run)
+{
+    struct app *app = &the_app;
+    hal_lock(run->hal);
+    const uint32_t before = app->controls;
+    const uint32_t again = app->controls;
+    hal_unlock(run->hal);
+    check(run, "nothing runs while locked", before == again, 0);
+    wait_us(run, 5000);
+    check(run, "control again after unlock", app->controls != before, 0);
+}
+
+static void check_measurement(run_t *run)
+{
+    const struct app *app = &the_app;
+    wait_us(run, 2000);
+    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        const int32_t off = (int32_t)app->in.i_leg[leg] - MID_SCALE;
+        check(run, "no current is mid-scale", off > -2000 && off < 2000, off);
+    }
+    check(run, "no break", !app->in.hw_fault, 0);
+    check(run, "temperature believable",
+          app->slow.temperature_missing ||
+              (app->slow.temperature_dC > -400 && app->slow.temperature_dC < 1500),
+          app->slow.temperature_dC);
+}
+
+static void check_bridge(run_t *run)
+{
+    struct app *app = &the_app;
+    float_all(app);
+    check(run, "arms", hal_bridge_arm(run->hal), 0);
+    check(run, "is armed", hal_bridge_armed(run->hal), 0);
+    wait_us(run, 1000);
+    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        app->out.driven[leg] = true; /* compare 0: all low */
+    }
+    wait_us(run, 1000);
+    check(run, "stays armed with all legs low", hal_bridge_armed(run->hal), 0);
+    app->out.trip = true;
+    wait_us(run, 1000);
+    check(run, "a trip disarms", !hal_bridge_armed(run->hal), 0);
+    float_all(app);
+    wait_us(run, 1000);
+    check(run, "a trip is not forgotten", !hal_bridge_armed(run->hal), 0);
+    check(run, "arms again", hal_bridge_arm(run->hal), 0);
+    hal_bridge_off(run->hal);
+    check(run, "off at once", !hal_bridge_armed(run->hal), 0);
+}
+
+static bool page_is(const hal_t *hal, uint32_t page, uint32_t first, uint32_t second)
+{
+    const uint32_t *words = hal_store_page(hal, page);
+    return words[0] == first && words[1] == second;
+}
+
+static void check_store(run_t *run)
+{
+    static const uint32_t data[2] = {0x12345678U, 0x9ABCDEF0U};
+    hal_t *hal = run->hal;
+    the_app.feed = true;
+    for (uint32_t page = 0; page < HAL_STORE_PAGES; page++) {
+        check(run, "page erases", hal_store_erase(hal, page) && page_is(hal, page, UINT32_MAX, UINT32_MAX),
+              (int32_t)page);
+        check(run, "page is written",
+              hal_store_write(hal, page, 0, data, 8) && page_is(hal, page, data[0], data[1]), (int32_t)page);
+    }
+    check(run, "end of the page is written", hal_store_write(hal, 0, HAL_STORE_PAGE_SIZE - 8U, data, 8), 0);
+    check(run, "beyond the page refused", !hal_store_write(hal, 0, HAL_STORE_PAGE_SIZE, data, 8), 0);
+    check(run, "odd offset refused", !hal_store_write(hal, 0, 20, data, 8), 0);
+    check(run, "odd size refused", !hal_store_write(hal, 0, 16, data, 4), 0);
+    check(run, "no such page refused", !hal_store_erase(hal, HAL_STORE_PAGES), 0);
+    check(run, "armed for the next check", hal_bridge_arm(hal), 0);
+    check(run, "no erasing while armed", !hal_store_erase(hal, 0), 0);
+    check(run, "no writing while armed", !hal_store_write(hal, 0, 16, data, 8), 0);
+    hal_bridge_off(hal);
+    check(run, "page kept", page_is(hal, 0, data[0], data[1]), 0);
+}
+
+static void check_bus(run_t *run)
+{
+    hal_can_frame_t frame;
+    check(run, "no frame waits", !hal_can_receive(run->hal, &frame), 0);
+    check(run, "bus not off", hal_can_state(run->hal) != HAL_CAN_BUS_OFF, 0);
+    check(run, "none lost", hal_can_lost(run->hal) == 0U, 0);
+}
+
+int hal_contract_run(hal_t *hal, const hal_contract_t *contract)
+{
+    run_t run = {.hal = hal, .contract = contract};
+    the_app = (struct app){.hal = hal, .feed = true};
+    check_refusals(&run);
+    float_all(&the_app);
+    hal_start(hal, &the_app);
+    check_interrupts(&run);
+    check_lock(&run);
+    check_measurement(&run);
+    check_bridge(&run);
+    check_store(&run);
+    check_bus(&run);
+    say(hal, "DONE ");
+    say_number(hal, run.failed);
+    say(hal, " of ");
+    say_number(hal, run.checks);
+    say(hal, "\r\n");
+    return run.failed;
+}

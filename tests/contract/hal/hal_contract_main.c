@@ -1,0 +1,19 @@
+/* The contract as an image: its board's own figures stand in the build. */
+#include "tests/contract/hal/hal_contract.h"
+
+int main(void)
+{
+    const hal_contract_t contract = {
+        .config = {.timer_counts = PM_CONTRACT_TIMER_COUNTS,
+                   .dead_time_ns = 500,
+                   .break_level = 0,
+                   .can_kbit_s = 500},
+        .period_us = PM_CONTRACT_PERIOD_US,
+        .idle = hal_idle,
+    };
+    hal_t *hal = hal_instance();
+    (void)hal_contract_run(hal, &contract);
+    for (;;) {
+        hal_idle(hal);
+    }
+}

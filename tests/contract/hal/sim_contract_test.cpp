@@ -1,0 +1,51 @@
+// The port `sim` keeps what hal.h promises.
+#include <memory>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpedantic"
+#pragma GCC diagnostic ignored "-Wc++20-extensions"
+extern "C" {
+#include "hal/sim/port.h"
+#include "tests/contract/hal/hal_contract.h"
+}
+#pragma GCC diagnostic pop
+#include "tests/support/plants.h"
+
+namespace
+{
+
+// What the interrupts of a processor do, one period of 100 us at a time.
+void pass_period(hal_t *hal)
+{
+    plant_sample(hal->plant, &hal->adc);
+    if (hal->app != nullptr) {
+        app_control(hal->app);
+        if (hal->slow_pending) {
+            hal->slow_pending = false;
+            app_slow(hal->app);
+        }
+        if (hal->time_us % 1000 == 0) {
+            app_monitor(hal->app);
+        }
+    }
+    plant_run_period(hal->plant);
+    hal->time_us += 100;
+}
+
+TEST(HalContract, Sim)
+{
+    plant_config_t config = plants::ipm_1000();
+    const char *error = nullptr;
+    const std::unique_ptr<plant_t, void (*)(plant_t *)> plant(plant_create(&config, 0.0, &error),
+                                                              &plant_destroy);
+    static hal_t hal;
+    sim_hal_init(&hal, plant.get());
+    const hal_contract_t contract = {{8500, 500, 0, 500}, 100, pass_period};
+    EXPECT_EQ(hal_contract_run(&hal, &contract), 0) << hal.console;
+    EXPECT_NE(std::string(hal.console).find("DONE 0 of"), std::string::npos) << hal.console;
+}
+
+} // namespace

@@ -1,0 +1,309 @@
+// The application on the simulated board: what stands between the user and a bridge that is on.
+#include <cstring>
+#include <memory>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpedantic"
+#pragma GCC diagnostic ignored "-Wc++20-extensions"
+extern "C" {
+#include "firmware/params/store.h"
+#include "hal/sim/sim_loop.h"
+}
+#pragma GCC diagnostic pop
+#include "tests/support/plants.h"
+
+namespace
+{
+
+class Bench
+{
+  public:
+    Bench() : plant_(make(), &plant_destroy)
+    {
+        sim_hal_init(&loop.hal, plant_.get());
+    }
+
+    // As from power-on, with these parameters in flash or none
+    void boot(const drive_params_t *params)
+    {
+        if (params != nullptr) {
+            ASSERT_TRUE(app_save(&loop.hal, params));
+        }
+        sim_loop_boot(&loop);
+    }
+
+    void send(bool enable, bool clear = false)
+    {
+        const hal_can_frame_t frame = {
+            0x201,
+            6,
+            {uint8_t((enable ? 1 : 0) | (clear ? 0x80 : 0)), DRIVE_MODE_SPEED, 0x30, 0x75, 0, 0}}; // 30 rad/s
+        ASSERT_TRUE(sim_queue_put(&loop.hal.received, &frame));
+    }
+
+    void run_ms(int ms)
+    {
+        for (int k = 0; k < 10 * ms; ++k) {
+            sim_loop_step(&loop);
+        }
+    }
+
+    // Commanded again and again, as a master does
+    void run_enabled_ms(int ms)
+    {
+        for (int done = 0; done < ms; done += 100) {
+            send(true);
+            run_ms(std::min(100, ms - done));
+        }
+    }
+
+    drive_fault_t fault() const
+    {
+        return loop.app.drive.fault;
+    }
+
+    std::string console() const
+    {
+        return loop.hal.console;
+    }
+
+    plant_t *plant() const
+    {
+        return plant_.get();
+    }
+
+    sim_loop_t loop = {};
+
+  private:
+    static plant_t *make()
+    {
+        plant_config_t c = plants::ipm_1000();
+        c.inverter.timer_counts = 8500;
+        const char *error = nullptr;
+        return plant_create(&c, 1.0, &error);
+    }
+
+    std::unique_ptr<plant_t, void (*)(plant_t *)> plant_;
+};
+
+drive_params_t defaults()
+{
+    drive_params_t params;
+    drive_params_default(&params);
+    return params;
+}
+
+TEST(App, RunsTheMotorOnCommandsOverCan)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    EXPECT_NE(x.console().find("parameters: stored"), std::string::npos);
+    x.run_enabled_ms(1000);
+    EXPECT_EQ(x.loop.app.drive.state, DRIVE_RUNNING);
+    plant_truth_t t;
+    plant_truth(x.plant(), &t);
+    EXPECT_NEAR(t.omega_mech_rad_s, 30, 1);
+    x.send(false);
+    x.run_ms(1000);
+    EXPECT_EQ(x.loop.app.drive.state, DRIVE_OFF);
+    EXPECT_FALSE(x.loop.hal.armed);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+}
+
+TEST(App, WithoutStoredParametersNothingIsArmed)
+{
+    Bench x;
+    x.boot(nullptr);
+    EXPECT_NE(x.console().find("none stored"), std::string::npos);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_PARAMETERS);
+    x.run_enabled_ms(300);
+    EXPECT_FALSE(x.loop.hal.armed);
+    x.send(false, true);
+    x.run_ms(10);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_PARAMETERS); // no way around it
+}
+
+TEST(App, RefusesParametersThatTheDriveRefuses)
+{
+    Bench x;
+    drive_params_t params = defaults();
+    params.R_s = -1;
+    x.boot(&params);
+    EXPECT_NE(x.console().find("refused: R_s"), std::string::npos);
+    x.run_enabled_ms(200);
+    EXPECT_FALSE(x.loop.hal.armed);
+}
+
+TEST(App, RefusesACarrierThatTheTimerDoesNotMake)
+{
+    Bench x;
+    drive_params_t params = defaults();
+    params.timer_counts = 8000; // at 10 kHz of a 170 MHz timer it is 8500
+    x.boot(&params);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_PARAMETERS);
+    x.run_enabled_ms(200);
+    EXPECT_FALSE(x.loop.hal.armed);
+}
+
+TEST(App, StoresToThePageThatIsOlder)
+{
+    Bench x;
+    drive_params_t params = defaults();
+    for (int32_t round = 0; round < 5; ++round) {
+        params.i_max = 1000 + round;
+        ASSERT_TRUE(app_save(&x.loop.hal, &params));
+        drive_params_t back;
+        uint32_t unknown;
+        ASSERT_TRUE(app_load(&x.loop.hal, &back, &unknown));
+        EXPECT_EQ(std::memcmp(&back, &params, sizeof params), 0);
+        EXPECT_EQ(unknown, 0U);
+    }
+}
+
+// Power lost at every word of the writing: the parameters before still hold.
+TEST(App, PowerLostInMidWriteKeepsTheOldParameters)
+{
+    const drive_params_t old = defaults();
+    drive_params_t wanted = old;
+    wanted.i_max = 1234;
+    const uint32_t words = 4 + 2 * DRIVE_PARAM_COUNT;
+    for (uint32_t cut = 0; cut < words; ++cut) {
+        Bench x;
+        ASSERT_TRUE(app_save(&x.loop.hal, &old));
+        x.loop.hal.store_words_left = cut;
+        EXPECT_FALSE(app_save(&x.loop.hal, &wanted)) << cut;
+        drive_params_t back;
+        uint32_t unknown;
+        ASSERT_TRUE(app_load(&x.loop.hal, &back, &unknown)) << cut;
+        EXPECT_EQ(back.i_max, old.i_max) << cut;
+    }
+}
+
+TEST(App, NamesOfAnotherVersionAreLeftOut)
+{
+    Bench x;
+    const store_pair_t pairs[] = {{store_id("i_max"), 2500}, {store_id("not_a_parameter"), 5}};
+    ASSERT_GT(store_make(x.loop.hal.store[0], 1, pairs, 2), 0U);
+    drive_params_t back;
+    uint32_t unknown;
+    ASSERT_TRUE(app_load(&x.loop.hal, &back, &unknown));
+    EXPECT_EQ(unknown, 1U);
+    EXPECT_EQ(back.i_max, 2500);
+    EXPECT_EQ(back.R_s, defaults().R_s);
+}
+
+TEST(App, CommandsThatCeaseAreAFault)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_enabled_ms(600);
+    ASSERT_EQ(x.loop.app.drive.state, DRIVE_RUNNING);
+    x.run_ms(405); // the last command is 100 ms old
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_REMOTE_LOST);
+    EXPECT_FALSE(x.loop.hal.armed);
+    x.run_enabled_ms(300); // does not start by itself
+    EXPECT_FALSE(x.loop.hal.armed);
+    x.send(false, true);
+    x.run_ms(5);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+}
+
+TEST(App, BusOffIsAFault)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_enabled_ms(600);
+    x.loop.hal.can_state = HAL_CAN_BUS_OFF;
+    x.run_ms(2);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_REMOTE_LOST);
+    EXPECT_FALSE(x.loop.hal.armed);
+}
+
+TEST(App, BreakInputAndItsClearing)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_enabled_ms(600);
+    x.loop.hal.hw_fault = true;
+    x.run_ms(1);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_HARDWARE);
+    EXPECT_FALSE(x.loop.hal.armed);
+    x.send(false, true);
+    x.run_ms(2);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_HARDWARE); // the cause is still there
+    x.loop.hal.hw_fault = false;
+    x.send(false, false);
+    x.run_ms(1);
+    x.send(false, true);
+    x.run_ms(2);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+}
+
+TEST(App, MissingTemperatureSensorIsAFault)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_enabled_ms(600);
+    x.loop.hal.temperature_missing = true;
+    x.run_ms(2);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_TEMPERATURE_SENSOR);
+    EXPECT_FALSE(x.loop.hal.armed);
+}
+
+TEST(App, SlowThatHasNotEndedIsAnOverrun)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_enabled_ms(600);
+    x.loop.app.slow_busy = true;
+    app_control(&x.loop.app);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_OVERRUN);
+}
+
+// The converters hang, so control does not come: the monitor opens the bridge and lets the dog bite.
+TEST(App, MonitorOpensTheBridgeWhenControlCeases)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_enabled_ms(600);
+    ASSERT_TRUE(x.loop.hal.armed);
+    app_monitor(&x.loop.app);
+    const uint32_t fed = x.loop.hal.watchdog_fed;
+    app_monitor(&x.loop.app);
+    EXPECT_FALSE(x.loop.hal.armed);
+    EXPECT_EQ(x.loop.hal.watchdog_fed, fed);
+    app_turn(&x.loop.app);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_OVERRUN);
+}
+
+TEST(App, WatchdogIsNotFedWhenTheMainLoopHangs)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_ms(10);
+    for (int ms = 0; ms < 99; ++ms) {
+        x.loop.app.periods++;
+        app_monitor(&x.loop.app);
+    }
+    const uint32_t fed = x.loop.hal.watchdog_fed;
+    x.loop.app.periods++;
+    app_monitor(&x.loop.app);
+    EXPECT_EQ(x.loop.hal.watchdog_fed, fed);
+    app_turn(&x.loop.app);
+    x.loop.app.periods++;
+    app_monitor(&x.loop.app);
+    EXPECT_EQ(x.loop.hal.watchdog_fed, fed + 1);
+}
+
+} // namespace

@@ -1,0 +1,32 @@
+// What `pmsim run` and `pmsim board` have in common: options, runs, report.
+#ifndef PMSIM_RUN_COMMAND_H
+#define PMSIM_RUN_COMMAND_H
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace CLI
+{
+class App;
+}
+
+namespace pmsim
+{
+
+struct RunOptions {
+    std::string scenario, out;
+    std::vector<std::string> settings;
+    uint64_t decimate = 0;
+    int jobs = 2;
+    bool quiet = false, json = false;
+};
+
+void add_run_options(CLI::App &command, RunOptions &options);
+
+// Runs, prints the expectations, writes files. Exit code: 0 all pass, 1 an expectation fails.
+int run_and_report(const RunOptions &options);
+
+} // namespace pmsim
+
+#endif

@@ -1,0 +1,125 @@
+// pmsim-board: scenarios on the emulated board. `pmsim board` starts it. Linked with libunicorn, which is
+// GPL-2.
+#include <cstdio>
+#include <exception>
+#include <fstream>
+#include <iostream>
+
+#include <CLI/CLI.hpp>
+
+#include "tools/pmsim/run_command.h"
+#include "tools/pmsim/yaml_reader.h"
+#include "tools/pmsim_board/console.h"
+#include "tools/pmsim_board/figures_report.h"
+#include "tools/pmsim_board/rig_board.h"
+
+namespace
+{
+
+using namespace pmsim;
+
+struct BoardOptions {
+    std::string image, figures, last;
+    std::vector<std::string> limits;
+    double console_s = 0.0;
+};
+
+// NAME=MOST: a line like those of the expectations. Returns whether it holds.
+bool check_limit(const std::string &limit, const figures_t &figures)
+{
+    const size_t equals = limit.find('=');
+    if (equals == std::string::npos) {
+        throw InputError("--limit " + limit + ": NAME=NUMBER is wanted");
+    }
+    const std::string name = limit.substr(0, equals);
+    size_t used = 0;
+    double most = 0.0;
+    try {
+        most = std::stod(limit.substr(equals + 1), &used);
+    } catch (const std::exception &) {
+        used = 0;
+    }
+    if (used == 0 || used != limit.size() - equals - 1) {
+        throw InputError("--limit " + limit + ": not a number");
+    }
+    std::string known;
+    for (const auto &[found, value] : figure_values(figures)) {
+        if (found == name) {
+            std::printf("%s  %-36s %9.1f  <= %g\n", value <= most ? "PASS" : "FAIL", name.c_str(), value,
+                        most);
+            return value <= most;
+        }
+        known += " " + found;
+    }
+    throw InputError("--limit " + limit + ": no such figure in this run; there are:" + known);
+}
+
+int run(const RunOptions &options, const BoardOptions &board)
+{
+    if (board.console_s > 0.0) {
+        return board_show_console(board.image.c_str(), board.console_s,
+                                  board.last.empty() ? nullptr : board.last.c_str());
+    }
+    if (options.scenario.empty()) {
+        throw InputError("a scenario is wanted, or --console SECONDS");
+    }
+    rig_board_image(board.image.c_str());
+    int code = run_and_report(options);
+    const figures_t figures = all_figures();
+    if (!options.quiet && !options.json) {
+        std::cout << figure_table(figures);
+    }
+    if (!board.figures.empty()) {
+        std::ofstream file(board.figures);
+        file << figure_json(figures);
+        if (!file.flush()) {
+            throw InputError(board.figures + ": cannot be written");
+        }
+    }
+    for (const std::string &limit : board.limits) {
+        code = check_limit(limit, figures) ? code : 1;
+    }
+    return code;
+}
+
+} // namespace
+
+int main(int argc, char **argv)
+{
+    CLI::App app(
+        "pmsim board: the flashed image, unmodified, on an emulated drive board closed on the plant.");
+    app.name("pmsim board");
+    RunOptions options;
+    BoardOptions board;
+    app.add_option("image", board.image, "image (ELF), e.g. out/build/stm32g431/pmdrive.elf")->required();
+    add_run_options(app, options);
+    app.get_option("scenario")->required(false);
+    app.add_option(
+        "--console", board.console_s,
+        "no scenario: run the image for so many seconds and print what its UART says; exit 1 when a line "
+        "begins with FAIL");
+    app.add_option("--until", board.last, "with --console: end at a line that begins with this");
+    app.add_option("--figures", board.figures,
+                   "write instructions, cycles, stack and load to this file (JSON)");
+    app.add_option("--limit", board.limits,
+                   "NAME=MOST of a figure, e.g. control.flux.mean=420; exit 1 above it")
+        ->allow_extra_args(false);
+    app.footer(
+        "Prints the expectations of the scenario as `pmsim run` does, then what the processor did: "
+        "instructions are\n"
+        "counted, cycles estimated (docs/emulator.md). After each interrupt the drive's memory is compared, "
+        "bit for\n"
+        "bit, with the same code on the host.\n"
+        "Exit code: 0 all pass, 1 an expectation or a limit fails, 2 bad input or the image has failed.\n\n"
+        "Example:\n"
+        "  pmsim board out/build/stm32g431/pmdrive.elf tests/scenario/demo.yaml --out out/board");
+    try {
+        app.parse(argc, argv);
+        return run(options, board);
+    } catch (const CLI::ParseError &error) {
+        return app.exit(error) == 0 ? 0 : 2;
+    } catch (const std::exception &error) {
+        std::cerr << "pmsim board: " << error.what() << '\n';
+        return 2;
+    }
+}
