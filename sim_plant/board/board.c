@@ -84,7 +84,7 @@ board_t *board_create(const char *elf_path, plant_t *plant, char *error, size_t 
         return NULL;
     }
     elf_symbol_t low, top;
-    if (elf_image_find(board->image, "port_stack_low", &low) &&
+    if (elf_image_find(board->image, "port_stack_bottom", &low) &&
         elf_image_find(board->image, "port_stack_top", &top)) {
         board->stack_low = low.address;
         board->stack_top = top.address;
@@ -242,7 +242,7 @@ bool board_bridge_on(const board_t *board)
 void *board_variable(board_t *board, const char *name, size_t size)
 {
     elf_symbol_t symbol;
-    bool found = elf_image_find(board->image, name, &symbol) && symbol.size == size;
+    bool found = elf_image_find(board->image, name, &symbol) && symbol.size >= size;
     return found ? cpu_memory(board->cpu, symbol.address, symbol.size) : NULL;
 }
 
