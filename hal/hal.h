@@ -20,6 +20,7 @@
 #include <stdint.h>
 
 #include "firmware/drive/drive.h"
+#include "hal/can_frame.h"
 
 typedef struct hal hal_t; /* the port's own, in its port.h */
 typedef struct app app_t; /* the application's, handed back to it */
@@ -112,14 +113,6 @@ typedef struct {
 void hal_measure_slow(hal_t *hal, hal_slow_t *slow); /* slow */
 
 /* --- can.c: classic frames, 11-bit identifiers --------------------------------------------------------- */
-
-typedef struct {
-    uint16_t id;
-    uint8_t length; /* 0 ... 8 */
-    uint8_t data[8];
-} hal_can_frame_t;
-
-typedef enum { HAL_CAN_ACTIVE, HAL_CAN_PASSIVE, HAL_CAN_BUS_OFF } hal_can_state_t;
 
 bool hal_can_receive(hal_t *hal, hal_can_frame_t *frame);    /* thread; false: none waits */
 bool hal_can_send(hal_t *hal, const hal_can_frame_t *frame); /* thread; false: no room, try again */

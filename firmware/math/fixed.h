@@ -99,19 +99,24 @@ static inline int32_t pm_sub_sat(int32_t a, int32_t b)
 
 #else
 
-static inline int32_t pm_narrow64(int64_t x)
+/* An overflow shows in the sign bits: what it should have been is the sign of a. */
+static inline int32_t pm_end(int32_t a)
 {
-    return x > INT32_MAX ? INT32_MAX : (x < INT32_MIN ? INT32_MIN : (int32_t)x);
+    return a < 0 ? INT32_MIN : INT32_MAX;
 }
 
 static inline int32_t pm_add_sat(int32_t a, int32_t b)
 {
-    return pm_narrow64((int64_t)a + b);
+    const uint32_t sum = (uint32_t)a + (uint32_t)b;
+    const uint32_t overflow = ((uint32_t)a ^ sum) & ((uint32_t)b ^ sum);
+    return overflow > (uint32_t)INT32_MAX ? pm_end(a) : (int32_t)sum;
 }
 
 static inline int32_t pm_sub_sat(int32_t a, int32_t b)
 {
-    return pm_narrow64((int64_t)a - b);
+    const uint32_t difference = (uint32_t)a - (uint32_t)b;
+    const uint32_t overflow = ((uint32_t)a ^ (uint32_t)b) & ((uint32_t)a ^ difference);
+    return overflow > (uint32_t)INT32_MAX ? pm_end(a) : (int32_t)difference;
 }
 
 #endif

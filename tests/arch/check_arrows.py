@@ -23,6 +23,7 @@ MODULES = {
     "observers": "observers",
     "injection": "injection",
     "bldc": "bldc",
+    "hal/linux": "hal_linux",
     "hal/sim": "hal_sim",
     "hal": "hal",
     "sim_plant": "sim_plant",
@@ -41,6 +42,7 @@ ARROWS = {
     "can": {"params"},
     "app": {"drive", "can", "params", "hal"},
     "hal": set(),
+    "hal_linux": {"hal"},
     "hal_sim": {"hal", "sim_plant"},
     "sim_plant": set(),
 }

@@ -14,6 +14,7 @@ namespace pmsim
 void add_run_command(CLI::App &app, int &exit_code);
 void add_board_command(CLI::App &app);
 void add_plant_command(CLI::App &app);
+void add_node_command(CLI::App &app, int &exit_code);
 void add_params_command(CLI::App &app);
 void add_metrics_command(CLI::App &app);
 void add_methods_command(CLI::App &app);

@@ -55,6 +55,11 @@ const Sample &Loop::step()
     return sample_;
 }
 
+rig_t *Loop::rig() const
+{
+    return rig_.get();
+}
+
 record_period_t Loop::record() const
 {
     record_period_t record;

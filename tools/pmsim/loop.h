@@ -17,7 +17,8 @@ class Loop
   public:
     explicit Loop(const Scenario &scenario); // the scenario must outlive it
 
-    const Sample &step();           // one control period
+    const Sample &step(); // one control period
+    rig_t *rig() const;
     record_period_t record() const; // of the last one
     uint32_t slow_divider() const;
 

@@ -80,6 +80,21 @@ void rig_set_break(rig_t *rig, double i_break_A)
     rig->loop.hal.i_break_A = i_break_A;
 }
 
+bool rig_send(rig_t *rig, const hal_can_frame_t *frame)
+{
+    return sim_queue_put(&rig->loop.hal.received, frame);
+}
+
+bool rig_receive(rig_t *rig, hal_can_frame_t *frame)
+{
+    return sim_queue_take(&rig->loop.hal.sent, frame);
+}
+
+void rig_set_can_state(rig_t *rig, hal_can_state_t state)
+{
+    rig->loop.hal.can_state = state;
+}
+
 void rig_step(rig_t *rig, rig_sample_t *sample)
 {
     plant_truth(rig->loop.hal.plant, &sample->truth);

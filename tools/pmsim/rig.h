@@ -11,6 +11,7 @@
 #include <stdint.h>
 
 #include "firmware/drive/parameters.h"
+#include "hal/can_frame.h"
 #include "sim_plant/plant.h"
 #include "tools/pmsim/record.h"
 
@@ -57,6 +58,12 @@ bool rig_clear_fault(rig_t *rig);
 void rig_set_temperature(rig_t *rig, double temperature_degC);
 void rig_set_hw_fault(rig_t *rig, bool held);
 void rig_set_break(rig_t *rig, double i_break_A);
+
+/* Frames to and from the drive's node; false: its ring is full, none waits. Its status also becomes known by
+ * them. */
+bool rig_send(rig_t *rig, const hal_can_frame_t *frame);
+bool rig_receive(rig_t *rig, hal_can_frame_t *frame);
+void rig_set_can_state(rig_t *rig, hal_can_state_t state);
 
 void rig_step(rig_t *rig, rig_sample_t *sample);
 uint32_t rig_slow_divider(const rig_t *rig);

@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "tools/pmsim/node_command.h"
 #include "tools/pmsim/run_command.h"
 #include "tools/pmsim/yaml_reader.h"
 #include "tools/pmsim_board/console.h"
@@ -54,7 +55,7 @@ bool check_limit(const std::string &limit, const figures_t &figures)
     throw InputError("--limit " + limit + ": no such figure in this run; there are:" + known);
 }
 
-int run(const RunOptions &options, const BoardOptions &board)
+int run(const RunOptions &options, const BoardOptions &board, NodeOptions node)
 {
     if (board.console_s > 0.0) {
         return board_show_console(board.image.c_str(), board.console_s,
@@ -63,7 +64,13 @@ int run(const RunOptions &options, const BoardOptions &board)
     if (options.scenario.empty()) {
         throw InputError("a scenario is wanted, or --console SECONDS");
     }
-    rig_board_image(board.image.c_str());
+    rig_board_image(board.image.c_str(), !node.can.empty());
+    if (!node.can.empty()) {
+        node.scenario = options.scenario;
+        node.settings = options.settings;
+        node.quiet = options.quiet;
+        return run_node(node);
+    }
     int code = run_and_report(options);
     const figures_t figures = all_figures();
     if (!options.quiet && !options.json) {
@@ -91,6 +98,7 @@ int main(int argc, char **argv)
     app.name("pmsim board");
     RunOptions options;
     BoardOptions board;
+    NodeOptions node;
     app.add_option("image", board.image, "image (ELF), e.g. out/build/stm32g431/pmdrive.elf")->required();
     add_run_options(app, options);
     app.get_option("scenario")->required(false);
@@ -115,7 +123,7 @@ int main(int argc, char **argv)
         "  pmsim board out/build/stm32g431/pmdrive.elf tests/scenario/demo.yaml --out out/board");
     try {
         app.parse(argc, argv);
-        return run(options, board);
+        return run(options, board, node);
     } catch (const CLI::ParseError &error) {
         return app.exit(error) == 0 ? 0 : 2;
     } catch (const std::exception &error) {

@@ -39,10 +39,12 @@ struct rig {
 };
 
 static const char *image_path;
+static bool live;
 
-void rig_board_image(const char *elf_path)
+void rig_board_image(const char *elf_path, bool commands_by_bus)
 {
     image_path = elf_path;
+    live = commands_by_bus;
 }
 
 static int mode_of(const drive_t *drive)
@@ -148,7 +150,8 @@ static void trace(void *owner, int exception, bool entry)
 static bool boot(rig_t *rig, const drive_params_t *params)
 {
     uint32_t words[STORE_WORDS];
-    const uint32_t used = app_page(params, 1, words);
+    const uint32_t used =
+        app_page(params, 1, words); /* refused ones too: the image has to refuse them itself */
     board_program(rig->board, STORE_ADDRESS, words, used * sizeof words[0]);
     if (!board_boot(rig->board, BOOT_S)) {
         return false;
@@ -237,6 +240,9 @@ static void put_word(uint8_t *bytes, int32_t value)
 
 static void send(rig_t *rig)
 {
+    if (live) {
+        return;
+    }
     board_frame_t setpoint = {.id = 0x300U + REMOTE_NODE, .length = 8};
     put_word(&setpoint.data[0], rig->sent.torque_uNm);
     put_word(&setpoint.data[4], rig->sent.current_mA);
@@ -281,25 +287,50 @@ void rig_set_break(rig_t *rig, double i_break_A)
     (void)i_break_A;
 }
 
-static void take_frames(rig_t *rig)
+bool rig_send(rig_t *rig, const hal_can_frame_t *frame)
 {
-    board_frame_t frame;
-    while (board_can_receive(rig->board, &frame)) {
-        /* status is read from the memory, where it is complete */
+    board_frame_t put = {.id = frame->id, .length = frame->length};
+    memcpy(put.data, frame->data, sizeof put.data);
+    return board_can_send(rig->board, &put);
+}
+
+bool rig_receive(rig_t *rig, hal_can_frame_t *frame)
+{
+    board_frame_t got;
+    if (!board_can_receive(rig->board, &got)) {
+        return false;
+    }
+    *frame = (hal_can_frame_t){.id = got.id, .length = got.length};
+    memcpy(frame->data, got.data, sizeof frame->data);
+    return true;
+}
+
+void rig_set_can_state(rig_t *rig, hal_can_state_t state)
+{
+    board_can_error(rig->board, state == HAL_CAN_BUS_OFF);
+}
+
+/* Nobody reads them in a scenario: the status is read from the memory, where it is complete. */
+static void drop_frames(rig_t *rig)
+{
+    hal_can_frame_t frame;
+    while (rig_receive(rig, &frame)) {
     }
 }
 
 void rig_step(rig_t *rig, rig_sample_t *sample)
 {
     plant_truth(rig->plant, &sample->truth);
-    if (++rig->since_sent >= REPEAT_PERIODS) {
+    if (!live && ++rig->since_sent >= REPEAT_PERIODS) {
         send(rig);
     }
     if (!board_run_period(rig->board)) {
         fprintf(stderr, "pmsim board: %s at %.6f s\n", board_error(rig->board), sample->truth.t_s);
         exit(2);
     }
-    take_frames(rig);
+    if (!live) {
+        drop_frames(rig);
+    }
     rig->figures.simulated_s += board_period_s(rig->board);
     rig_fill_sample(&rig->scale, &rig->image->drive, &rig->image->out, sample);
 }

@@ -12,8 +12,9 @@
 extern "C" {
 #endif
 
-/* For all rigs that are created after it. */
-void rig_board_image(const char *elf_path);
+/* For all rigs that are created after it. commands_by_bus: rig_command() says nothing, a master is on the
+ * bus. */
+void rig_board_image(const char *elf_path, bool commands_by_bus);
 
 #ifdef __cplusplus
 }

@@ -80,7 +80,7 @@ int main(int argc, char **argv)
         return 1;
     }
     uint32_t different = 0;
-    static record_period_t r[256];
+    static record_period_t r[64]; /* 16 KiB of RAM must do on the smallest board */
     for (uint32_t k = 0; k < header.periods;) {
         const uint32_t n = (uint32_t)fread(r, sizeof r[0], sizeof r / sizeof r[0], file);
         if (n == 0U) {

@@ -34,6 +34,9 @@ def main():
     if count(elf, "--", "fail").returncode == 0:
         wrong["exit status"] = None
         print("a program that fails was accepted")
+    if "status 99" not in count(elf, "--", "fault").stderr:
+        wrong["fault"] = None
+        print("a processor fault did not end the program")
     sys.exit(1 if wrong else 0)
 
 

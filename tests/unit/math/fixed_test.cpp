@@ -73,6 +73,14 @@ TEST(MathFixed, UpperProductIsRoundedExactly)
     for_pairs([](int32_t a, int32_t b) { CHECK_PAIR(rounded_product(a, b), pm_mulh(a, b), a, b); });
 }
 
+TEST(MathFixed, UpperProductFromHalvesIsTheSame) // that of ARMv6-M
+{
+    for_pairs([](int32_t a, int32_t b) {
+        CHECK_PAIR(rounded_product(a, b), pm_mulh_halves(a, b, 0), a, b);
+        CHECK_PAIR(-rounded_negative_product(a, b), pm_mulh_halves(a, b, 1), a, b);
+    });
+}
+
 TEST(MathFixed, UpperProductAccumulatesAndWraps)
 {
     Random random;

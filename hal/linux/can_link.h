@@ -1,0 +1,28 @@
+/* A CAN bus of this computer, by name. Classic frames with 11-bit identifiers; others are skipped.
+ *
+ *   can0, vcan0 ...       SocketCAN
+ *   socketcand:HOST:PORT  listens there and speaks socketcand's raw mode to one client; port 0: any free one
+ *   slcan:/dev/pts/N      speaks the serial-line protocol of CAN adapters on that terminal
+ *   slcan:                the same on a new pseudo-terminal, whose name can_link_where() tells
+ *
+ * No function blocks. Tests: tests/unit/hal_linux. */
+#ifndef HAL_LINUX_CAN_LINK_H
+#define HAL_LINUX_CAN_LINK_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "hal/can_frame.h"
+
+typedef struct can_link can_link_t;
+
+/* NULL and a text that says what to do. */
+can_link_t *can_link_open(const char *name, char *error, size_t error_size);
+void can_link_close(can_link_t *link);
+
+bool can_link_receive(can_link_t *link, hal_can_frame_t *frame);    /* false: none waits */
+bool can_link_send(can_link_t *link, const hal_can_frame_t *frame); /* false: no room, or nobody listens */
+hal_can_state_t can_link_state(const can_link_t *link);
+const char *can_link_where(const can_link_t *link); /* where a peer finds it */
+
+#endif
