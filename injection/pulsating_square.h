@@ -30,10 +30,12 @@ typedef struct {
 } pulsating_square_config_t;
 
 typedef struct {
-    pm_ab_t i;     /* current at k-1 */
-    pm_dq_t delta; /* change over the last period */
-    bool positive; /* sign commanded in the last period */
-    uint8_t warm;  /* periods until two valid differences exist */
+    pm_ab_t i;          /* current at k-1 */
+    pm_dq_t half_delta; /* half of the change over the last period */
+    pm_dq_t h;          /* of the last step */
+    pm_q_t eps;         /* of the last step */
+    bool positive;      /* sign commanded in the last period */
+    uint8_t warm;       /* periods until two valid differences exist */
 } pulsating_square_t;
 
 void pulsating_square_reset(pulsating_square_t *self, pm_ab_t i);
@@ -41,10 +43,19 @@ void pulsating_square_demodulate(pulsating_square_t *self, const pulsating_squar
                                  const obs_in_t *in, obs_out_t *out);
 pm_dq_t pulsating_square_output(pulsating_square_t *self, const pulsating_square_config_t *config);
 
-/* Current at k without the carrier; call before pulsating_square_demodulate(). */
+/* The result of the last step. */
+obs_out_t pulsating_square_last(const pulsating_square_t *self, const pulsating_square_config_t *config);
+
+/* Current at k without the carrier, doubled or as it is; call before pulsating_square_demodulate(). */
+static inline pm_ab_t pulsating_square_fundamental_twice(const pulsating_square_t *self, pm_ab_t i)
+{
+    return (pm_ab_t){.alpha = i.alpha + self->i.alpha, .beta = i.beta + self->i.beta};
+}
+
 static inline pm_ab_t pulsating_square_fundamental(const pulsating_square_t *self, pm_ab_t i)
 {
-    return (pm_ab_t){.alpha = pm_mean(i.alpha, self->i.alpha), .beta = pm_mean(i.beta, self->i.beta)};
+    const pm_ab_t twice = pulsating_square_fundamental_twice(self, i);
+    return (pm_ab_t){.alpha = pm_half(twice.alpha), .beta = pm_half(twice.beta)};
 }
 
 #endif

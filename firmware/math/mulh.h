@@ -9,6 +9,7 @@
 #define PM_MATH_MULH_H
 
 #include <stdint.h>
+#include <string.h>
 
 #if defined(__ARM_FEATURE_DSP) && __ARM_FEATURE_DSP && defined(__thumb2__)
 #define PM_HAS_DSP 1
@@ -57,6 +58,13 @@ static inline int32_t pm_mulh_sub(int32_t c, int32_t a, int32_t b) /* c - a b / 
 }
 
 #endif
+
+/* The lower half of x in both places: one store of a word where the compiler would make two. */
+static inline void pm_store_twice(uint16_t *both, uint32_t x)
+{
+    const uint32_t word = (x & 0xFFFFU) | (x << 16);
+    memcpy(both, &word, sizeof word);
+}
 
 /* (a b + c d) / 2^32, two roundings. */
 static inline int32_t pm_mulh2(int32_t a, int32_t b, int32_t c, int32_t d)
