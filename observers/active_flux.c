@@ -1,5 +1,6 @@
 #include "observers/active_flux.h"
 
+#include "firmware/math/pair.h"
 #include "firmware/math/root.h"
 
 /* psi_ref stays within this share of the amplitude that the parameters give. */
@@ -79,20 +80,21 @@ void active_flux_step(active_flux_t *self, const active_flux_config_t *config, c
                       obs_out_t *out)
 {
     (void)config;
-    const pm_ab_t v = in->v;
-    const pm_ab_t past = self->i;
-    pm_ab_t psi = self->psi;
-    psi.alpha = pm_mulh_sub(pm_mulh_add(psi.alpha, v.alpha, self->step), past.alpha, self->drop);
-    psi.beta = pm_mulh_sub(pm_mulh_add(psi.beta, v.beta, self->step), past.beta, self->drop);
+    pm_ab_t psi = pm_pair_ab(&self->psi);
+    const pm_ab_t past = pm_pair_ab(&self->i);
+    const pm_pair_t k = pm_pair(&self->step, &self->drop);
+    psi.alpha = pm_mulh_sub(pm_mulh_add(psi.alpha, in->v.alpha, k.first), past.alpha, k.second);
+    psi.beta = pm_mulh_sub(pm_mulh_add(psi.beta, in->v.beta, k.first), past.beta, k.second);
     self->i = in->i;
 
     pm_dq_t active = pm_park_half(psi, in->dir);
-    active.d = pm_mulh_sub(active.d, self->inductance, in->i_dq.d);
-    active.q = pm_mulh_sub(active.q, self->inductance, in->i_dq.q);
+    const pm_pair_t model = pm_pair(&self->inductance, &self->reference);
+    active.d = pm_mulh_sub(active.d, model.first, in->i_dq.d);
+    active.q = pm_mulh_sub(active.q, model.first, in->i_dq.q);
 
-    const int32_t k_q = self->k_seed;
-    const pm_dq_t back = {.d = pm_mulh(self->reference - active.d, pm_add_sat(self->k_amplitude, k_q)),
-                          .q = pm_mulh(active.q, k_q)};
+    const pm_pair_t g = pm_pair(&self->k_amplitude, &self->k_seed);
+    const pm_dq_t back = {.d = pm_mulh(model.second - active.d, pm_add_sat(g.first, g.second)),
+                          .q = pm_mulh(active.q, g.second)};
     psi.alpha = pm_mulh_add(pm_mulh_add(psi.alpha, back.d, in->dir.cos), back.q, in->dir.sin);
     psi.beta = pm_mulh_sub(pm_mulh_add(psi.beta, back.d, in->dir.sin), back.q, in->dir.cos);
     /* with the position lost, a voltage at standstill drives the flux up until the fault */

@@ -1,6 +1,7 @@
 #include "firmware/control/current_control.h"
 
 #include "firmware/math/compiler.h"
+#include "firmware/math/pair.h"
 #include "firmware/math/root.h"
 
 void current_control_reset(current_control_t *self, pm_dq_t v)
@@ -21,6 +22,7 @@ PM_RARE static pm_dq_t limit(current_control_t *self, const current_control_conf
         v.q = v.q < 0 ? -left : left;
     }
     v = (pm_dq_t){.d = pm_widen(v.d), .q = pm_widen(v.q)};
+    self->limited = true;
     pm_pi_update(&self->d, &config->d, e.d, v.d - u.d);
     pm_pi_update(&self->q, &config->q, e.q, v.q - u.q);
     return v;
@@ -30,13 +32,16 @@ void current_control_step(current_control_t *self, const current_control_config_
                           pm_dq_t i_ref, pm_q_t omega, pm_q_t v_max, current_control_out_t *out)
 {
     const pm_dq_t e = {.d = i_ref.d - i.d, .q = i_ref.q - i.q};
-    const pm_wide_t integral_d = self->d.integral;
-    const pm_wide_t integral_q = self->q.integral;
+    const pm_pair_t integral = pm_pair(&self->d.integral, &self->q.integral);
+    const pm_pair_t d = pm_pair(&config->d.kp, &config->d.ki);
+    const pm_pair_t q = pm_pair(&config->q.kp, &config->q.ki);
+    const pm_pair_t main = pm_pair(&config->L_d, &config->psi_m);
     /* fluxes in Q26 and Q28, the feed-forward in Q22 */
     const int32_t psi_q = pm_shl(pm_mulh(config->L_q, i.q), 2);
-    const int32_t psi_d = config->psi_m + pm_mul(config->L_d, i.d);
-    const pm_wide_t u_d = pm_mulh_sub(pm_gain_add(integral_d, e.d, config->d.kp), omega, psi_q);
-    const pm_wide_t u_q = pm_gain_add(integral_q, e.q, config->q.kp) + pm_half(pm_half(pm_mulh(omega, psi_d)));
+    const int32_t psi_d = main.second + pm_mul(main.first, i.d);
+    const pm_wide_t u_d = pm_mulh_sub(pm_gain_add(integral.first, e.d, d.first), omega, psi_q);
+    const pm_wide_t u_q =
+        pm_gain_add(integral.second, e.q, q.first) + pm_half(pm_half(pm_mulh(omega, psi_d)));
 
     const pm_wide_t top = pm_widen(v_max);
     pm_dq_t u = {.d = u_d, .q = u_q};
@@ -44,8 +49,10 @@ void current_control_step(current_control_t *self, const current_control_config_
     if (out->limited) {
         u = limit(self, config, e, u, v_max);
     } else {
-        self->d.integral = pm_gain_add(integral_d, e.d, config->d.ki);
-        self->q.integral = pm_gain_add(integral_q, e.q, config->q.ki);
+        const pm_wide_t integral_d = pm_gain_add(integral.first, e.d, d.second);
+        const pm_wide_t integral_q = pm_gain_add(integral.second, e.q, q.second);
+        self->d.integral = integral_d;
+        self->q.integral = integral_q;
     }
     out->wide = u;
     out->v = (pm_dq_t){.d = pm_narrow(u.d), .q = pm_narrow(u.q)};

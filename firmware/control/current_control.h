@@ -21,6 +21,7 @@ typedef struct {
 
 typedef struct {
     pm_pi_t d, q;
+    bool limited; /* set when the voltage was; whoever reads it clears it */
 } current_control_t;
 
 typedef struct {

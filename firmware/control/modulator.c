@@ -1,6 +1,7 @@
 #include "firmware/control/modulator.h"
 
 #include "firmware/math/compiler.h"
+#include "firmware/math/pair.h"
 
 void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t v_dc)
 {
@@ -22,8 +23,9 @@ static inline pm_abc_t centred(pm_ab_t v)
 
 static inline pm_abc_t lost_by(const modulator_config_t *config, pm_ab_t i)
 {
-    const int32_t a = pm_mulh(i.alpha, config->zone_alpha);
-    const int32_t y = pm_mulh(i.beta, config->zone_beta);
+    const pm_pair_t zone = pm_pair(&config->zone_alpha, &config->zone_beta);
+    const int32_t a = pm_mulh(i.alpha, zone.first);
+    const int32_t y = pm_mulh(i.beta, zone.second);
     return (pm_abc_t){.a = a, .b = y - pm_half(a), .c = y + pm_half(a)}; /* c reversed */
 }
 
@@ -51,17 +53,18 @@ static bool shorten(pm_ab_t *v, pm_q_t v_dc)
 }
 
 /* Beyond the rails: by the voltage asked for, by compensation, or by rounding. */
-PM_RARE static void hold_to_rails(const modulator_t *self, const modulator_config_t *config, pm_q_t v_dc,
+PM_RARE static void hold_to_rails(modulator_t *self, const modulator_config_t *config, pm_q_t v_dc,
                                   int32_t per_volt, pm_abc_t i, modulator_out_t *out)
 {
     out->limited = shorten(&out->v, v_dc);
+    self->limited = self->limited || out->limited;
     set_legs(self, config, centred(out->v), per_volt, i, out->on);
     for (uint32_t x = 0; x < 3U; x++) {
         out->on[x] = pm_clamp(out->on[x], 0, config->counts);
     }
 }
 
-void modulator_step(const modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
+void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
                     pm_ab_t i_quarter, modulator_out_t *out)
 {
     const int32_t counts = config->counts;

@@ -29,6 +29,7 @@ typedef struct {
 
 typedef struct {
     int32_t lost; /* counts that dead time and drops take, Q(32 - PM_ZONE_BITS); below 2^(PM_ZONE_BITS - 1) */
+    bool limited; /* set when the vector was shortened; whoever reads it clears it */
 } modulator_t;
 
 typedef struct {
@@ -40,7 +41,7 @@ typedef struct {
 void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t v_dc);
 
 /* i_quarter: a quarter of the current, Q26. */
-void modulator_step(const modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
+void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
                     pm_ab_t i_quarter, modulator_out_t *out);
 
 #endif

@@ -2,6 +2,7 @@
 
 #include "firmware/drive/drive_parts.h"
 #include "firmware/math/compiler.h"
+#include "firmware/math/pair.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
 
@@ -56,9 +57,10 @@ const drive_fault_record_t *drive_fault_record(const drive_t *drive)
 static inline void measure(drive_t *drive, const drive_in_t *in)
 {
     const pm_q_t *zero = drive->calibration.zero;
+    const pm_pair_t zero_ab = pm_pair(&zero[0], &zero[1]);
     const pm_abc_t i = {
-        .a = pm_shl(in->i_leg[0], CURRENT_BITS) - zero[0],
-        .b = pm_shl(in->i_leg[1], CURRENT_BITS) - zero[1],
+        .a = pm_shl(in->i_leg[0], CURRENT_BITS) - zero_ab.first,
+        .b = pm_shl(in->i_leg[1], CURRENT_BITS) - zero_ab.second,
         .c = pm_shl(in->i_leg[2], CURRENT_BITS) - zero[2],
     };
     drive->i_abc = i;
@@ -110,6 +112,7 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
     protection_step(drive);
     drive->v_acting = drive->v_next;
     drive->v_next = (pm_ab_t){0, 0};
+    drive->status.theta = drive->position.pll.theta;
     out->trip = drive->fault != DRIVE_FAULT_NONE;
     if (drive->stage == STAGE_PULSES) {
         pulses(drive, out);
@@ -141,6 +144,7 @@ PM_RARE static position_out_t imposed(drive_t *drive)
     const pm_pll_t open = {.theta = drive->theta_open, .omega = drive->omega_open};
     if (is_led(drive)) {
         position_follow(&drive->position, &open);
+        drive->status.theta = open.theta;
     }
     const pm_dir_t dir = pm_dir(open.theta);
     return (position_out_t){.dir = dir, .i = pm_park(drive->i_ab, dir), .omega = open.omega};
@@ -148,10 +152,12 @@ PM_RARE static position_out_t imposed(drive_t *drive)
 
 static inline void write_out(const modulator_out_t *m, drive_out_t *out)
 {
-    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-        pm_store_twice(out->compare[x], (uint32_t)m->on[x]);
-        out->driven[x] = true;
-    }
+    pm_store_twice(out->compare[0], m->on[0]);
+    pm_store_twice(out->compare[1], m->on[1]);
+    pm_store_twice(out->compare[2], m->on[2]);
+    out->driven[0] = true;
+    out->driven[1] = true;
+    out->driven[2] = true;
     out->trip = false;
 }
 
@@ -161,7 +167,7 @@ static inline void control(drive_t *drive, const position_out_t *frame, drive_ou
     const drive_config_t *c = &drive->config;
     const pm_q_t v_dc = drive->status.v_dc;
     current_control_out_t u;
-    current_control_step(&drive->current, &c->current, frame->i, drive->i_ref, frame->omega,
+    current_control_step(&drive->current, &c->current, frame->i, pm_pair_dq(&drive->i_ref), frame->omega,
                          pm_unit(v_dc, drive->v_share), &u);
     drive->u = u.wide;
     drive->status.i = frame->i;
@@ -175,9 +181,6 @@ static inline void control(drive_t *drive, const position_out_t *frame, drive_ou
     modulator_step(&drive->modulator, &c->modulator, pm_park_inverse_quarter(v, ahead), v_dc,
                    pm_park_inverse_quarter(frame->i, ahead), &m);
     drive->v_next = m.v;
-    if (u.limited || m.limited) {
-        drive->limited = true;
-    }
     write_out(&m, out);
 }
 
@@ -188,20 +191,22 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
     if (drive->stage < STAGE_OPEN_LOOP || in->hw_fault || !protection_passed(drive)) {
         without_control(drive, in, out);
     } else {
-        const pm_ab_t v = drive->v_acting;
-        drive->v_acting = drive->v_next;
+        const pm_ab_t v = pm_pair_ab(&drive->v_acting);
+        const pm_ab_t next = pm_pair_ab(&drive->v_next);
+        drive->v_acting.alpha = next.alpha;
+        drive->v_acting.beta = next.beta;
         const bool open = drive->stage != STAGE_VECTOR;
         if (open) {
             impose(drive);
         }
         position_out_t frame;
         position_step(&drive->position, &drive->config.position, v, drive->i_ab, &frame);
+        drive->status.theta = drive->position.pll.theta;
         if (open) {
             frame = imposed(drive);
         }
         control(drive, &frame, out);
     }
-    drive->status.theta = drive->position.pll.theta;
 }
 
 void drive_prepare(drive_t *drive)

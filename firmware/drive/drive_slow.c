@@ -189,8 +189,9 @@ static void report(drive_t *drive)
 void drive_slow(drive_t *drive, const drive_slow_in_t *in)
 {
     drive->temperature_dC = in->temperature_dC;
-    drive->status.limits = drive->limited ? DRIVE_LIMIT_VOLTAGE : 0U;
-    drive->limited = false;
+    drive->status.limits = drive->current.limited || drive->modulator.limited ? DRIVE_LIMIT_VOLTAGE : 0U;
+    drive->current.limited = false;
+    drive->modulator.limited = false;
     if (drive->fault == DRIVE_FAULT_NONE) {
         reference_take(drive);
         drive->state_ms = (uint16_t)(drive->state_ms + (drive->state_ms < UINT16_MAX ? 1U : 0U));

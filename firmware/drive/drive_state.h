@@ -38,7 +38,6 @@ struct drive {
     pm_abc_t i_abc;
     pm_ab_t i_ab;
     bool hw_fault;
-    bool limited;     /* the voltage was, since the last drive_slow() */
     bool carrier;     /* injection is on */
     pm_dir_t ahead;   /* one and a half periods of rotation: from the sample to where the voltage acts */
     pm_unit_t v_share; /* share of v_dc for current control */

@@ -59,10 +59,10 @@ static inline int32_t pm_mulh_sub(int32_t c, int32_t a, int32_t b) /* c - a b / 
 
 #endif
 
-/* The lower half of x in both places: one store of a word where the compiler would make two. */
-static inline void pm_store_twice(uint16_t *both, uint32_t x)
+/* x in both places: one store of a word where the compiler would make two. */
+static inline void pm_store_twice(uint16_t *both, int32_t x) /* 0 <= x < 2^16 */
 {
-    const uint32_t word = (x & 0xFFFFU) | (x << 16);
+    const uint32_t word = (uint32_t)x | ((uint32_t)x << 16);
     memcpy(both, &word, sizeof word);
 }
 
