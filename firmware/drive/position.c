@@ -23,7 +23,7 @@ void position_reset(position_t *self, const position_config_t *config, pm_angle_
     const pm_dir_t dir = pm_dir(theta);
     const obs_in_t in = {.i = i, .dir = dir, .i_dq = pm_park(i, dir)};
     active_flux_reset(&self->flux, &config->flux, &in);
-    pulsating_square_reset(&self->square, i);
+    pulsating_square_reset(&self->square, &config->square, i);
 }
 
 void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i,
@@ -78,7 +78,7 @@ static void set_weight(position_t *self, const position_config_t *config)
     }
     if (!self->inject && speed < config->omega_high) {
         self->inject = true;
-        pulsating_square_reset(&self->square, self->flux.i);
+        pulsating_square_reset(&self->square, &config->square, self->flux.i);
     } else if (self->inject && speed > config->omega_high + config->omega_high / 8) {
         self->inject = false;
     }
@@ -96,15 +96,15 @@ static pm_q_t magnitude_after(pm_q_t *filter, pm_q_t x)
 
 /* Means of magnitudes: a source that has slipped shows errors of either sign, slower than the noise that is
  * filtered before. Whichever leads, both must agree. */
-static void set_quality(position_t *self, const obs_out_t *flux, const obs_out_t *square)
+static void set_quality(position_t *self, const position_config_t *config, const obs_out_t *flux)
 {
-    const pm_q_t square_eps = magnitude_after(&self->square_eps, square->eps);
+    const pm_q_t square_eps = magnitude_after(&self->square_eps, self->square.eps);
     /* also while the flux is tied: an EMF that the position does not explain */
     pm_q_t eps = magnitude_after(&self->flux_eps, flux->eps);
     pm_q_t misfit = self->weight > 0 ? pm_abs(flux->misfit) : 0;
     if (self->weight < PM_ONE) {
         eps = pm_max(eps, square_eps);
-        misfit = pm_max(misfit, pm_abs(square->misfit));
+        misfit = pm_max(misfit, pm_abs(pulsating_square_misfit(&self->square, &config->square)));
     }
     (void)pm_lp1(&self->eps_mean, eps, K_MEAN);
     (void)pm_lp1(&self->misfit_mean, misfit, K_MEAN);
@@ -117,10 +117,10 @@ void position_slow(position_t *self, const position_config_t *config, pm_dq_t i)
 {
     const obs_in_t in = {.omega = self->pll.omega, .i_dq = i};
     const obs_out_t flux = active_flux_last(&self->flux);
-    const obs_out_t square = pulsating_square_last(&self->square, &config->square);
     set_weight(self, config);
+    pulsating_square_slow(&self->square, &config->square, &in);
     self->gains.kp_turn = between(config->pll_low.kp_turn, config->pll_high.kp_turn, self->weight);
     self->gains.ki = between(config->pll_low.ki, config->pll_high.ki, self->weight);
     active_flux_slow(&self->flux, &config->flux, &in, &flux, self->weight);
-    set_quality(self, &flux, &square);
+    set_quality(self, config, &flux);
 }

@@ -22,6 +22,18 @@ static inline pm_pair_t pm_pair(const int32_t *first, const int32_t *second)
     return r;
 }
 
+/* An element of a table: the address is computed once for both words. */
+static inline pm_pair_t pm_pair_of(const pm_pair_t *table, uint32_t index)
+{
+    pm_pair_t r;
+#if PM_HAS_DSP
+    __asm__("ldrd %0, %1, %2" : "=r"(r.first), "=r"(r.second) : "Uv"(table[index]));
+#else
+    r = table[index];
+#endif
+    return r;
+}
+
 static inline pm_ab_t pm_pair_ab(const pm_ab_t *x)
 {
     const pm_pair_t r = pm_pair(&x->alpha, &x->beta);
