@@ -66,8 +66,10 @@ static inline pm_dq_t pm_park_half(pm_ab_t x, pm_dir_t r)
 
 static inline pm_dq_t pm_park(pm_ab_t x, pm_dir_t r)
 {
-    const pm_dq_t half = pm_park_half(x, r);
-    return (pm_dq_t){.d = pm_shl(half.d, 1), .q = pm_shl(half.q, 1)};
+    pm_dq_t y = pm_park_half(x, r);
+    y.d = pm_shl(y.d, 1);
+    y.q = pm_shl(y.q, 1);
+    return y;
 }
 
 static inline pm_ab_t pm_park_inverse(pm_dq_t x, pm_dir_t r)

@@ -37,13 +37,19 @@ static inline pm_pair_t pm_pair_of(const pm_pair_t *table, uint32_t index)
 static inline pm_ab_t pm_pair_ab(const pm_ab_t *x)
 {
     const pm_pair_t r = pm_pair(&x->alpha, &x->beta);
-    return (pm_ab_t){.alpha = r.first, .beta = r.second};
+    pm_ab_t y;
+    y.alpha = r.first;
+    y.beta = r.second;
+    return y;
 }
 
 static inline pm_dq_t pm_pair_dq(const pm_dq_t *x)
 {
     const pm_pair_t r = pm_pair(&x->d, &x->q);
-    return (pm_dq_t){.d = r.first, .q = r.second};
+    pm_dq_t y;
+    y.d = r.first;
+    y.q = r.second;
+    return y;
 }
 
 #endif

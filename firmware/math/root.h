@@ -39,7 +39,10 @@ static inline pm_counts_t pm_counts_make(uint32_t counts)
 {
     const uint32_t free = (uint32_t)__builtin_clz(counts | 1U);
     const uint32_t lift = free < 20U ? 20U - free : 0U;
-    return (pm_counts_t){.dividend = counts << (20U - lift), .lift = lift};
+    pm_counts_t r;
+    r.dividend = counts << (20U - lift);
+    r.lift = lift;
+    return r;
 }
 
 static inline int32_t pm_counts_per_unit(pm_counts_t counts, pm_q_t v)
