@@ -15,8 +15,11 @@ set(CMAKE_C_FLAGS_INIT "${pm_cpu_flags} -ffunction-sections -fdata-sections -fst
 string(APPEND CMAKE_C_FLAGS_INIT " -flto -ffat-lto-objects")
 # Ordering for a pipeline that Cortex-M4 does not have costs registers: 7 instructions per control period.
 string(APPEND CMAKE_C_FLAGS_INIT " -fno-schedule-insns")
+# Enumerations are ints, as on the host: so drive_t has the same layout in both places (tests/target/drive).
+string(APPEND CMAKE_C_FLAGS_INIT " -fno-short-enums")
 set(CMAKE_CXX_FLAGS_INIT "${CMAKE_C_FLAGS_INIT} -fno-exceptions -fno-rtti")
-set(CMAKE_EXE_LINKER_FLAGS_INIT "${pm_cpu_flags}")
+# The C library is built with short enumerations; none crosses its interface.
+set(CMAKE_EXE_LINKER_FLAGS_INIT "${pm_cpu_flags} -fno-short-enums -Wl,--no-enum-size-warning")
 
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
 set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "hal/sim/sim_loop.h"
+#include "tools/pmsim/record_layout.h"
 
 _Static_assert((int)RIG_OFF == (int)DRIVE_OFF && (int)RIG_CALIBRATING == (int)DRIVE_CALIBRATING &&
                    (int)RIG_FINDING == (int)DRIVE_FINDING && (int)RIG_RUNNING == (int)DRIVE_RUNNING &&
@@ -161,6 +162,11 @@ void rig_step(rig_t *rig, rig_sample_t *sample)
 uint32_t rig_slow_divider(const rig_t *rig)
 {
     return rig->loop.slow_divider;
+}
+
+void rig_layout(uint32_t layout[RECORD_LAYOUT])
+{
+    record_layout(layout);
 }
 
 void rig_record(const rig_t *rig, record_period_t *record)
