@@ -55,7 +55,8 @@ void active_flux_reset(active_flux_t *self, const active_flux_config_t *config, 
     set_reference(self, nominal(config, in->i_dq.d));
     set_operating_point(self, config, in);
     active_flux_tie(self, config);
-    const pm_dq_t drawn = {.d = pm_mulh(self->inductance, in->i_dq.d), .q = pm_mulh(self->inductance, in->i_dq.q)};
+    const pm_dq_t drawn = {.d = pm_mulh(self->inductance, in->i_dq.d),
+                           .q = pm_mulh(self->inductance, in->i_dq.q)};
     /* Q25, and Q26 by the factor two of the transform */
     const pm_dq_t psi = {.d = pm_shl(self->reference + drawn.d, 1), .q = pm_shl(drawn.q, 1)};
     self->psi = pm_park_inverse(psi, in->dir);

@@ -15,12 +15,12 @@
  * L_q(i_q) = L_q + L_q2 i_q^2: a constant L_q costs IPM-1000 2.4 degrees at rated load.
  *
  * What is integrated is psi + R T_s/2 i, which needs one current only: the mean of both ends then stands as
- * R T_s/2 beside L_q. L_q(i_q), g |omega| and R T_s are renewed at 1 kHz. Formats are chosen so that each line
- * is a chain of multiply-accumulates without a shift.
+ * R T_s/2 beside L_q. L_q(i_q), g |omega| and R T_s are renewed at 1 kHz. Formats are chosen so that each
+ * line is a chain of multiply-accumulates without a shift.
  *
  * Called each period; result belongs to k. Range: |psi| < 4, |i| < 2, L_q < 4, k_d and k_q < 1/8 per period
- * (beyond, they are held there). misfit: distance of the amplitude from psi_ref, relative. eps and misfit have
- * 19 fractional bits. Tests: tests/unit/observers/active_flux_test.cpp, tests/scenario. */
+ * (beyond, they are held there). misfit: distance of the amplitude from psi_ref, relative. eps and misfit
+ * have 19 fractional bits. Tests: tests/unit/observers/active_flux_test.cpp, tests/scenario. */
 #ifndef OBSERVERS_ACTIVE_FLUX_H
 #define OBSERVERS_ACTIVE_FLUX_H
 

@@ -29,10 +29,13 @@ static inline pm_abc_t lost_by(const modulator_config_t *config, pm_ab_t i)
     return (pm_abc_t){.a = a, .b = y - pm_half(a), .c = y + pm_half(a)}; /* c reversed */
 }
 
-static inline void set_legs(const modulator_t *self, const modulator_config_t *config, pm_abc_t u,
-                            int32_t per_volt, pm_abc_t i, int32_t *on)
+static inline void set_legs(const modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
+                            pm_ab_t i_quarter, int32_t *on)
 {
     const int32_t centre = pm_half(config->counts);
+    const int32_t per_volt = pm_counts_per_unit(config->per_unit, v_dc);
+    const pm_abc_t i = lost_by(config, i_quarter);
+    const pm_abc_t u = centred(v);
     on[0] = pm_zone_add(pm_mulh_add(centre, u.a, per_volt), i.a, self->lost);
     on[1] = pm_zone_add(pm_mulh_add(centre, u.b, per_volt), i.b, self->lost);
     on[2] = pm_zone_sub(pm_mulh_sub(centre, u.c, per_volt), i.c, self->lost);
@@ -54,29 +57,29 @@ static bool shorten(pm_ab_t *v, pm_q_t v_dc)
 
 /* Beyond the rails: by the voltage asked for, by compensation, or by rounding. */
 PM_RARE static void hold_to_rails(modulator_t *self, const modulator_config_t *config, pm_q_t v_dc,
-                                  int32_t per_volt, pm_abc_t i, modulator_out_t *out)
+                                  pm_ab_t i_quarter, modulator_out_t *out)
 {
     out->limited = shorten(&out->v, v_dc);
-    self->limited = self->limited || out->limited;
-    set_legs(self, config, centred(out->v), per_volt, i, out->on);
-    for (uint32_t x = 0; x < 3U; x++) {
-        out->on[x] = pm_clamp(out->on[x], 0, config->counts);
+    if (out->limited) {
+        self->limited = true;
+        set_legs(self, config, out->v, v_dc, i_quarter, out->on);
     }
+    out->on[0] = pm_clamp(out->on[0], 0, config->counts);
+    out->on[1] = pm_clamp(out->on[1], 0, config->counts);
+    out->on[2] = pm_clamp(out->on[2], 0, config->counts);
 }
 
 void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
                     pm_ab_t i_quarter, modulator_out_t *out)
 {
     const int32_t counts = config->counts;
-    const int32_t per_volt = pm_counts_per_unit(config->per_unit, v_dc);
-    const pm_abc_t i = lost_by(config, i_quarter);
     int32_t on[3];
-    set_legs(self, config, centred(v), per_volt, i, on);
+    set_legs(self, config, v, v_dc, i_quarter, on);
     if (pm_within(on[0], 0, counts) && pm_within(on[1], 0, counts) && pm_within(on[2], 0, counts)) {
         *out = (modulator_out_t){.on = {on[0], on[1], on[2]}, .v = v, .limited = false};
     } else {
-        modulator_out_t held = {.v = v};
-        hold_to_rails(self, config, v_dc, per_volt, i, &held);
+        modulator_out_t held = {.on = {on[0], on[1], on[2]}, .v = v};
+        hold_to_rails(self, config, v_dc, i_quarter, &held);
         *out = held;
     }
 }

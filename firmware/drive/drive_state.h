@@ -38,12 +38,12 @@ struct drive {
     pm_abc_t i_abc;
     pm_ab_t i_ab;
     bool hw_fault;
-    bool carrier;     /* injection is on */
-    pm_dir_t ahead;   /* one and a half periods of rotation: from the sample to where the voltage acts */
+    bool carrier;      /* injection is on */
+    pm_dir_t ahead;    /* one and a half periods of rotation: from the sample to where the voltage acts */
     pm_unit_t v_share; /* share of v_dc for current control */
-    pm_dq_t u;        /* voltage of the current control, without carrier; Q22 */
-    pm_ab_t v_acting; /* commanded at k-1: acts over [k, k+1) */
-    pm_ab_t v_next;   /* commanded at k: acts over [k+1, k+2) */
+    pm_dq_t u;         /* voltage of the current control, without carrier; Q22 */
+    pm_ab_t v_acting;  /* commanded at k-1: acts over [k, k+1) */
+    pm_ab_t v_next;    /* commanded at k: acts over [k+1, k+2) */
     modulator_t modulator;
 
     position_t position;

@@ -50,8 +50,8 @@ typedef struct {
 void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i,
                    position_out_t *out);
 
-/* While the rotor follows a given vector (align, open-loop start) the step stands between these two: `imposed`
- * takes the place of the loop, and the flux is tied to it. */
+/* While the rotor follows a given vector (align, open-loop start) the step stands between these two:
+ * `imposed` takes the place of the loop, and the flux is tied to it. */
 void position_lead(position_t *self, const position_config_t *config, const pm_pll_t *imposed);
 void position_follow(position_t *self, const pm_pll_t *imposed);
 

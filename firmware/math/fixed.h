@@ -130,7 +130,7 @@ static inline int32_t pm_abs(int32_t x) /* INT32_MIN -> INT32_MAX */
 /* |x| without a branch, but INT32_MIN stays. */
 static inline int32_t pm_magnitude(int32_t x)
 {
-    const uint32_t sign = (uint32_t)(x >> 31);
+    const uint32_t sign = x < 0 ? UINT32_MAX : 0U; /* a shift in the next operand */
     return (int32_t)(((uint32_t)x ^ sign) - sign);
 }
 

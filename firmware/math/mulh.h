@@ -9,7 +9,6 @@
 #define PM_MATH_MULH_H
 
 #include <stdint.h>
-#include <string.h>
 
 #if defined(__ARM_FEATURE_DSP) && __ARM_FEATURE_DSP && defined(__thumb2__)
 #define PM_HAS_DSP 1
@@ -63,7 +62,7 @@ static inline int32_t pm_mulh_sub(int32_t c, int32_t a, int32_t b) /* c - a b / 
 static inline void pm_store_twice(uint16_t *both, int32_t x) /* 0 <= x < 2^16 */
 {
     const uint32_t word = (uint32_t)x | ((uint32_t)x << 16);
-    memcpy(both, &word, sizeof word);
+    __builtin_memcpy(both, &word, sizeof word);
 }
 
 /* (a b + c d) / 2^32, two roundings. */

@@ -25,7 +25,7 @@ typedef struct {
     uint32_t parameters; /* count */
     uint32_t periods;    /* count */
     uint32_t slow_divider;
-    uint32_t period_bytes; /* sizeof(record_period_t) */
+    uint32_t period_bytes;          /* sizeof(record_period_t) */
     uint32_t layout[RECORD_LAYOUT]; /* of the recorder's drive_t */
 } record_header_t;
 

@@ -62,7 +62,8 @@ void put_period(Bytes &bytes, const record_period_t &period)
 
 } // namespace
 
-static_assert(sizeof(record_period_t) == 44 && sizeof(record_header_t) == 24 + 4 * RECORD_LAYOUT, "record.h must have no holes");
+static_assert(sizeof(record_period_t) == 44 && sizeof(record_header_t) == 24 + 4 * RECORD_LAYOUT,
+              "record.h must have no holes");
 
 Recording record_scenario(const Scenario &scenario, uint64_t most_periods)
 {

@@ -1,5 +1,5 @@
-/* Where the drive's memory has what: the same on host and target, so that either can read the other's drive_t.
- * The recording carries the host's figures; tests/target/drive compares them with the target's. */
+/* Where the drive's memory has what: the same on host and target, so that either can read the other's
+ * drive_t. The recording carries the host's figures; tests/target/drive compares them with the target's. */
 #ifndef PMSIM_RECORD_LAYOUT_H
 #define PMSIM_RECORD_LAYOUT_H
 

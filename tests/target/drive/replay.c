@@ -78,8 +78,8 @@ static bool same_layout(const record_header_t *header)
     bool same = true;
     for (unsigned k = 0; k < RECORD_LAYOUT; k++) {
         if (layout[k] != header->layout[k]) {
-            printf("replay: item %u of record_layout() is %lu, on the host %lu\n", k, (unsigned long)layout[k],
-                   (unsigned long)header->layout[k]);
+            printf("replay: item %u of record_layout() is %lu, on the host %lu\n", k,
+                   (unsigned long)layout[k], (unsigned long)header->layout[k]);
             same = false;
         }
     }
