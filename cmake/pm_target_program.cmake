@@ -40,16 +40,19 @@ function(pm_target_program)
         $<IF:$<BOOL:${ARG_LTO}>,-flto,-fno-lto> -nostartfiles -Wl,--gc-sections ${pm_target_link})
 endfunction()
 
-# pm_add_count_test(NAME n PROGRAM target FUNCTIONS f... [LIMITS f=N...] [ARGUMENTS word...])
-# A test that counts instructions per call and fails when a limit is exceeded.
+# pm_add_count_test(NAME n PROGRAM target FUNCTIONS f... [LIMITS f=N...] [MEANS f=N...] [ARGUMENTS word...])
+# A test that counts instructions per call and fails when a call exceeds its limit, or the mean of all calls theirs.
 function(pm_add_count_test)
-    cmake_parse_arguments(ARG "" "NAME;PROGRAM" "FUNCTIONS;LIMITS;ARGUMENTS" ${ARGN})
+    cmake_parse_arguments(ARG "" "NAME;PROGRAM" "FUNCTIONS;LIMITS;MEANS;ARGUMENTS" ${ARGN})
     set(options)
     foreach(item IN LISTS ARG_FUNCTIONS)
         list(APPEND options --function ${item})
     endforeach()
     foreach(item IN LISTS ARG_LIMITS)
         list(APPEND options --limit ${item})
+    endforeach()
+    foreach(item IN LISTS ARG_MEANS)
+        list(APPEND options --mean ${item})
     endforeach()
     add_test(NAME target.${ARG_NAME}
         COMMAND ${PM_PYTHON} ${PROJECT_SOURCE_DIR}/tests/target/count.py $<TARGET_FILE:${ARG_PROGRAM}>

@@ -93,6 +93,13 @@ static inline int32_t pm_mulh_add(int32_t c, int32_t a, int32_t b) /* c + a b / 
 
 #endif
 
+/* x in both places: one store of a word where the compiler would make two. */
+static inline void pm_store_twice(uint16_t *both, int32_t x) /* 0 <= x < 2^16 */
+{
+    const uint32_t word = (uint32_t)x | ((uint32_t)x << 16);
+    __builtin_memcpy(both, &word, sizeof word);
+}
+
 /* (a b + c d) / 2^32, two roundings. */
 static inline int32_t pm_mulh2(int32_t a, int32_t b, int32_t c, int32_t d)
 {

@@ -123,13 +123,13 @@ def print_tables(table, profile, measured_calls):
                   f"{100 * row['instructions'] / total:>6.1f}%")
 
 
-def check_limits(table, limits):
+def check_limits(table, limits, what):
     good = True
     for text in limits:
         name, _, bound = text.partition("=")
-        worst = table[name]["max"] if name in table else None
-        held = worst is not None and worst <= int(bound)
-        print(f"{'PASS' if held else 'FAIL'} {name} {worst} {bound} instructions")
+        got = table[name][what] if name in table else None
+        held = got is not None and got <= float(bound)
+        print(f"{'PASS' if held else 'FAIL'} {name} {what} {got if got is None else round(got, 2)} {bound} instructions")
         good = good and held
     return good
 
@@ -137,12 +137,13 @@ def check_limits(table, limits):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0],
                                      epilog="Words after -- are the arguments of the program's main(). "
-                                            "Exit status 1: a --limit is exceeded.")
+                                            "Exit status 1: a --limit or --mean is exceeded.")
     parser.add_argument("elf", help="program made with pm_target_program()")
     parser.add_argument("--function", action="append", required=True, metavar="NAME",
                         help="function to measure, may be a pattern like 'pm_*'; may be repeated")
     parser.add_argument("--profile", action="store_true", help="also show where the instructions went, by function")
     parser.add_argument("--limit", action="append", default=[], metavar="NAME=N", help="fail if a call takes more")
+    parser.add_argument("--mean", action="append", default=[], metavar="NAME=N", help="fail if calls take more on average")
     parser.add_argument("--skip", type=int, default=0, metavar="N", help="leave out the first N calls")
     parser.add_argument("--json", metavar="FILE", help="write the result, with every call's count; - is stdout")
     parser.add_argument("--timeout", type=float, default=300.0, metavar="S", help="give up after S seconds (300)")
@@ -168,7 +169,8 @@ def main():
     if options.json != "-":
         calls = sum(row["calls"] for row in table.values()) + options.skip
         print_tables(table, profile if options.profile else {}, calls)
-    if not check_limits(table, options.limit):
+    held = [check_limits(table, options.limit, "max"), check_limits(table, options.mean, "mean")]
+    if not all(held):
         sys.exit(1)
 
 

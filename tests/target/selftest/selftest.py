@@ -28,6 +28,10 @@ def main():
     if count(elf, "--limit", "known_nested=12").returncode != 0:
         wrong["limit held"] = None
         print("a limit that holds was refused")
+    for mean, status in (("known_loop=12", 0), ("known_loop=11.9", 1)):
+        if count(elf, "--mean", mean).returncode != status:
+            wrong["mean"] = None
+            print(f"--mean {mean} did not end with status {status}")
     if count(elf, "--limit", "known_nested=11").returncode != 1:
         wrong["limit exceeded"] = None
         print("a limit that is exceeded was accepted")
