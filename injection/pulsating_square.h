@@ -9,6 +9,8 @@
  * T_s/2) h_d. Without it the position lags by L_q/(L_q - L_d) times as much. lambda = i_q (a + b |i_q|), gain
  * = g_0 + g_2 i_q^2 from the commissioned inductances (config.c).
  *
+ * Both are renewed at 1 kHz; |lambda| <= 1.
+ *
  * Order in period k: pulsating_square_demodulate() with the current at k, then pulsating_square_output() for
  * the voltage over [k+1, k+2). eps is exact for small e and 1/2 sin 2e beyond: stable at 0 and 180 degrees,
  * so the polarity must be known. misfit: distance of h_d from its expected value, relative. The fundamental
@@ -30,21 +32,37 @@ typedef struct {
 } pulsating_square_config_t;
 
 typedef struct {
-    pm_ab_t i;     /* current at k-1 */
-    pm_dq_t delta; /* change over the last period */
-    bool positive; /* sign commanded in the last period */
-    uint8_t warm;  /* periods until two valid differences exist */
+    pm_ab_t i;          /* current at k-1 */
+    pm_dq_t half_delta; /* half of the change over the last period */
+    pm_unit_t lambda;   /* at the present current and speed */
+    uint32_t warm;      /* periods until two valid differences exist */
+    pm_q_t carrier;     /* commanded in the last period: +-v_h */
+    int32_t gain;       /* at the present current, Q20, with the sign of the answer that comes next */
+    pm_q_t h_d;         /* of the last step, either sign */
+    pm_q_t eps;         /* of the last step */
 } pulsating_square_t;
 
-void pulsating_square_reset(pulsating_square_t *self, pm_ab_t i);
+void pulsating_square_reset(pulsating_square_t *self, const pulsating_square_config_t *config, pm_ab_t i);
 void pulsating_square_demodulate(pulsating_square_t *self, const pulsating_square_config_t *config,
                                  const obs_in_t *in, obs_out_t *out);
 pm_dq_t pulsating_square_output(pulsating_square_t *self, const pulsating_square_config_t *config);
 
-/* Current at k without the carrier; call before pulsating_square_demodulate(). */
+/* At 1 kHz: gain and lambda for i_dq and omega of `in`, also after a reset. */
+void pulsating_square_slow(pulsating_square_t *self, const pulsating_square_config_t *config,
+                           const obs_in_t *in);
+/* misfit of the last step. */
+pm_q_t pulsating_square_misfit(const pulsating_square_t *self, const pulsating_square_config_t *config);
+
+/* Current at k without the carrier, doubled or as it is; call before pulsating_square_demodulate(). */
+static inline pm_ab_t pulsating_square_fundamental_twice(const pulsating_square_t *self, pm_ab_t i)
+{
+    return (pm_ab_t){.alpha = i.alpha + self->i.alpha, .beta = i.beta + self->i.beta};
+}
+
 static inline pm_ab_t pulsating_square_fundamental(const pulsating_square_t *self, pm_ab_t i)
 {
-    return (pm_ab_t){.alpha = pm_mean(i.alpha, self->i.alpha), .beta = pm_mean(i.beta, self->i.beta)};
+    const pm_ab_t twice = pulsating_square_fundamental_twice(self, i);
+    return (pm_ab_t){.alpha = pm_half(twice.alpha), .beta = pm_half(twice.beta)};
 }
 
 #endif

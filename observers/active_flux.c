@@ -1,19 +1,46 @@
 #include "observers/active_flux.h"
 
+#include "firmware/math/pair.h"
 #include "firmware/math/root.h"
 
 /* psi_ref stays within this share of the amplitude that the parameters give. */
 #define BAND PM_Q(0.5)
 
+/* To the formats of the state: Q28 to Q29, to Q30, Q32 to Q34. */
+static int32_t to_inductance(pm_q_t L)
+{
+    return pm_shl(pm_sat(L, PM_Q_BITS + 2), 1);
+}
+
+static int32_t to_drop(pm_q_t R_t)
+{
+    return pm_shl(pm_sat(R_t, PM_Q_BITS + 1), 2);
+}
+
+static int32_t to_feedback(pm_frac_t k)
+{
+    return pm_shl(pm_sat(k, 29), 2);
+}
+
 static void set_reference(active_flux_t *self, pm_q_t psi)
 {
     self->psi_ref = psi;
-    self->inverse = pm_div(PM_ONE / 4, psi); /* Q28 of a quarter is Q26 */
+    self->reference = pm_frac(psi, PM_FRAC(0.125)); /* Q28 to Q25 */
+    self->inverse = pm_div(PM_ONE / 4, psi);        /* Q28 of a quarter is Q26 */
 }
 
-static inline pm_q_t inductance_q(const active_flux_config_t *config, pm_q_t i_q)
+/* What depends on current, speed and temperature, which change little within a millisecond. */
+static void set_operating_point(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in)
 {
-    return config->L_q + pm_mul(config->L_q2, pm_mul(i_q, i_q));
+    const pm_q_t L_q = config->L_q + pm_mul(config->L_q2, pm_mul(in->i_dq.q, in->i_dq.q));
+    self->drop = to_drop(pm_frac(self->R, config->t_s));
+    self->inductance = to_inductance(L_q) + self->drop / 4; /* R T_s / 2 */
+    self->k_amplitude = to_feedback(pm_mul(pm_abs(in->omega), config->g));
+}
+
+void active_flux_tie(active_flux_t *self, const active_flux_config_t *config)
+{
+    self->k_seed = to_feedback(config->k_seed);
 }
 
 static pm_q_t nominal(const active_flux_config_t *config, pm_q_t i_d)
@@ -23,41 +50,65 @@ static pm_q_t nominal(const active_flux_config_t *config, pm_q_t i_d)
 
 void active_flux_reset(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in)
 {
-    set_reference(self, nominal(config, in->i_dq.d));
-    const pm_q_t L_q = inductance_q(config, in->i_dq.q);
-    const pm_dq_t psi = {.d = self->psi_ref + pm_mul(L_q, in->i_dq.d), .q = pm_mul(L_q, in->i_dq.q)};
-    self->psi = pm_park_inverse(psi, in->dir);
     self->R = config->R;
+    self->step = config->t_s / 4;
+    set_reference(self, nominal(config, in->i_dq.d));
+    set_operating_point(self, config, in);
+    active_flux_tie(self, config);
+    const pm_dq_t drawn = {.d = pm_mulh(self->inductance, in->i_dq.d),
+                           .q = pm_mulh(self->inductance, in->i_dq.q)};
+    /* Q25, and Q26 by the factor two of the transform */
+    const pm_dq_t psi = {.d = pm_shl(self->reference + drawn.d, 1), .q = pm_shl(drawn.q, 1)};
+    self->psi = pm_park_inverse(psi, in->dir);
+    self->active = (pm_dq_t){.d = self->reference, .q = 0};
     self->i = in->i;
-    self->k_seed = config->k_seed;
+}
+
+static inline pm_q_t relative(const active_flux_t *self, int32_t flux)
+{
+    const int32_t bits = 25 + 26 - 32;
+    return pm_shl(pm_sat(pm_mulh(flux, self->inverse), 19), PM_Q_BITS - bits);
+}
+
+static inline void describe(const active_flux_t *self, pm_dq_t active, obs_out_t *out)
+{
+    out->vector = (pm_dq_t){.d = pm_shl(active.d, 3), .q = pm_shl(active.q, 3)};
+    out->eps = relative(self, active.q);
+    out->misfit = relative(self, self->reference - active.d);
 }
 
 void active_flux_step(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in,
                       obs_out_t *out)
 {
-    const pm_ab_t i_mean = {.alpha = pm_mean(in->i.alpha, self->i.alpha),
-                            .beta = pm_mean(in->i.beta, self->i.beta)};
-    /* saturating: with the position lost, a voltage at standstill drives the flux up until the fault */
-    self->psi.alpha =
-        pm_add_sat(self->psi.alpha, pm_frac(in->v.alpha - pm_mul(self->R, i_mean.alpha), config->t_s));
-    self->psi.beta =
-        pm_add_sat(self->psi.beta, pm_frac(in->v.beta - pm_mul(self->R, i_mean.beta), config->t_s));
+    (void)config;
+    pm_ab_t psi = pm_pair_ab(&self->psi);
+    const pm_ab_t past = pm_pair_ab(&self->i);
+    const pm_pair_t k = pm_pair(&self->step, &self->drop);
+    psi.alpha = pm_mulh_sub(pm_mulh_add(psi.alpha, in->v.alpha, k.first), past.alpha, k.second);
+    psi.beta = pm_mulh_sub(pm_mulh_add(psi.beta, in->v.beta, k.first), past.beta, k.second);
     self->i = in->i;
 
-    const pm_dq_t psi = pm_park(self->psi, in->dir);
-    const pm_q_t L_q = inductance_q(config, in->i_dq.q);
-    const pm_dq_t active = {.d = psi.d - pm_mul(L_q, in->i_dq.d), .q = psi.q - pm_mul(L_q, in->i_dq.q)};
-    const pm_q_t error_d = pm_sub_sat(self->psi_ref, active.d);
+    pm_dq_t active = pm_park_half(psi, in->dir);
+    const pm_pair_t model = pm_pair(&self->inductance, &self->reference);
+    active.d = pm_mulh_sub(active.d, model.first, in->i_dq.d);
+    active.q = pm_mulh_sub(active.q, model.first, in->i_dq.q);
 
-    const pm_frac_t k_d = pm_shl(pm_mulh(pm_abs(in->omega), config->g), 32 - PM_Q_BITS) + self->k_seed;
-    const pm_ab_t correction = pm_park_inverse(
-        (pm_dq_t){.d = pm_frac(error_d, k_d), .q = -pm_frac(active.q, self->k_seed)}, in->dir);
-    self->psi.alpha = pm_add_sat(self->psi.alpha, correction.alpha);
-    self->psi.beta = pm_add_sat(self->psi.beta, correction.beta);
+    const pm_pair_t g = pm_pair(&self->k_amplitude, &self->k_seed);
+    const pm_dq_t back = {.d = pm_mulh(model.second - active.d, pm_add_sat(g.first, g.second)),
+                          .q = pm_mulh(active.q, g.second)};
+    psi.alpha = pm_mulh_add(pm_mulh_add(psi.alpha, back.d, in->dir.cos), back.q, in->dir.sin);
+    psi.beta = pm_mulh_sub(pm_mulh_add(psi.beta, back.d, in->dir.sin), back.q, in->dir.cos);
+    /* with the position lost, a voltage at standstill drives the flux up until the fault */
+    self->psi = (pm_ab_t){.alpha = pm_sat(psi.alpha, 29), .beta = pm_sat(psi.beta, 29)};
+    self->active = active;
+    describe(self, active, out);
+}
 
-    out->vector = active;
-    out->eps = pm_gain_unit(active.q, self->inverse);
-    out->misfit = pm_gain_unit(error_d, self->inverse);
+obs_out_t active_flux_last(const active_flux_t *self)
+{
+    obs_out_t out;
+    describe(self, self->active, &out);
+    return out;
 }
 
 static void follow_resistance(active_flux_t *self, const active_flux_config_t *config, pm_q_t psi_q,
@@ -73,7 +124,7 @@ void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, c
     const pm_q_t centre = nominal(config, in->i_dq.d);
     if (weight == 0) {
         /* tied to the position, the flux says nothing of the amplitude */
-        self->k_seed = config->k_seed;
+        active_flux_tie(self, config);
         set_reference(self, centre);
         if (pm_abs(in->omega) < config->omega_R) {
             follow_resistance(self, config, out->vector.q, in->i_dq.q);
@@ -84,4 +135,5 @@ void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, c
         self->k_seed = 0;
         set_reference(self, pm_clamp(psi, centre - band, centre + band));
     }
+    set_operating_point(self, config, in);
 }

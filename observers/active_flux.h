@@ -14,8 +14,13 @@
  * make the observer unstable under load below a third of rated speed (docs/decisions/004-resistance.md).
  * L_q(i_q) = L_q + L_q2 i_q^2: a constant L_q costs IPM-1000 2.4 degrees at rated load.
  *
- * Called each period; result belongs to k. Range: |psi| < 4, |i| < 2. misfit: distance of the amplitude from
- * psi_ref, relative. Tests: tests/unit/observers/active_flux_test.cpp, tests/scenario. */
+ * What is integrated is psi + R T_s/2 i, which needs one current only: the mean of both ends then stands as
+ * R T_s/2 beside L_q. L_q(i_q), g |omega| and R T_s are renewed at 1 kHz. Formats are chosen so that each
+ * line is a chain of multiply-accumulates without a shift.
+ *
+ * Called each period; result belongs to k. Range: |psi| < 4, |i| < 2, L_q < 4, k_d and k_q < 1/8 per period
+ * (beyond, they are held there). misfit: distance of the amplitude from psi_ref, relative. eps and misfit
+ * have 19 fractional bits. Tests: tests/unit/observers/active_flux_test.cpp, tests/scenario. */
 #ifndef OBSERVERS_ACTIVE_FLUX_H
 #define OBSERVERS_ACTIVE_FLUX_H
 
@@ -36,18 +41,29 @@ typedef struct {
 } active_flux_config_t;
 
 typedef struct {
-    pm_ab_t psi; /* stator flux */
-    pm_ab_t i;   /* current at k-1 */
-    pm_q_t R;    /* adapted */
+    pm_ab_t psi;         /* stator flux + R T_s/2 i, Q26 */
+    pm_ab_t i;           /* current at k-1 */
+    int32_t step;        /* T_s w_base, Q30 */
+    int32_t drop;        /* R T_s w_base, Q30 */
+    int32_t inductance;  /* L_q(i_q) + R T_s/2, Q29 */
+    int32_t reference;   /* psi_ref, Q25 */
+    int32_t k_amplitude; /* k_d T_s, Q34 */
+    int32_t k_seed;      /* present k_q T_s, Q34 */
+    pm_gain_t inverse;   /* 1 / psi_ref, Q26 */
+    pm_dq_t active;      /* active flux of the last step, Q25 */
     pm_q_t psi_ref;
-    pm_gain_t inverse; /* 1 / psi_ref, Q26 */
-    pm_frac_t k_seed;  /* present k_q T_s */
+    pm_q_t R; /* adapted */
 } active_flux_t;
 
 /* Flux of the current model at the given position: no transient follows when the position is right. */
 void active_flux_reset(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in);
 void active_flux_step(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in,
                       obs_out_t *out);
+
+/* The result of the last step. */
+obs_out_t active_flux_last(const active_flux_t *self);
+/* Ties the flux to the position until active_flux_slow() decides otherwise. */
+void active_flux_tie(active_flux_t *self, const active_flux_config_t *config);
 
 /* At 1 kHz, with what went into the last step and came out (i_dq and omega, vector): adapts psi_ref and R,
  * ties the flux to the position at weight 0. */

@@ -38,3 +38,7 @@ pm_build() {
     pm_quietly "out/logs/configure-$preset.log" cmake --preset "$preset"
     pm_quietly "out/logs/build-$preset.log" cmake --build --preset "$preset" "$@"
 }
+
+# The processors beside that of the board for which the core is built and shown right.
+# shellcheck disable=SC2034
+pm_portable_presets=(cortex-m0plus cortex-m33 rv32imac)

@@ -13,7 +13,7 @@ def q31(value):
 print("/* Made by tools/gen_trig_table.py; checked by tests/unit/math/trig_test.cpp. */")
 print('#include "firmware/math/trig.h"\n')
 print("/* clang-format off */")
-print(f"const pm_dir_t pm_dir_table[{COUNT}] = {{")
+print(f"const pm_pair_t pm_dir_table[{COUNT}] = {{")
 for k in range(COUNT):
     angle = 2 * pi * k / COUNT
     print(f"    {{{q31(cos(angle))}, {q31(sin(angle))}}},")

@@ -8,11 +8,13 @@ The deepest stack follows direct calls only; calls through pointers are not foll
 import argparse
 import json
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "tests/target"))
+from machine import machine_of, run  # noqa: E402 (found through the path above)
+
 # library -> source folder
 MODULES = {
     "pm_math": "firmware/math",
@@ -21,27 +23,30 @@ MODULES = {
     "pm_injection": "injection",
     "pm_bldc": "bldc",
     "pm_drive": "firmware/drive",
+    "pm_params": "firmware/params",
+    "pm_app": "firmware/app",
 }
-KINDS = {".text": "code", ".rodata": "rodata", ".data": "data", ".bss": "bss"}
+KINDS = ("code", "rodata", "data", "bss")
+# RISC-V keeps what is small apart, in sections of their own.
+SECTIONS = {".text": "code", ".rodata": "rodata", ".srodata": "rodata", ".data": "data", ".sdata": "data",
+            ".bss": "bss", ".sbss": "bss"}
+CALL = re.compile(r": R_(?:ARM_THM_(?:CALL|JUMP\w+)|RISCV_(?:CALL\w*|JAL|RVC_JUMP))\s+([\w.$]+)")
 TYPEDEF = re.compile(r"^(?:\}|typedef struct \w+)\s*(\w+_t);", re.MULTILINE)
-
-
-def run(*command):
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+TAG = re.compile(r"^struct (\w+) \{", re.MULTILINE)  # struct x, whose typedef x_t may stand elsewhere
 
 
 def section_sizes(archive):
     """object -> {code, rodata, data, bss} in bytes."""
     objects = {}
     current = None
-    for line in run("arm-none-eabi-size", "-A", str(archive)).splitlines():
+    for line in run(machine_of(archive).prefix + "size", "-A", str(archive)).splitlines():
         header = re.match(r"(\S+)\s+\(ex ", line)
         if header:
-            current = objects.setdefault(header.group(1), dict.fromkeys(KINDS.values(), 0))
+            current = objects.setdefault(header.group(1), dict.fromkeys(KINDS, 0))
             continue
         section = re.match(r"(\.\w+)\S*\s+(\d+)\s", line)
-        if section and section.group(1) in KINDS:
-            current[KINDS[section.group(1)]] += int(section.group(2))
+        if section and section.group(1) in SECTIONS:
+            current[SECTIONS[section.group(1)]] += int(section.group(2))
     return objects
 
 
@@ -61,14 +66,14 @@ def calls(archive):
     """(object, function) -> names of the functions it calls or jumps to."""
     graph = {}
     member = function = None
-    for line in run("arm-none-eabi-objdump", "-dr", str(archive)).splitlines():
+    for line in run(machine_of(archive).prefix + "objdump", "-dr", str(archive)).splitlines():
         match = re.match(r"(\S+):\s+file format", line)
         if match:
             member = Path(match.group(1)).name
         match = re.match(r"[0-9a-f]+ <(.+)>:$", line)
         if match:
             function = graph.setdefault((member, match.group(1)), set())
-        match = re.search(r": R_ARM_THM_(?:CALL|JUMP\w+)\s+([\w.$]+)", line)
+        match = CALL.search(line)
         if match:
             function.add(match.group(1))
     return graph
@@ -90,7 +95,7 @@ def struct_sizes(archive):
     """typedef name -> bytes, from the debug information."""
     sizes, typedefs = {}, {}
     unit, tag, offset, name, size = "", "", "", None, None
-    for line in run("arm-none-eabi-readelf", "--debug-dump=info", str(archive)).splitlines():
+    for line in run(machine_of(archive).prefix + "readelf", "--debug-dump=info", str(archive)).splitlines():
         match = re.match(r"\s*<\w+><(\w+)>: Abbrev Number: \d+ \((\w+)\)", line)
         if match:
             offset, tag, name = match.group(1), match.group(2), None
@@ -115,7 +120,7 @@ def collect(build):
     archives = {name: build / folder / f"lib{name}.a" for name, folder in MODULES.items()}
     archives = {name: path for name, path in archives.items() if path.exists()}
     if not archives:
-        sys.exit(f"size_report.py: no libraries in {build}; build the stm32g431 preset first")
+        sys.exit(f"size_report.py: no libraries in {build}; build its preset first")
     graph, own, structs = {}, {}, {}
     for path in archives.values():
         graph.update(calls(path))
@@ -133,7 +138,8 @@ def collect(build):
             row["stack"] = max((f["stack"] for f in row["functions"].values()), default=0)
         report[name] = {"objects": objects, "total": total(objects)}
     for name, folder in MODULES.items():
-        names = {n for h in sorted((ROOT / folder).glob("*.h")) for n in TYPEDEF.findall(h.read_text())}
+        texts = [h.read_text() for h in sorted((ROOT / folder).glob("*.h"))]
+        names = {n for text in texts for n in TYPEDEF.findall(text) + [f"{tag}_t" for tag in TAG.findall(text)]}
         state = {n: structs[n] for n in sorted(names) if n in structs}
         if state or name in report:
             report.setdefault(name, {"objects": {}, "total": total({})})["structs"] = state
@@ -142,12 +148,12 @@ def collect(build):
 
 def total(objects):
     rows = objects.values()
-    return {**{kind: sum(row[kind] for row in rows) for kind in KINDS.values()},
+    return {**{kind: sum(row[kind] for row in rows) for kind in KINDS},
             **{kind: max((row[kind] for row in rows), default=0) for kind in ("frame", "stack")}}
 
 
 def markdown(report):
-    columns = [*KINDS.values(), "frame", "stack"]
+    columns = [*KINDS, "frame", "stack"]
     lines = ["# Size on Cortex-M4", "", "Bytes, -O2. Frame is the largest of one function, stack the deepest chain of calls.",
              "", "| module | object | " + " | ".join(columns) + " | deepest |",
              "|---|---|" + "---:|" * len(columns) + "---|"]
@@ -175,7 +181,7 @@ def main():
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / "size.md").write_text(markdown(report))
     (options.out / "size.json").write_text(json.dumps(report, indent=1) + "\n")
-    columns = [*KINDS.values(), "frame", "stack"]
+    columns = [*KINDS, "frame", "stack"]
     print(f"{'module':<14}" + "".join(f"{c:>8}" for c in columns))
     for name, module in report.items():
         print(f"{name:<14}" + "".join(f"{module['total'][c]:>8}" for c in columns))

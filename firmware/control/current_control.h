@@ -14,16 +14,19 @@
 
 typedef struct {
     pm_pi_config_t d, q;
-    pm_q_t L_d, L_q; /* per-unit, decoupling */
+    pm_q_t L_q; /* per-unit, decoupling; |L i| < 8 */
+    pm_q_t L_d;
     pm_q_t psi_m;
 } current_control_config_t;
 
 typedef struct {
     pm_pi_t d, q;
+    bool limited; /* set when the voltage was; whoever reads it clears it */
 } current_control_t;
 
 typedef struct {
-    pm_dq_t v;
+    pm_dq_t v;    /* Q28 */
+    pm_dq_t wide; /* the same in Q22 */
     bool limited;
 } current_control_out_t;
 

@@ -5,23 +5,32 @@
  * the hexagon the vector is shortened on its own direction, so the angle is kept; the realised vector is
  * returned. Compensation adds to each leg the on-time that dead time and device drops take from it, by the
  * sign of the leg's current with a linear zone around zero: +-(T_dt/T_s + V_drop/v_dc), in timer counts. The
- * returned vector is the one without compensation, which is what the motor then sees.
+ * returned vector is the one without compensation, which is what the motor then sees. Beyond the hexagon by
+ * less than the compensation takes back, it may be returned as it was asked for.
  *
- * Called once per period; the output holds over the next one, so i is the current expected there.
- * One division. Range: |v| < 4, v_dc >= 1/16, timer_counts < 2^15. Tests:
- * tests/unit/control/modulator_test.cpp. */
+ * modulator_step() once per period; the output holds over the next one, so i is the current expected there.
+ * One division. modulator_slow() at 1 kHz with the link voltage, and once before the first step. Range:
+ * |v| < 4, v_dc >= 1/16, timer_counts < 2^15. Tests: tests/unit/control/modulator_test.cpp. */
 #ifndef CONTROL_MODULATOR_H
 #define CONTROL_MODULATOR_H
 
 #include "firmware/math/frames.h"
+#include "firmware/math/root.h"
 
 typedef struct {
-    int32_t counts;      /* timer counts of half a period */
-    int32_t dead_counts; /* counts that dead time takes, per half period */
-    pm_q_t drop;         /* device drop */
-    int32_t zone_gain;   /* 2^15 / zone in mulh units: i at the zone's edge gives 2^15 */
+    int32_t counts;       /* timer counts of half a period */
+    pm_counts_t per_unit; /* pm_counts_make(counts) */
+    int32_t zone_alpha;   /* pm_mulh(zone / 4, zone_alpha) = 2^PM_ZONE_BITS */
+    int32_t zone_beta;    /* sqrt(3)/2 zone_alpha */
+    int32_t dead_counts;  /* counts that dead time takes, per half period */
+    pm_q_t drop;          /* device drop */
     bool compensate;
 } modulator_config_t;
+
+typedef struct {
+    int32_t lost; /* counts that dead time and drops take, Q(32 - PM_ZONE_BITS); below 2^(PM_ZONE_BITS - 1) */
+    bool limited; /* set when the vector was shortened; whoever reads it clears it */
+} modulator_t;
 
 typedef struct {
     int32_t on[3]; /* 0 ... counts */
@@ -29,7 +38,10 @@ typedef struct {
     bool limited;  /* the vector was shortened */
 } modulator_out_t;
 
-void modulator_step(const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc, pm_ab_t i,
-                    modulator_out_t *out);
+void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t v_dc);
+
+/* i_quarter: a quarter of the current, Q26. */
+void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
+                    pm_ab_t i_quarter, modulator_out_t *out);
 
 #endif

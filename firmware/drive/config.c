@@ -34,6 +34,8 @@ static void make_protection(maker_t *m, protection_config_t *c)
     c->i_trip = per_unit(m, DRIVE_PARAM_i_trip, m->base.i);
     c->v_dc_max = per_unit(m, DRIVE_PARAM_v_dc_max, m->base.v);
     c->v_dc_min = per_unit(m, DRIVE_PARAM_v_dc_min, m->base.v);
+    c->i_trip_squared = pm_mulh(c->i_trip, c->i_trip);
+    c->v_dc_span = (uint32_t)c->v_dc_max - (uint32_t)c->v_dc_min;
     c->v_dc_derate = per_unit(m, DRIVE_PARAM_v_dc_derate, m->base.v);
     c->i_sum = PM_Q(0.1);
     c->offset_max =

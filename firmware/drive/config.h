@@ -26,8 +26,11 @@ typedef struct {
 } drive_base_t;
 
 typedef struct {
+    int32_t i_trip_squared; /* Q24 */
+    pm_q_t v_dc_min;
+    uint32_t v_dc_span; /* v_dc_max - v_dc_min */
     pm_q_t i_trip;
-    pm_q_t v_dc_max, v_dc_min, v_dc_derate;
+    pm_q_t v_dc_max, v_dc_derate;
     pm_q_t i_sum;       /* largest believable sum of the phase currents */
     int32_t offset_max; /* of a 16-bit code */
     int32_t temp_derate_dC, temp_trip_dC;

@@ -8,10 +8,9 @@ static pm_pll_config_t make_pll(maker_t *m, drive_param_id_t bandwidth)
     const pm_num_t ki = pm_num_div(pm_num_mul(square(w_n), m->base.t_s), m->base.omega);
     const pm_num_t turns = pm_num_div(pm_num_mul(m->base.omega, m->base.t_s), PM_NUM_TWO_PI);
     return (pm_pll_config_t){
-        .kp = gain(m, kp, FRAC_BITS, bandwidth),
+        .kp_turn = gain(m, pm_num_div(pm_num_mul(pm_num(4), kp), PM_NUM_TWO_PI), FRAC_BITS, bandwidth),
         .ki = gain(m, ki, FRAC_BITS, bandwidth),
         .k_theta = fixed(m, pm_num_mul(turns, pm_num(16)), 30, DRIVE_PARAM_speed_trip),
-        .omega_limit = PM_Q(1.25),
     };
 }
 

@@ -1,12 +1,16 @@
 #include "firmware/drive/drive.h"
 
-#include <stddef.h>
-
 #include "firmware/drive/drive_parts.h"
+#include "firmware/math/compiler.h"
+#include "firmware/math/pair.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
 
-/* The modulator's smallest link voltage; below, the bridge is off anyway. */
+/* A code of full scale is one. */
+#define CURRENT_BITS (PM_Q_BITS - 15)
+#define VOLTAGE_BITS (PM_Q_BITS - 16)
+
+/* The modulator's smallest link voltage; below v_dc_min, which is larger, the bridge is off. */
 #define V_DC_LEAST PM_Q(0.0625)
 
 drive_result_t drive_init(drive_t *drive, const drive_params_t *params)
@@ -50,18 +54,18 @@ const drive_fault_record_t *drive_fault_record(const drive_t *drive)
     return &drive->record;
 }
 
-static void measure(drive_t *drive, const drive_in_t *in)
+static inline void measure(drive_t *drive, const drive_in_t *in)
 {
-    const int32_t *offset = drive->calibration.offset;
-    /* full scale of a code is one: a shift, no product */
-    drive->i_abc = (pm_abc_t){
-        .a = pm_shl((int32_t)in->i_leg[0] - offset[0], PM_Q_BITS - 15),
-        .b = pm_shl((int32_t)in->i_leg[1] - offset[1], PM_Q_BITS - 15),
-        .c = pm_shl((int32_t)in->i_leg[2] - offset[2], PM_Q_BITS - 15),
+    const pm_q_t *zero = drive->calibration.zero;
+    const pm_pair_t zero_ab = pm_pair(&zero[0], &zero[1]);
+    const pm_abc_t i = {
+        .a = pm_shl(in->i_leg[0], CURRENT_BITS) - zero_ab.first,
+        .b = pm_shl(in->i_leg[1], CURRENT_BITS) - zero_ab.second,
+        .c = pm_shl(in->i_leg[2], CURRENT_BITS) - zero[2],
     };
-    drive->i_ab = pm_clarke(drive->i_abc);
-    drive->status.v_dc = pm_max(pm_shl((int32_t)in->v_dc, PM_Q_BITS - 16), V_DC_LEAST);
-    drive->hw_fault = in->hw_fault;
+    drive->i_abc = i;
+    drive->i_ab = pm_clarke(i);
+    drive->status.v_dc = pm_shl(in->v_dc, VOLTAGE_BITS);
 }
 
 static void calibrate(calibration_t *self, const drive_in_t *in)
@@ -75,7 +79,7 @@ static void calibrate(calibration_t *self, const drive_in_t *in)
     self->count++;
     if (self->count == DRIVE_OFFSET_PERIODS) {
         for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-            self->offset[x] = self->sum[x] / (int32_t)DRIVE_OFFSET_PERIODS;
+            self->zero[x] = pm_shl(self->sum[x], CURRENT_BITS - DRIVE_OFFSET_BITS);
         }
     }
 }
@@ -94,68 +98,6 @@ static void pulses(drive_t *drive, drive_out_t *out)
     }
 }
 
-static inline pm_ab_t *voltage_slot(drive_t *drive)
-{
-    return &drive->v[drive->period & 1U];
-}
-
-static void write_out(drive_t *drive, pm_ab_t v, pm_ab_t i, drive_out_t *out)
-{
-    modulator_out_t m;
-    modulator_step(&drive->config.modulator, v, drive->status.v_dc, i, &m);
-    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-        out->compare[x][0] = (uint16_t)m.on[x];
-        out->compare[x][1] = (uint16_t)m.on[x];
-        out->driven[x] = true;
-    }
-    *voltage_slot(drive) = m.v;
-    drive->limited = m.limited;
-}
-
-/* Current control in the frame of `theta` and its voltage one and a half periods later, when it acts. */
-static void control(drive_t *drive, pm_angle_t theta, pm_q_t omega, pm_dq_t i, drive_out_t *out)
-{
-    const drive_config_t *c = &drive->config;
-    const bool inject = drive->position.inject && drive->stage == STAGE_VECTOR;
-    pm_q_t v_max = pm_unit(drive->status.v_dc, c->v_linear);
-    if (inject) { /* a sagging link must not leave nothing to control with */
-        v_max = pm_max(v_max - c->position.square.v_h, pm_half(pm_half(v_max)));
-    }
-    current_control_out_t u;
-    current_control_step(&drive->current, &c->current, i, drive->i_ref, omega, v_max, &u);
-    drive->u = u.v;
-    drive->status.i = i;
-
-    const int32_t turn = pm_omega_to_angle(omega, c->k_theta);
-    const pm_dir_t ahead = pm_dir(theta + (pm_angle_t)turn + (pm_angle_t)pm_half(turn));
-    if (inject) {
-        u.v.d += pulsating_square_output(&drive->position.square, &c->position.square).d;
-    }
-    write_out(drive, pm_park_inverse(u.v, ahead), pm_park_inverse(i, ahead), out);
-    drive->limited |= u.limited;
-}
-
-static void vector(drive_t *drive, drive_out_t *out)
-{
-    const bool imposed = drive->stage == STAGE_OPEN_LOOP;
-    pm_pll_t open = {0};
-    if (imposed) {
-        drive->theta_open += (pm_angle_t)pm_omega_to_angle(drive->omega_open, drive->config.k_theta);
-        open = (pm_pll_t){.theta = drive->theta_open, .omega = drive->omega_open};
-    }
-    /* below this speed the observer would drift on an imposed angle: it is led along */
-    const bool led = imposed && pm_abs(open.omega) < drive->config.position.omega_low;
-    position_out_t p;
-    position_step(&drive->position, &drive->config.position, *voltage_slot(drive), drive->i_ab,
-                  led ? &open : NULL, &p);
-    if (imposed) {
-        p.i = pm_park(drive->i_ab, pm_dir(open.theta));
-    } else {
-        open = drive->position.pll;
-    }
-    control(drive, open.theta, open.omega, p.i, out);
-}
-
 static void off(drive_out_t *out)
 {
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
@@ -163,24 +105,122 @@ static void off(drive_out_t *out)
     }
 }
 
+/* A period without current control: a fault, the bridge off, calibration, pulses. */
+PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_out_t *out)
+{
+    drive->hw_fault = in->hw_fault;
+    protection_step(drive);
+    drive->v_acting = drive->v_next;
+    drive->v_next = (pm_ab_t){0, 0};
+    drive->status.theta = drive->position.pll.theta;
+    out->trip = drive->fault != DRIVE_FAULT_NONE;
+    if (drive->stage == STAGE_PULSES) {
+        pulses(drive, out);
+    } else {
+        off(out);
+        if (drive->stage == STAGE_CALIBRATE) {
+            calibrate(&drive->calibration, in);
+        }
+    }
+}
+
+/* Below this speed the observer would drift on an imposed angle: it is led along. */
+static bool is_led(const drive_t *drive)
+{
+    return pm_abs(drive->omega_open) < drive->config.position.omega_low;
+}
+
+PM_RARE static void impose(drive_t *drive)
+{
+    drive->theta_open += (pm_angle_t)pm_omega_to_angle(drive->omega_open, drive->config.k_theta);
+    if (is_led(drive)) {
+        const pm_pll_t open = {.theta = drive->theta_open, .omega = drive->omega_open};
+        position_lead(&drive->position, &drive->config.position, &open);
+    }
+}
+
+PM_RARE static position_out_t imposed(drive_t *drive)
+{
+    const pm_pll_t open = {.theta = drive->theta_open, .omega = drive->omega_open};
+    if (is_led(drive)) {
+        position_follow(&drive->position, &open);
+        drive->status.theta = open.theta;
+    }
+    const pm_dir_t dir = pm_dir(open.theta);
+    return (position_out_t){.dir = dir, .i = pm_park(drive->i_ab, dir), .omega = open.omega};
+}
+
+static inline void write_out(const modulator_out_t *m, drive_out_t *out)
+{
+    pm_store_twice(out->compare[0], m->on[0]);
+    pm_store_twice(out->compare[1], m->on[1]);
+    pm_store_twice(out->compare[2], m->on[2]);
+    out->driven[0] = true;
+    out->driven[1] = true;
+    out->driven[2] = true;
+    out->trip = false;
+}
+
+/* The voltage acts one and a half periods later, when the frame has turned to drive->ahead. */
+static inline void control(drive_t *drive, const position_out_t *frame, drive_out_t *out)
+{
+    const drive_config_t *c = &drive->config;
+    const pm_q_t v_dc = drive->status.v_dc;
+    current_control_out_t u;
+    current_control_step(&drive->current, &c->current, frame->i, pm_pair_dq(&drive->i_ref), frame->omega,
+                         pm_unit(v_dc, drive->v_share), &u);
+    drive->u = u.wide;
+    drive->status.i = frame->i;
+
+    pm_dq_t v = {.d = pm_shl(u.wide.d, 30 - PM_WIDE_BITS), .q = pm_shl(u.wide.q, 30 - PM_WIDE_BITS)};
+    if (drive->carrier) {
+        v.d += pm_shl(pulsating_square_output(&drive->position.square, &c->position.square).d, 2);
+    }
+    const pm_half_dir_t ahead = pm_dir_sum(frame->dir, drive->ahead);
+    modulator_out_t m;
+    modulator_step(&drive->modulator, &c->modulator, pm_park_inverse_quarter(v, ahead), v_dc,
+                   pm_park_inverse_quarter(frame->i, ahead), &m);
+    drive->v_next = m.v;
+    write_out(&m, out);
+}
+
 void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
 {
     drive->period++;
     measure(drive, in);
-    protection_step(drive, in);
-    out->trip = drive->fault != DRIVE_FAULT_NONE;
-    if (!out->trip && drive->stage >= STAGE_OPEN_LOOP) {
-        vector(drive, out);
+    if (drive->stage < STAGE_OPEN_LOOP || in->hw_fault || !protection_passed(drive)) {
+        without_control(drive, in, out);
     } else {
-        *voltage_slot(drive) = (pm_ab_t){0, 0};
-        if (!out->trip && drive->stage == STAGE_PULSES) {
-            pulses(drive, out);
-        } else {
-            off(out);
-            if (drive->stage == STAGE_CALIBRATE) {
-                calibrate(&drive->calibration, in);
-            }
+        const pm_ab_t v = pm_pair_ab(&drive->v_acting);
+        const pm_ab_t next = pm_pair_ab(&drive->v_next);
+        drive->v_acting.alpha = next.alpha;
+        drive->v_acting.beta = next.beta;
+        const bool open = drive->stage != STAGE_VECTOR;
+        if (open) {
+            impose(drive);
         }
+        position_out_t frame;
+        position_step(&drive->position, &drive->config.position, v, drive->i_ab, &frame);
+        drive->status.theta = drive->position.pll.theta;
+        if (open) {
+            frame = imposed(drive);
+        }
+        control(drive, &frame, out);
     }
-    drive->status.theta = drive->position.pll.theta;
+}
+
+void drive_prepare(drive_t *drive)
+{
+    const drive_config_t *c = &drive->config;
+    const bool open = drive->stage == STAGE_OPEN_LOOP;
+    const pm_q_t v_dc = drive->status.v_dc;
+    const int32_t turn = pm_omega_to_angle(open ? drive->omega_open : drive->position.pll.omega, c->k_theta);
+    drive->ahead = pm_dir((pm_angle_t)turn + (pm_angle_t)pm_half(turn));
+    drive->carrier = drive->stage == STAGE_VECTOR && drive->position.inject;
+    drive->v_share = c->v_linear;
+    if (drive->carrier) { /* a sagging link must not leave nothing to control with */
+        const pm_unit_t taken = pm_ratio(pm_min(c->position.square.v_h, v_dc), v_dc);
+        drive->v_share = pm_max(c->v_linear - taken, c->v_linear / 4);
+    }
+    modulator_slow(&drive->modulator, &c->modulator, pm_max(v_dc, V_DC_LEAST));
 }

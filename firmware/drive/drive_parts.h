@@ -4,9 +4,30 @@
 
 #include "firmware/drive/drive_state.h"
 
+/* Each period while the bridge is driven: currents and DC link within their limits. */
+static inline bool protection_currents_passed(const drive_t *drive)
+{
+    const pm_abc_t i = drive->i_abc;
+    const int32_t top = drive->config.protection.i_trip_squared;
+    const int32_t a = pm_mulh_sub(top, i.a, i.a);
+    const int32_t b = pm_mulh_sub(top, i.b, i.b);
+    const int32_t c = pm_mulh_sub(top, i.c, i.c);
+    return a >= 0 && b >= 0 && c >= 0;
+}
+
+static inline bool protection_passed(const drive_t *drive)
+{
+    const protection_config_t *c = &drive->config.protection;
+    const uint32_t above = (uint32_t)drive->status.v_dc - (uint32_t)c->v_dc_min;
+    return above <= c->v_dc_span && protection_currents_passed(drive);
+}
+
+/* drive.c: at 1 kHz, what the step needs of the present operating point and stage. */
+void drive_prepare(drive_t *drive);
+
 /* protection.c */
 
-void protection_step(drive_t *drive, const drive_in_t *in); /* each period: currents, DC link, break input */
+void protection_step(drive_t *drive); /* names the fault of a period that has not passed */
 void protection_slow(drive_t *drive); /* 1 kHz: temperature, speed, position, stall, sum */
 
 bool protection_cause_present(const drive_t *drive); /* of the faults that show with the bridge off */

@@ -47,7 +47,7 @@ static void finish_calibration(drive_t *drive)
         return;
     }
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-        if (pm_abs(c->offset[x] - 32768) > drive->config.protection.offset_max) {
+        if (pm_abs(c->zero[x] - PM_ONE) > pm_shl(drive->config.protection.offset_max, PM_Q_BITS - 15)) {
             drive_trip(drive, DRIVE_FAULT_SENSOR_OFFSET);
             return;
         }
@@ -181,7 +181,7 @@ static void report(drive_t *drive)
     s->omega = drive->position.pll.omega;
     s->omega_ref = drive->stage == STAGE_OPEN_LOOP ? drive->omega_open : drive->speed.reference;
     s->i_ref = drive->i_ref;
-    s->v = drive->v[drive->period & 1U];
+    s->v = drive->v_next;
     s->weight = drive->position.weight;
     s->quality = drive->position.quality;
 }
@@ -189,7 +189,9 @@ static void report(drive_t *drive)
 void drive_slow(drive_t *drive, const drive_slow_in_t *in)
 {
     drive->temperature_dC = in->temperature_dC;
-    drive->status.limits = drive->limited ? DRIVE_LIMIT_VOLTAGE : 0U;
+    drive->status.limits = drive->current.limited || drive->modulator.limited ? DRIVE_LIMIT_VOLTAGE : 0U;
+    drive->current.limited = false;
+    drive->modulator.limited = false;
     if (drive->fault == DRIVE_FAULT_NONE) {
         reference_take(drive);
         drive->state_ms = (uint16_t)(drive->state_ms + (drive->state_ms < UINT16_MAX ? 1U : 0U));
@@ -200,5 +202,6 @@ void drive_slow(drive_t *drive, const drive_slow_in_t *in)
         drive->state = DRIVE_FAULT;
         drive->stage = STAGE_OFF;
     }
+    drive_prepare(drive);
     report(drive);
 }

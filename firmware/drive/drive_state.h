@@ -13,11 +13,12 @@ typedef enum {
     STAGE_VECTOR,    /* field-oriented control at the estimated angle */
 } drive_stage_t;
 
-#define DRIVE_OFFSET_PERIODS 1024U
+#define DRIVE_OFFSET_BITS    10
+#define DRIVE_OFFSET_PERIODS 1024U /* 2^DRIVE_OFFSET_BITS */
 
 /* Offsets of the current channels: means of so many periods. */
 typedef struct {
-    int32_t offset[DRIVE_LEGS]; /* code at zero current */
+    pm_q_t zero[DRIVE_LEGS]; /* code at zero current, one being full scale */
     int32_t sum[DRIVE_LEGS];
     uint16_t count; /* periods taken */
 } calibration_t;
@@ -28,7 +29,7 @@ struct drive {
     drive_status_t status;
     drive_fault_record_t record;
 
-    volatile drive_fault_t fault; /* latched; the step switches the bridge off while it is set */
+    drive_fault_t fault; /* latched; while it is set, the stage is STAGE_OFF */
     drive_state_t state;
     drive_stage_t stage;
     uint32_t period;
@@ -37,10 +38,13 @@ struct drive {
     pm_abc_t i_abc;
     pm_ab_t i_ab;
     bool hw_fault;
-    bool limited; /* the voltage was, in the last step */
-    pm_dq_t u;    /* voltage of the current control, without carrier */
-    pm_ab_t v[2]; /* by parity of the period: read at k as commanded at k-2, which acted over [k-1, k), then
-                     rewritten */
+    bool carrier;      /* injection is on */
+    pm_dir_t ahead;    /* one and a half periods of rotation: from the sample to where the voltage acts */
+    pm_unit_t v_share; /* share of v_dc for current control */
+    pm_dq_t u;         /* voltage of the current control, without carrier; Q22 */
+    pm_ab_t v_acting;  /* commanded at k-1: acts over [k, k+1) */
+    pm_ab_t v_next;    /* commanded at k: acts over [k+1, k+2) */
+    modulator_t modulator;
 
     position_t position;
     initial_pulses_t pulses;

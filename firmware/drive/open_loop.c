@@ -26,7 +26,8 @@ void open_loop_resume(drive_t *drive)
 {
     const pm_dq_t i = drive->status.i;
     const pm_angle_t turn = pm_atan2(i.q, i.d);
-    const pm_dq_t u = pm_park((pm_ab_t){.alpha = drive->u.d, .beta = drive->u.q}, pm_dir(turn));
+    const pm_ab_t v = {.alpha = pm_narrow(drive->u.d), .beta = pm_narrow(drive->u.q)};
+    const pm_dq_t u = pm_park(v, pm_dir(turn));
     drive->theta_open = drive->position.pll.theta + turn;
     drive->omega_open = drive->position.pll.omega;
     drive->i_open = pm_hypot(i.d, i.q);
@@ -40,7 +41,8 @@ static void hand_over(drive_t *drive)
     const pm_angle_t turn = drive->theta_open - drive->position.pll.theta;
     const pm_dir_t dir = pm_dir(turn);
     const pm_ab_t i = pm_park_inverse((pm_dq_t){.d = drive->i_open, .q = 0}, dir);
-    const pm_ab_t u = pm_park_inverse(drive->u, dir);
+    const pm_dq_t v = {.d = pm_narrow(drive->u.d), .q = pm_narrow(drive->u.q)};
+    const pm_ab_t u = pm_park_inverse(v, dir);
     current_control_reset(&drive->current, (pm_dq_t){.d = u.alpha, .q = u.beta});
     reference_reset(drive, i.beta);
     drive->i_ref.d = i.alpha;

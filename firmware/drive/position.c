@@ -1,7 +1,5 @@
 #include "firmware/drive/position.h"
 
-#include <stddef.h>
-
 #include "firmware/math/filter.h"
 #include "firmware/math/trig.h"
 
@@ -25,31 +23,46 @@ void position_reset(position_t *self, const position_config_t *config, pm_angle_
     const pm_dir_t dir = pm_dir(theta);
     const obs_in_t in = {.i = i, .dir = dir, .i_dq = pm_park(i, dir)};
     active_flux_reset(&self->flux, &config->flux, &in);
-    pulsating_square_reset(&self->square, i);
+    pulsating_square_reset(&self->square, &config->square, i);
 }
 
 void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i,
-                   const pm_pll_t *imposed, position_out_t *out)
+                   position_out_t *out)
 {
-    pm_pll_predict(&self->pll, &self->gains);
-    if (imposed != NULL) {
-        self->pll = *imposed;
-        self->flux.k_seed = config->flux.k_seed;
+    pm_pll_t pll = self->pll;
+    pm_pll_predict(&pll, &self->gains);
+    const pm_dir_t dir = pm_dir(pll.theta);
+    const bool inject = self->inject;
+    /* both ways twice the current, so that the halving transform gives the current itself */
+    pm_ab_t twice = {.alpha = pm_shl(i.alpha, 1), .beta = pm_shl(i.beta, 1)};
+    if (inject) {
+        twice = pulsating_square_fundamental_twice(&self->square, i);
     }
-    out->dir = pm_dir(self->pll.theta);
-    const pm_ab_t fundamental = self->inject ? pulsating_square_fundamental(&self->square, i) : i;
-    out->i = pm_park(fundamental, out->dir);
+    const pm_dq_t i_dq = pm_park_half(twice, dir);
+    const obs_in_t in = {.v = v, .i = i, .dir = dir, .omega = pll.omega, .i_dq = i_dq};
+    obs_out_t flux;
+    active_flux_step(&self->flux, &config->flux, &in, &flux);
+    pm_q_t eps = flux.eps;
+    if (inject) {
+        obs_out_t square;
+        pulsating_square_demodulate(&self->square, &config->square, &in, &square);
+        eps = square.eps + pm_mul(self->weight, eps - square.eps);
+    }
+    pm_pll_correct(&pll, &self->gains, eps);
+    self->pll = pll;
+    *out = (position_out_t){.dir = dir, .i = i_dq, .omega = pll.omega};
+}
 
-    const obs_in_t in = {.v = v, .i = i, .dir = out->dir, .omega = self->pll.omega, .i_dq = out->i};
-    active_flux_step(&self->flux, &config->flux, &in, &self->flux_out);
-    pm_q_t eps = self->flux_out.eps;
-    if (self->inject) {
-        pulsating_square_demodulate(&self->square, &config->square, &in, &self->square_out);
-        eps = self->square_out.eps + pm_mul(self->weight, eps - self->square_out.eps);
-    }
-    if (imposed == NULL) {
-        pm_pll_correct(&self->pll, &self->gains, eps);
-    }
+void position_lead(position_t *self, const position_config_t *config, const pm_pll_t *imposed)
+{
+    active_flux_tie(&self->flux, &config->flux);
+    self->pll = *imposed;
+    self->pll.theta -= (pm_angle_t)pm_omega_to_angle(imposed->omega, self->gains.k_theta);
+}
+
+void position_follow(position_t *self, const pm_pll_t *imposed)
+{
+    self->pll = *imposed;
 }
 
 static void set_weight(position_t *self, const position_config_t *config)
@@ -65,7 +78,7 @@ static void set_weight(position_t *self, const position_config_t *config)
     }
     if (!self->inject && speed < config->omega_high) {
         self->inject = true;
-        pulsating_square_reset(&self->square, self->flux.i);
+        pulsating_square_reset(&self->square, &config->square, self->flux.i);
     } else if (self->inject && speed > config->omega_high + config->omega_high / 8) {
         self->inject = false;
     }
@@ -83,15 +96,15 @@ static pm_q_t magnitude_after(pm_q_t *filter, pm_q_t x)
 
 /* Means of magnitudes: a source that has slipped shows errors of either sign, slower than the noise that is
  * filtered before. Whichever leads, both must agree. */
-static void set_quality(position_t *self)
+static void set_quality(position_t *self, const position_config_t *config, const obs_out_t *flux)
 {
-    const pm_q_t square = magnitude_after(&self->square_eps, self->square_out.eps);
+    const pm_q_t square_eps = magnitude_after(&self->square_eps, self->square.eps);
     /* also while the flux is tied: an EMF that the position does not explain */
-    pm_q_t eps = magnitude_after(&self->flux_eps, self->flux_out.eps);
-    pm_q_t misfit = self->weight > 0 ? pm_abs(self->flux_out.misfit) : 0;
+    pm_q_t eps = magnitude_after(&self->flux_eps, flux->eps);
+    pm_q_t misfit = self->weight > 0 ? pm_abs(flux->misfit) : 0;
     if (self->weight < PM_ONE) {
-        eps = pm_max(eps, square);
-        misfit = pm_max(misfit, pm_abs(self->square_out.misfit));
+        eps = pm_max(eps, square_eps);
+        misfit = pm_max(misfit, pm_abs(pulsating_square_misfit(&self->square, &config->square)));
     }
     (void)pm_lp1(&self->eps_mean, eps, K_MEAN);
     (void)pm_lp1(&self->misfit_mean, misfit, K_MEAN);
@@ -103,9 +116,11 @@ static void set_quality(position_t *self)
 void position_slow(position_t *self, const position_config_t *config, pm_dq_t i)
 {
     const obs_in_t in = {.omega = self->pll.omega, .i_dq = i};
+    const obs_out_t flux = active_flux_last(&self->flux);
     set_weight(self, config);
-    self->gains.kp = between(config->pll_low.kp, config->pll_high.kp, self->weight);
+    pulsating_square_slow(&self->square, &config->square, &in);
+    self->gains.kp_turn = between(config->pll_low.kp_turn, config->pll_high.kp_turn, self->weight);
     self->gains.ki = between(config->pll_low.ki, config->pll_high.ki, self->weight);
-    active_flux_slow(&self->flux, &config->flux, &in, &self->flux_out, self->weight);
-    set_quality(self);
+    active_flux_slow(&self->flux, &config->flux, &in, &flux, self->weight);
+    set_quality(self, config, &flux);
 }

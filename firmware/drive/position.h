@@ -28,7 +28,6 @@ typedef struct {
     pm_pll_config_t gains; /* between pll_low and pll_high */
     active_flux_t flux;
     pulsating_square_t square;
-    obs_out_t flux_out, square_out;
     pm_q_t weight;               /* 0: injection, 1: flux observer */
     bool inject;                 /* carrier on */
     pm_q_t omega_mean;           /* filtered for the weight */
@@ -44,13 +43,17 @@ void position_reset(position_t *self, const position_config_t *config, pm_angle_
 typedef struct {
     pm_dir_t dir; /* direction of the present position */
     pm_dq_t i;    /* fundamental current in it */
+    pm_q_t omega;
 } position_out_t;
 
-/* One period: v is the mean voltage over [k-1, k), i the current at k. `imposed` (angle and speed, NULL
- * normally) takes the place of the loop while the rotor follows a given vector, and ties the flux to it:
- * align, open-loop start. */
+/* One period: v is the mean voltage over [k-1, k), i the current at k. */
 void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i,
-                   const pm_pll_t *imposed, position_out_t *out);
+                   position_out_t *out);
+
+/* While the rotor follows a given vector (align, open-loop start) the step stands between these two:
+ * `imposed` takes the place of the loop, and the flux is tied to it. */
+void position_lead(position_t *self, const position_config_t *config, const pm_pll_t *imposed);
+void position_follow(position_t *self, const pm_pll_t *imposed);
 
 /* At 1 kHz: weight, carrier, loop gains, quality. */
 void position_slow(position_t *self, const position_config_t *config, pm_dq_t i);

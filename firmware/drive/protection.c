@@ -8,6 +8,7 @@ void drive_trip(drive_t *drive, drive_fault_t fault)
         return;
     }
     drive->fault = fault;
+    drive->stage = STAGE_OFF; /* which opens the bridge */
     drive->record = (drive_fault_record_t){
         .fault = fault,
         .i = drive->i_abc,
@@ -19,24 +20,17 @@ void drive_trip(drive_t *drive, drive_fault_t fault)
     };
 }
 
-static bool current_within(const drive_t *drive)
-{
-    const pm_q_t top = drive->config.protection.i_trip;
-    const pm_abc_t i = drive->i_abc;
-    return pm_within(i.a, -top, top) && pm_within(i.b, -top, top) && pm_within(i.c, -top, top);
-}
-
-void protection_step(drive_t *drive, const drive_in_t *in)
+void protection_step(drive_t *drive)
 {
     const protection_config_t *c = &drive->config.protection;
     const pm_q_t v_dc = drive->status.v_dc;
     /* before the calibration the offsets are not known, and nothing is driven */
     const bool live = drive->stage > STAGE_CALIBRATE;
-    if (in->hw_fault) {
+    if (drive->hw_fault) {
         drive_trip(drive, DRIVE_FAULT_HARDWARE);
-    } else if (live && !current_within(drive)) {
+    } else if (live && !protection_currents_passed(drive)) {
         drive_trip(drive, DRIVE_FAULT_OVER_CURRENT);
-    } else if (live && !pm_within(v_dc, c->v_dc_min, c->v_dc_max)) {
+    } else if (live && !protection_passed(drive)) {
         drive_trip(drive, v_dc > c->v_dc_max ? DRIVE_FAULT_OVER_VOLTAGE : DRIVE_FAULT_UNDER_VOLTAGE);
     } else {
         /* all is well */

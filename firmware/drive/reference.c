@@ -41,8 +41,9 @@ static pm_q_t flux_current(drive_t *drive, pm_q_t i_q)
 {
     const drive_config_t *c = &drive->config;
     const pm_q_t v_top = pm_unit(drive->status.v_dc, c->v_linear);
-    const pm_q_t weak = field_weakening_step(&drive->field_weakening, &c->field_weakening,
-                                             pm_hypot(drive->u.d, drive->u.q), v_top - v_top / 20);
+    const pm_q_t weak =
+        field_weakening_step(&drive->field_weakening, &c->field_weakening,
+                             pm_hypot(pm_narrow(drive->u.d), pm_narrow(drive->u.q)), v_top - v_top / 20);
     const pm_q_t light = pm_mul(c->i_d_light, drive->position.weight);
     return pm_max(pm_min(mtpa_i_d(&c->mtpa, i_q), -light) + weak, -c->i_max);
 }

@@ -99,19 +99,24 @@ static inline int32_t pm_sub_sat(int32_t a, int32_t b)
 
 #else
 
-static inline int32_t pm_narrow64(int64_t x)
+/* An overflow shows in the sign bits: what it should have been is the sign of a. */
+static inline int32_t pm_end(int32_t a)
 {
-    return x > INT32_MAX ? INT32_MAX : (x < INT32_MIN ? INT32_MIN : (int32_t)x);
+    return a < 0 ? INT32_MIN : INT32_MAX;
 }
 
 static inline int32_t pm_add_sat(int32_t a, int32_t b)
 {
-    return pm_narrow64((int64_t)a + b);
+    const uint32_t sum = (uint32_t)a + (uint32_t)b;
+    const uint32_t overflow = ((uint32_t)a ^ sum) & ((uint32_t)b ^ sum);
+    return overflow > (uint32_t)INT32_MAX ? pm_end(a) : (int32_t)sum;
 }
 
 static inline int32_t pm_sub_sat(int32_t a, int32_t b)
 {
-    return pm_narrow64((int64_t)a - b);
+    const uint32_t difference = (uint32_t)a - (uint32_t)b;
+    const uint32_t overflow = ((uint32_t)a ^ (uint32_t)b) & ((uint32_t)a ^ difference);
+    return overflow > (uint32_t)INT32_MAX ? pm_end(a) : (int32_t)difference;
 }
 
 #endif
@@ -125,6 +130,13 @@ static inline bool pm_within(int32_t x, int32_t lo, int32_t hi)
 static inline int32_t pm_abs(int32_t x) /* INT32_MIN -> INT32_MAX */
 {
     return x < 0 ? pm_sub_sat(0, x) : x;
+}
+
+/* |x| without a branch, but INT32_MIN stays. */
+static inline int32_t pm_magnitude(int32_t x)
+{
+    const uint32_t sign = x < 0 ? UINT32_MAX : 0U; /* a shift in the next operand */
+    return (int32_t)(((uint32_t)x ^ sign) - sign);
 }
 
 static inline pm_q_t pm_mul(pm_q_t x, pm_q_t y)
@@ -190,11 +202,18 @@ static inline int32_t pm_mean(int32_t a, int32_t b)
     return pm_half(a + b);
 }
 
-/* -height ... height, linear while |x| < edge: gain = 2^19 / edge (pm_mulh(edge, gain) = 2^15); |height| <
- * 2^16. */
-static inline int32_t pm_zone(pm_q_t x, int32_t gain, int32_t height)
+/* sum +- height x / edge for |x| below edge = 2^PM_ZONE_BITS, sum +- height beyond; height in
+ * Q(32 - PM_ZONE_BITS): one saturation and one multiply-accumulate. */
+#define PM_ZONE_BITS 14
+
+static inline int32_t pm_zone_add(int32_t sum, int32_t x, int32_t height)
 {
-    return (pm_sat(pm_mulh(x, gain), 15) * height) >> 15;
+    return pm_mulh_add(sum, pm_sat(x, PM_ZONE_BITS), height);
+}
+
+static inline int32_t pm_zone_sub(int32_t sum, int32_t x, int32_t height)
+{
+    return pm_mulh_sub(sum, pm_sat(x, PM_ZONE_BITS), height);
 }
 
 /* A small signal: Q32, +-0.5, saturating; for carrier currents, whose gains exceed pm_gain(). */

@@ -30,6 +30,11 @@ typedef struct {
     pm_unit_t cos, sin;
 } pm_dir_t;
 
+/* The same halved: Q30. */
+typedef struct {
+    int32_t cos, sin;
+} pm_half_dir_t;
+
 /* Factors near one are written as one minus a fraction: a single SMMLSR, and no lost bit. */
 static inline pm_ab_t pm_clarke(pm_abc_t x)
 {
@@ -50,11 +55,20 @@ static inline pm_abc_t pm_clarke_inverse(pm_ab_t x)
     return r;
 }
 
-static inline pm_dq_t pm_park(pm_ab_t x, pm_dir_t r)
+/* Half of pm_park(): where the caller's next product can carry the factor two. */
+static inline pm_dq_t pm_park_half(pm_ab_t x, pm_dir_t r)
 {
     pm_dq_t y;
-    y.d = pm_shl(pm_mulh_add(pm_mulh(x.alpha, r.cos), x.beta, r.sin), 1);
-    y.q = pm_shl(pm_mulh_sub(pm_mulh(x.beta, r.cos), x.alpha, r.sin), 1);
+    y.d = pm_mulh_add(pm_mulh(x.alpha, r.cos), x.beta, r.sin);
+    y.q = pm_mulh_sub(pm_mulh(x.beta, r.cos), x.alpha, r.sin);
+    return y;
+}
+
+static inline pm_dq_t pm_park(pm_ab_t x, pm_dir_t r)
+{
+    pm_dq_t y = pm_park_half(x, r);
+    y.d = pm_shl(y.d, 1);
+    y.q = pm_shl(y.q, 1);
     return y;
 }
 
@@ -63,6 +77,24 @@ static inline pm_ab_t pm_park_inverse(pm_dq_t x, pm_dir_t r)
     pm_ab_t y;
     y.alpha = pm_shl(pm_mulh_sub(pm_mulh(x.d, r.cos), x.q, r.sin), 1);
     y.beta = pm_shl(pm_mulh_add(pm_mulh(x.d, r.sin), x.q, r.cos), 1);
+    return y;
+}
+
+/* Half of the direction of the sum of two angles. */
+static inline pm_half_dir_t pm_dir_sum(pm_dir_t a, pm_dir_t b)
+{
+    pm_half_dir_t r;
+    r.cos = pm_mulh_sub(pm_mulh(a.cos, b.cos), a.sin, b.sin);
+    r.sin = pm_mulh_add(pm_mulh(a.sin, b.cos), a.cos, b.sin);
+    return r;
+}
+
+/* A quarter of pm_park_inverse(): in Q28 for x in Q30. */
+static inline pm_ab_t pm_park_inverse_quarter(pm_dq_t x, pm_half_dir_t r)
+{
+    pm_ab_t y;
+    y.alpha = pm_mulh_sub(pm_mulh(x.d, r.cos), x.q, r.sin);
+    y.beta = pm_mulh_add(pm_mulh(x.d, r.sin), x.q, r.cos);
     return y;
 }
 

@@ -16,6 +16,13 @@
 #define PM_HAS_DSP 0
 #endif
 
+/* ARMv6-M multiplies to 32 bits only; there a long product is a call. */
+#if defined(__ARM_ARCH_ISA_THUMB) && __ARM_ARCH_ISA_THUMB < 2
+#define PM_HAS_LONG_MUL 0
+#else
+#define PM_HAS_LONG_MUL 1
+#endif
+
 #if PM_HAS_DSP
 
 static inline int32_t pm_mulh(int32_t a, int32_t b)
@@ -41,14 +48,23 @@ static inline int32_t pm_mulh_sub(int32_t c, int32_t a, int32_t b)
 
 #else
 
-static inline int32_t pm_mulh(int32_t a, int32_t b) /* a b / 2^32 */
+/* (a b + 2^31 - less) / 2^32, rounded down; less is 0 or 1. From four products of halves where a product of
+ * 32 bits is the longest there is; no sum overflows, with the largest halves the first reaches 2^31 - 1. */
+static inline int32_t pm_mulh_halves(int32_t a, int32_t b, uint32_t less)
 {
-    return (int32_t)(((int64_t)a * b + INT64_C(0x80000000)) >> 32);
+    const uint32_t a0 = (uint32_t)a & 0xFFFFU, b0 = (uint32_t)b & 0xFFFFU;
+    const int32_t a1 = a >> 16, b1 = b >> 16;
+    const uint32_t low = less == 0U ? ((a0 * b0) >> 16) + 0x8000U : ((a0 * b0 + 0xFFFFU) >> 16) + 0x7FFFU;
+    const int32_t middle = a1 * (int32_t)b0 + (int32_t)low;
+    return a1 * b1 + (middle >> 16) + (((int32_t)a0 * b1 + (int32_t)((uint32_t)middle & 0xFFFFU)) >> 16);
 }
 
-static inline int32_t pm_mulh_add(int32_t c, int32_t a, int32_t b) /* c + a b / 2^32 */
+#if PM_HAS_LONG_MUL
+
+static inline int32_t pm_mulh(int32_t a, int32_t b) /* a b / 2^32 */
 {
-    return (int32_t)((uint32_t)c + (uint32_t)pm_mulh(a, b));
+    const int64_t p = (int64_t)a * b;
+    return (int32_t)(p >> 32) + (int32_t)((uint32_t)p >> 31);
 }
 
 static inline int32_t pm_mulh_sub(int32_t c, int32_t a, int32_t b) /* c - a b / 2^32 */
@@ -56,7 +72,33 @@ static inline int32_t pm_mulh_sub(int32_t c, int32_t a, int32_t b) /* c - a b / 
     return (int32_t)((uint32_t)c + (uint32_t)((INT64_C(0x80000000) - (int64_t)a * b) >> 32));
 }
 
+#else
+
+static inline int32_t pm_mulh(int32_t a, int32_t b)
+{
+    return pm_mulh_halves(a, b, 0U);
+}
+
+static inline int32_t pm_mulh_sub(int32_t c, int32_t a, int32_t b)
+{
+    return (int32_t)((uint32_t)c - (uint32_t)pm_mulh_halves(a, b, 1U));
+}
+
 #endif
+
+static inline int32_t pm_mulh_add(int32_t c, int32_t a, int32_t b) /* c + a b / 2^32 */
+{
+    return (int32_t)((uint32_t)c + (uint32_t)pm_mulh(a, b));
+}
+
+#endif
+
+/* x in both places: one store of a word where the compiler would make two. */
+static inline void pm_store_twice(uint16_t *both, int32_t x) /* 0 <= x < 2^16 */
+{
+    const uint32_t word = (uint32_t)x | ((uint32_t)x << 16);
+    __builtin_memcpy(both, &word, sizeof word);
+}
 
 /* (a b + c d) / 2^32, two roundings. */
 static inline int32_t pm_mulh2(int32_t a, int32_t b, int32_t c, int32_t d)

@@ -29,10 +29,17 @@ static inline pm_wide_t pm_pi_output(const pm_pi_t *self, const pm_pi_config_t *
     return pm_gain_add(self->integral, e, c->kp) + pm_widen(ff);
 }
 
+/* The second half of the update alone. */
+static inline void pm_pi_follow(pm_pi_t *self, const pm_pi_config_t *c, pm_wide_t excess)
+{
+    self->integral += pm_shl(pm_mulh(excess, c->kb), 1);
+}
+
 /* excess = u_limited - u of the same step. */
 static inline void pm_pi_update(pm_pi_t *self, const pm_pi_config_t *c, pm_q_t e, pm_wide_t excess)
 {
-    self->integral = pm_gain_add(self->integral, e, c->ki) + pm_shl(pm_mulh(excess, c->kb), 1);
+    self->integral = pm_gain_add(self->integral, e, c->ki);
+    pm_pi_follow(self, c, excess);
 }
 
 #endif

@@ -4,8 +4,8 @@
  *   kp = 2 zeta w_n T_s, ki = w_n^2 T_s (per-unit of the base speed).
  * Error under an acceleration a: a / w_n^2. The angle is predicted first, corrected after the measurement:
  * pm_pll_predict() moves theta from k-1 to k; pm_pll_correct() uses eps(k).
- * Ranges: |eps| <= pi, omega_limit <= 4, kp < 0.5, |omega| k_theta below half a turn per step; the speed
- * saturates at the limit. Angle steps are rounded to 2^-30 turn, the speed to 2^-28; an error below 2^-29
+ * Ranges: |eps| <= pi, kp < 0.5, |omega| k_theta below half a turn per step; the speed saturates at -2 and
+ * 2 - 2^-28. Angle steps are rounded to 2^-30 turn, the speed to 2^-28; an error below 2^-29
  * / ki does not move the speed.
  * Cost: docs/decisions/001-signal-format.md. Tests: tests/unit/math/pll_test.cpp. */
 #ifndef PM_MATH_PLL_H
@@ -14,10 +14,9 @@
 #include "firmware/math/fixed.h"
 
 typedef struct {
-    pm_frac_t kp;       /* Q32, 2 zeta w_n T_s */
-    pm_frac_t ki;       /* Q32, w_n^2 T_s / w_base */
-    int32_t k_theta;    /* Q30, turns x 16 per step at base speed: pm_omega_to_angle() */
-    pm_q_t omega_limit; /* per-unit */
+    pm_frac_t kp_turn; /* Q32, 2 zeta w_n T_s 4 / (2 pi): quarters of 2^32 per radian in Q28 */
+    pm_frac_t ki;      /* Q32, w_n^2 T_s / w_base */
+    int32_t k_theta;   /* Q30, turns x 16 per step at base speed: pm_omega_to_angle() */
 } pm_pll_config_t;
 
 typedef struct {
@@ -38,8 +37,8 @@ static inline void pm_pll_predict(pm_pll_t *self, const pm_pll_config_t *c)
 
 static inline void pm_pll_correct(pm_pll_t *self, const pm_pll_config_t *c, pm_q_t eps)
 {
-    self->theta += (pm_angle_t)pm_rad_to_angle(pm_frac(eps, c->kp));
-    self->omega = pm_clamp(pm_frac_add(self->omega, eps, c->ki), -c->omega_limit, c->omega_limit);
+    self->theta += (pm_angle_t)pm_shl(pm_frac(eps, c->kp_turn), 2);
+    self->omega = pm_sat(pm_frac_add(self->omega, eps, c->ki), PM_Q_BITS + 1);
 }
 
 #endif

@@ -8,9 +8,9 @@
  *   division.
  * pm_ratio(num, den): num / den in Q31 for 0 <= num <= den, den > 0; error -2^-16 ... 2^-15. One 32-bit
  *   division.
- * pm_counts_per_unit(counts, v): 16 counts / v, cut to an integer, so that pm_mulh(x, .) gives counts for
- *   a voltage x; 0 <= counts < 2^15, v >= 1/16; relative error <= (v + 1 / v) 2^-16 before the cut. One
- *   32-bit division.
+ * pm_counts_per_unit(counts, v): 16 counts / v, so that pm_mulh(x, .) gives counts for a voltage x;
+ *   v >= 1/16, of which 16 bits count; relative error <= (v + 1 / v) 2^-16, or one below the exact value when
+ *   that is more. One 32-bit division. pm_counts_make() prepares the dividend; 0 < counts < 2^15.
  * Cost: docs/decisions/001-signal-format.md. Tests: tests/unit/math/root_test.cpp. */
 #ifndef PM_MATH_ROOT_H
 #define PM_MATH_ROOT_H
@@ -30,10 +30,24 @@ pm_unit_t pm_ratio(pm_q_t num, pm_q_t den);
 }
 #endif
 
-static inline int32_t pm_counts_per_unit(int32_t counts, pm_q_t v)
+typedef struct {
+    uint32_t dividend; /* counts, lifted as far as 32 bits and the quotient allow */
+    uint32_t lift;     /* what the quotient lacks, bits */
+} pm_counts_t;
+
+static inline pm_counts_t pm_counts_make(uint32_t counts)
 {
-    const uint32_t recip = UINT32_MAX / ((uint32_t)v >> 12); /* 2^16 / v */
-    return (int32_t)(((uint64_t)recip * (uint32_t)counts) >> 12);
+    const uint32_t free = (uint32_t)__builtin_clz(counts | 1U);
+    const uint32_t lift = free < 20U ? 20U - free : 0U;
+    pm_counts_t r;
+    r.dividend = counts << (20U - lift);
+    r.lift = lift;
+    return r;
+}
+
+static inline int32_t pm_counts_per_unit(pm_counts_t counts, pm_q_t v)
+{
+    return (int32_t)((counts.dividend / ((uint32_t)v >> 12)) << counts.lift);
 }
 
 #endif

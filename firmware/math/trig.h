@@ -10,13 +10,13 @@
 #ifndef PM_MATH_TRIG_H
 #define PM_MATH_TRIG_H
 
-#include "firmware/math/frames.h"
+#include "firmware/math/pair.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-extern const pm_dir_t pm_dir_table[128]; /* trig_table.c, made by tools/gen_trig_table.py */
+extern const pm_pair_t pm_dir_table[128]; /* cosine, sine; trig_table.c, made by tools/gen_trig_table.py */
 
 pm_angle_t pm_atan2(int32_t y, int32_t x);
 
@@ -26,15 +26,15 @@ pm_angle_t pm_atan2(int32_t y, int32_t x);
 
 static inline pm_dir_t pm_dir(pm_angle_t angle)
 {
-    const pm_dir_t near = pm_dir_table[(angle + (1U << 24)) >> 25];
+    const pm_pair_t near = pm_pair_of(pm_dir_table, (angle + (1U << 24)) >> 25); /* cosine, sine */
     /* The low 25 bits, signed, are the rest. 2 pi / 128 (1 - (pi / 128)^2 / 8) in Q32. */
     const int32_t rest = pm_mulh((int32_t)(angle << 7), 210812839);
     const int32_t half = rest >> 1;
-    const int32_t s_mid = pm_mulh_add(near.sin, near.cos, half);
-    const int32_t c_mid = pm_mulh_sub(near.cos, near.sin, half);
+    const int32_t s_mid = pm_mulh_add(near.second, near.first, half);
+    const int32_t c_mid = pm_mulh_sub(near.first, near.second, half);
     pm_dir_t r;
-    r.cos = pm_mulh_sub(near.cos, s_mid, rest);
-    r.sin = pm_mulh_add(near.sin, c_mid, rest);
+    r.cos = pm_mulh_sub(near.first, s_mid, rest);
+    r.sin = pm_mulh_add(near.second, c_mid, rest);
     return r;
 }
 

@@ -2,7 +2,7 @@
 #include "firmware/math/trig.h"
 
 /* clang-format off */
-const pm_dir_t pm_dir_table[128] = {
+const pm_pair_t pm_dir_table[128] = {
     {2147483647, 0},
     {2144896910, 105372028},
     {2137142927, 210490206},

@@ -13,9 +13,14 @@
 #define CCM_BASE    0x10000000u
 #define CCM_SIZE    0x2800u
 #define CCM_ALIAS   0x20005800u
+#define SYSTEM_BASE 0x1FFF7400u /* of it, the unique identifier alone has its contents */
+#define SYSTEM_SIZE 0x400u
+#define UNIQUE_ID   0x1FFF7590u
 #define ERASED      0xFF
 #define PAINT       0xC5
 #define BOOT_STEP_S 50e-6
+
+static const uint32_t unique_id[3] = {0x00280043u, 0x594E5004u, 0x20373358u};
 
 struct board {
     cpu_t *cpu;
@@ -34,6 +39,7 @@ static void add_memories(cpu_t *cpu)
         {"SRAM", RAM_BASE, RAM_SIZE, true, true, 0u},
         {"CCM", CCM_BASE, CCM_SIZE, true, true, 0u},
         {"CCM behind SRAM", CCM_ALIAS, CCM_SIZE, true, true, CCM_BASE},
+        {"system memory", SYSTEM_BASE, SYSTEM_SIZE, false, false, 0u},
     };
     for (size_t n = 0; n < sizeof memories / sizeof *memories; n++) {
         cpu_add_memory(cpu, &memories[n]);
@@ -41,6 +47,8 @@ static void add_memories(cpu_t *cpu)
     memset(cpu_memory(cpu, FLASH_BASE, FLASH_SIZE), ERASED, FLASH_SIZE);
     memset(cpu_memory(cpu, RAM_BASE, RAM_SIZE), PAINT, RAM_SIZE);
     memset(cpu_memory(cpu, CCM_BASE, CCM_SIZE), PAINT, CCM_SIZE);
+    memset(cpu_memory(cpu, SYSTEM_BASE, SYSTEM_SIZE), ERASED, SYSTEM_SIZE);
+    memcpy(cpu_memory(cpu, UNIQUE_ID, sizeof unique_id), unique_id, sizeof unique_id);
 }
 
 static bool load(void *context, uint32_t address, const uint8_t *data, uint32_t size)
@@ -68,6 +76,7 @@ board_t *board_create(const char *elf_path, plant_t *plant, char *error, size_t 
         return NULL;
     }
     add_memories(board->cpu);
+    cpu_set_symbols(board->cpu, board->image);
     board_chip_init(&board->chip, board->cpu, plant);
     if (!elf_image_load(board->image, board->cpu, load)) {
         snprintf(error, error_size, "%s: a part of it is not for this processor's flash", elf_path);
@@ -75,7 +84,7 @@ board_t *board_create(const char *elf_path, plant_t *plant, char *error, size_t 
         return NULL;
     }
     elf_symbol_t low, top;
-    if (elf_image_find(board->image, "port_stack_low", &low) &&
+    if (elf_image_find(board->image, "port_stack_bottom", &low) &&
         elf_image_find(board->image, "port_stack_top", &top)) {
         board->stack_low = low.address;
         board->stack_top = top.address;
@@ -109,6 +118,9 @@ static void reset(board_t *board, uint32_t cause)
 static void reset_if_asked(board_t *board)
 {
     uint32_t cause = cpu_reset_asked(board->cpu) ? RCC_SOFTWARE_RESET : 0u;
+    if (cpu_locked_up(board->cpu)) {
+        cause = RCC_WATCHDOG_RESET; /* that is what ends it, some ms later */
+    }
     cause |= board->chip.iwdg.expired ? RCC_WATCHDOG_RESET : 0u;
     cause = board->chip.flash.cut ? RCC_POWER_RESET : cause;
     if (cause != 0u) {
@@ -179,12 +191,12 @@ bool board_run_period(board_t *board)
         if (updated && (follows || chip->wiring.in_step)) {
             finish_period(board, at);
             chip->wiring.in_step = follows;
-            return !cpu_error(board->cpu);
+            return cpu_error(board->cpu)[0] == '\0';
         }
         if (!chip->wiring.in_step &&
             board_within_s(chip, cpu_now(board->cpu)) * plant_inverter(board->plant)->f_pwm_Hz >= 1.0) {
             finish_period(board, cpu_now(board->cpu));
-            return !cpu_error(board->cpu);
+            return cpu_error(board->cpu)[0] == '\0';
         }
     }
 }
@@ -230,7 +242,7 @@ bool board_bridge_on(const board_t *board)
 void *board_variable(board_t *board, const char *name, size_t size)
 {
     elf_symbol_t symbol;
-    bool found = elf_image_find(board->image, name, &symbol) && symbol.size == size;
+    bool found = elf_image_find(board->image, name, &symbol) && symbol.size >= size;
     return found ? cpu_memory(board->cpu, symbol.address, symbol.size) : NULL;
 }
 

@@ -44,7 +44,7 @@ double board_period_s(const board_t *board);   /* of the carrier */
 uint32_t board_resets(const board_t *board);   /* since board_boot() */
 bool board_bridge_on(const board_t *board);    /* TIM1's main output enable, and any leg driven */
 
-/* A variable of the image by its name; NULL when there is none or its size differs. */
+/* The first bytes of a variable of the image; NULL when there is none of that name, or it is smaller. */
 void *board_variable(board_t *board, const char *name, size_t size);
 
 /* Flash pages as the debugger sees them: for parameters that are there before the first boot. */

@@ -56,7 +56,6 @@ static void add_devices(board_chip_t *chip)
     add(chip, usart_device(&chip->usart), RCC_APB1ENR1, 0x20000u);
     add(chip, board_misc_syscfg(&chip->misc), RCC_APB2ENR, 0x1u);
     add(chip, board_misc_debug(&chip->misc), 0u, 0u);
-    add(chip, board_misc_identity(&chip->misc), 0u, 0u);
 }
 
 void board_chip_init(board_chip_t *chip, cpu_t *cpu, plant_t *plant)

@@ -8,17 +8,11 @@ static const board_register_t debug_list[] = {
     {DBGMCU_APB1FZR1, "APB1FZR1", 0, FREEZE_IWDG, 0},
     {DBGMCU_APB2FZR, "APB2FZR", 0, FREEZE_TIM1, 0},
 };
-static const board_register_t identity_list[] = {
-    {0x0, "UID0", 0x00280043u, 0, 0},
-    {0x4, "UID1", 0x594E5004u, 0, 0},
-    {0x8, "UID2", 0x20373358u, 0, 0},
-};
 
 void board_misc_init(board_misc_t *misc, cpu_t *cpu)
 {
     board_registers_init(&misc->syscfg, cpu, "SYSCFG", syscfg_list, 1);
     board_registers_init(&misc->debug, cpu, "DBGMCU", debug_list, 2);
-    board_registers_init(&misc->identity, cpu, "UID", identity_list, 3);
 }
 
 /* DBGMCU keeps its bits but for a power-on reset. */
@@ -55,9 +49,4 @@ cpu_device_t board_misc_syscfg(board_misc_t *misc)
 cpu_device_t board_misc_debug(board_misc_t *misc)
 {
     return (cpu_device_t){"DBGMCU", 0xE0042000u, 0x400u, &misc->debug, read_any, write_any};
-}
-
-cpu_device_t board_misc_identity(board_misc_t *misc)
-{
-    return (cpu_device_t){"UID", 0x1FFF7590u, 0xCu, &misc->identity, read_any, write_any};
 }

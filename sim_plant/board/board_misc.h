@@ -1,4 +1,4 @@
-/* Small things: SYSCFG's break sources, the debugger's freeze bits, the unique identifier. RM0440 10, 47, 48.
+/* Small things: SYSCFG's break sources and the debugger's freeze bits. RM0440 10, 47.
  */
 #ifndef BOARD_MISC_H
 #define BOARD_MISC_H
@@ -6,14 +6,13 @@
 #include "sim_plant/board/board_registers.h"
 
 typedef struct {
-    board_registers_t syscfg, debug, identity;
+    board_registers_t syscfg, debug;
 } board_misc_t;
 
 void board_misc_init(board_misc_t *misc, cpu_t *cpu);
 void board_misc_reset(board_misc_t *misc);
 cpu_device_t board_misc_syscfg(board_misc_t *misc);
 cpu_device_t board_misc_debug(board_misc_t *misc);
-cpu_device_t board_misc_identity(board_misc_t *misc);
 
 /* What stops when the debugger halts the processor. */
 bool board_misc_freezes_iwdg(const board_misc_t *misc);

@@ -10,7 +10,7 @@
 #include "sim_plant/board/exceptions.h"
 
 /* Numbers of unicorn's interrupt hook */
-enum { UNICORN_SVC = 2, UNICORN_BKPT = 7, UNICORN_EXCEPTION_EXIT = 8 };
+enum { UNICORN_SVC = 2, UNICORN_PREFETCH_ABORT = 3, UNICORN_BKPT = 7, UNICORN_EXCEPTION_EXIT = 8 };
 
 #define NOWHERE UINT64_C(0xFFFFFFFE) /* an address that is never executed: runs end by stopping */
 
@@ -199,10 +199,9 @@ static void serve_attention(cpu_t *cpu, cpu_block_t *block)
 {
     if (block->cost.divisions > 0 && hook_divisions(cpu, block, true)) {
         (void)hook_divisions(cpu, block, false);
-        (void)uc_ctl_flush_tlb(cpu->uc); /* of translated blocks, in spite of its name */
+        cpu_retranslate(cpu, block->address, block->size);
     } else if (!mpu_allows(&cpu->mpu, block->address, MPU_EXECUTE, cpu_is_urgent(cpu))) {
-        cpu->system.cfsr |= CFSR_IACCVIOL;
-        exceptions_raise(cpu, EXCEPTION_MEM_MANAGE);
+        cpu_take_fetch_fault(cpu, true);
     } else if (block->cost.floating && (cpu->system.cpacr & FPU_ENABLED) != FPU_ENABLED) {
         exceptions_raise_usage(cpu, CFSR_NOCP);
     }
@@ -268,7 +267,7 @@ static void on_interrupt(uc_engine *uc, uint32_t number, void *user)
 static uint64_t window_read(cpu_t *cpu, uint32_t address, unsigned size)
 {
     uint32_t value = 0;
-    if (cpu->failed) {
+    if (cpu->failed || cpu->fault.pending) {
         return 0;
     }
     const bus_answer_t answer = bus_read(&cpu->bus, address, size, &value);
@@ -284,7 +283,7 @@ static uint64_t window_read(cpu_t *cpu, uint32_t address, unsigned size)
 
 static void window_write(cpu_t *cpu, uint32_t address, unsigned size, uint32_t value)
 {
-    if (cpu->failed) {
+    if (cpu->failed || cpu->fault.pending) {
         return;
     }
     const bus_answer_t answer = bus_write(&cpu->bus, address, size, value);
@@ -344,13 +343,15 @@ static void take_interrupt(cpu_t *cpu)
     case UNICORN_SVC:
         exceptions_raise(cpu, EXCEPTION_SVC);
         break;
+    case UNICORN_PREFETCH_ABORT: /* the architecture's own rules; fetches from nowhere come as errors */
+        cpu_take_fetch_fault(cpu, true);
+        break;
     case UNICORN_BKPT:
         take_breakpoint(cpu);
         break;
     case UNICORN_EXCEPTION_EXIT:
         if ((cpu_get(cpu, UC_ARM_REG_XPSR) & 0x1FFU) == 0) { /* in thread mode it is but an address */
-            cpu->system.cfsr |= CFSR_IACCVIOL;
-            exceptions_raise(cpu, EXCEPTION_MEM_MANAGE);
+            cpu_take_fetch_fault(cpu, true);
         } else {
             exceptions_return(cpu, cpu_get(cpu, UC_ARM_REG_PC) | 1U);
         }
@@ -408,7 +409,9 @@ static void watch_alignment(cpu_t *cpu)
     } else {
         (void)uc_hook_del(cpu->uc, cpu->alignment_hook);
     }
-    (void)uc_ctl_flush_tlb(cpu->uc);
+    for (unsigned i = 0; i < cpu->regions; i++) { /* so that the hook gets into the translated code */
+        cpu_retranslate(cpu, cpu->region[i].is.base, cpu->region[i].is.size);
+    }
 }
 
 /* What was asked for from within a block. */
@@ -421,6 +424,9 @@ static void settle(cpu_t *cpu)
     if (cpu->remap) {
         watch_alignment(cpu);
         cpu_map_all(cpu);
+    }
+    if (cpu->close_again) {
+        cpu_close_again(cpu);
     }
 }
 
@@ -552,6 +558,7 @@ void cpu_reset(cpu_t *cpu, uint32_t vector_table)
     cpu->error[0] = 0;
     cpu->block = NULL;
     cpu->flash_writes = 0;
+    cpu->fault.pending = cpu->fault.unaligned = false;
     cpu->wait_until = 0;
     while (cpu->frames > 0) {
         cpu_stats_leave(cpu, cpu->frame[cpu->frames - 1].exception);

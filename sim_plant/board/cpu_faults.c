@@ -53,12 +53,21 @@ uint32_t cpu_access_pc(cpu_t *cpu, uint32_t address, bool write, uint32_t *it)
     return block->address;
 }
 
-static void give_fault(cpu_t *cpu, uint32_t address, bool write, bool fetch, bool protection)
+/* Within an IT block unicorn 2.0.1 goes on behind a store that failed, up to the next store: registers are put
+ * back and devices do not hear of it (fault.pending), but one store to memory can slip through. */
+static void give_fault(cpu_t *cpu, uint32_t address, bool write, bool protection)
 {
+    if (cpu->fault.pending) {
+        return; /* the first one counts */
+    }
+    uint32_t registers[16];
+    cpu_get_core(cpu, registers);
+    memcpy(cpu->fault.registers, registers, sizeof cpu->fault.registers);
+    cpu->fault.xpsr = cpu_get(cpu, UC_ARM_REG_XPSR);
     cpu->fault.address = address;
     cpu->fault.write = write;
-    cpu->fault.fetch = fetch;
     cpu->fault.protection = protection;
+    cpu->fault.pending = true;
 }
 
 static bool to_flash(cpu_t *cpu, uint32_t address, unsigned size, uint32_t value)
@@ -66,7 +75,7 @@ static bool to_flash(cpu_t *cpu, uint32_t address, unsigned size, uint32_t value
     const cpu_device_t *device = bus_find(&cpu->bus, address);
     uint8_t *place = cpu_memory(cpu, address, size);
     if (device == NULL || place == NULL) {
-        give_fault(cpu, address, true, false, false);
+        give_fault(cpu, address, true, false);
         return false;
     }
     if (cpu->flash_writes == CPU_FLASH_WRITES) {
@@ -95,30 +104,33 @@ bool cpu_on_bad_memory(uc_engine *uc, uc_mem_type type, uint64_t where, int size
     cpu_t *cpu = user;
     const uint32_t address = (uint32_t)where;
     if (type == UC_MEM_FETCH_UNMAPPED || type == UC_MEM_FETCH_PROT) {
-        give_fault(cpu, address, false, true,
+        give_fault(cpu, address, false,
                    !mpu_allows(&cpu->mpu, address, MPU_EXECUTE, cpu_is_urgent(cpu)));
         return false;
     }
     const bool write = type == UC_MEM_WRITE_UNMAPPED || type == UC_MEM_WRITE_PROT;
-    if (cpu->fault.unaligned) {
+    if (cpu->fault.pending) {
         return false;
     }
     if (!mpu_allows(&cpu->mpu, address, write ? MPU_WRITE : MPU_READ, cpu_is_urgent(cpu))) {
-        give_fault(cpu, address, write, false, true);
+        give_fault(cpu, address, write, true);
         return false;
     }
     const cpu_region_t *region = cpu_region_of(cpu, address);
     if (region == NULL) {
-        give_fault(cpu, address, write, false, false);
+        give_fault(cpu, address, write, false);
         return false;
     }
-    wait_for(cpu, region->original->stalled_until);
+    if (region->original->stalled_until != 0) {
+        wait_for(cpu, region->original->stalled_until);
+        cpu->remap = true; /* open from now on */
+    }
     if (write && !region->is.writable) {
         return to_flash(cpu, address, (unsigned)size, (uint32_t)value);
     }
-    /* Allowed after all: unicorn's finest grain is a page. It may now remember a read as allowed everywhere
-     * in the page: mapping anew makes it forget. */
-    cpu->remap = true;
+    /* Allowed after all: unicorn's finest grain is a page. It now takes reads as allowed everywhere in it, until
+     * the end of the block. */
+    cpu->close_again = true;
     cpu->want_stop = true;
     return true;
 }
@@ -129,12 +141,12 @@ void cpu_on_any_memory(uc_engine *uc, uc_mem_type type, uint64_t where, int size
     (void)value;
     cpu_t *cpu = user;
     const uint32_t address = (uint32_t)where;
-    if (address % (uint32_t)size == 0) {
+    if (address % (uint32_t)size == 0 || cpu->fault.pending) {
         return;
     }
     cpu_region_t *region = cpu_region_of(cpu, address);
     if (region != NULL) {
-        give_fault(cpu, address, type == UC_MEM_WRITE, false, false);
+        give_fault(cpu, address, type == UC_MEM_WRITE, false);
         cpu->fault.unaligned = true;
         cpu->remap = true;
         (void)uc_mem_protect(uc, address & ~(uint64_t)(CPU_PAGE - 1), CPU_PAGE, UC_PROT_NONE);
@@ -159,9 +171,13 @@ static void take_back_after(cpu_t *cpu, uint32_t pc)
 static void data_fault(cpu_t *cpu)
 {
     uint32_t it;
+    for (int i = 0; i < 15; i++) {
+        cpu_set_register(cpu, i, cpu->fault.registers[i]);
+    }
+    cpu->fault.pending = false;
     const uint32_t pc = cpu_access_pc(cpu, cpu->fault.address, cpu->fault.write, &it);
     take_back_after(cpu, pc);
-    const uint32_t xpsr = cpu_get(cpu, UC_ARM_REG_XPSR) & ~UINT32_C(0x0600FC00);
+    const uint32_t xpsr = cpu->fault.xpsr & ~UINT32_C(0x0600FC00);
     cpu_set(cpu, UC_ARM_REG_XPSR, xpsr | (it & 3U) << 25 | (it & 0xFCU) << 8);
     cpu_set(cpu, UC_ARM_REG_PC, pc | 1U);
     if (cpu->fault.unaligned) {
@@ -178,7 +194,7 @@ static void data_fault(cpu_t *cpu)
     }
 }
 
-static void fetch_fault(cpu_t *cpu, bool protection)
+void cpu_take_fetch_fault(cpu_t *cpu, bool protection)
 {
     cpu->system.cfsr |= protection ? CFSR_IACCVIOL : CFSR_IBUSERR;
     exceptions_raise(cpu, protection ? EXCEPTION_MEM_MANAGE : EXCEPTION_BUS_FAULT);
@@ -220,7 +236,8 @@ void cpu_take_error(cpu_t *cpu, uc_err error)
         break;
     case UC_ERR_FETCH_UNMAPPED:
     case UC_ERR_FETCH_PROT:
-        fetch_fault(cpu, cpu->fault.protection);
+        cpu->fault.pending = false;
+        cpu_take_fetch_fault(cpu, cpu->fault.protection);
         break;
     case UC_ERR_INSN_INVALID:
         invalid_instruction(cpu);

@@ -102,6 +102,23 @@ void cpu_map(cpu_t *cpu, cpu_region_t *region)
     *region = fresh;
 }
 
+/* Mapping anew makes unicorn forget which pages it has found open. */
+void cpu_close_again(cpu_t *cpu)
+{
+    for (unsigned i = 0; i < cpu->regions; i++) {
+        const cpu_region_t *region = &cpu->region[i];
+        for (unsigned k = 0; k < region->runs; k++) {
+            if ((region->run[k].permissions & UC_PROT_READ) == 0) {
+                (void)uc_mem_unmap(cpu->uc, region->run[k].base, region->run[k].size);
+                (void)uc_mem_map_ptr(cpu->uc, region->run[k].base, region->run[k].size,
+                                     region->run[k].permissions,
+                                     region->host + (region->run[k].base - region->is.base));
+            }
+        }
+    }
+    cpu->close_again = false;
+}
+
 void cpu_map_all(cpu_t *cpu)
 {
     for (unsigned i = 0; i < cpu->regions; i++) {
@@ -159,17 +176,23 @@ void cpu_set_wait_states(cpu_t *cpu, uint32_t base, unsigned wait_states)
     }
 }
 
+void cpu_retranslate(cpu_t *cpu, uint32_t address, uint32_t size)
+{
+    (void)uc_ctl_remove_cache(cpu->uc, (uint64_t)address, (uint64_t)address + size);
+}
+
 void cpu_code_changed(cpu_t *cpu, uint32_t address, uint32_t size)
 {
     cpu_region_t *changed = cpu_region_of(cpu, address);
     for (unsigned i = 0; changed != NULL && i < cpu->regions; i++) {
         cpu_region_t *region = &cpu->region[i];
         if (region->original == changed->original) {
-            cpu_forget_blocks(cpu, region->is.base + (address - changed->is.base), size);
+            const uint32_t there = region->is.base + (address - changed->is.base);
+            cpu_forget_blocks(cpu, there, size);
+            cpu_retranslate(cpu, there, size);
             cycles_flash_reset(&region->fetch, region->fetch.wait_states);
         }
     }
-    (void)uc_ctl_flush_tlb(cpu->uc); /* of translated blocks, in spite of its name */
 }
 
 void cpu_stall(cpu_t *cpu, uint32_t base, uint64_t until_cycle)

@@ -81,7 +81,8 @@ struct cpu {
     uint32_t division_pc;
 
     bool failed, reset_asked, locked_up, halted, sleeping, sleeping_for_event, event;
-    bool remap; /* access rights have changed */
+    bool remap;       /* access rights have changed */
+    bool close_again; /* a read was allowed in a page that is not all open */
     char error[256];
 
     cpu_block_t *block; /* present or last */
@@ -92,8 +93,11 @@ struct cpu {
 
     struct {
         uint32_t address;
-        bool write, fetch, protection, unaligned;
-    } fault; /* the access that ended the run of unicorn */
+        bool write, protection, unaligned;
+        bool pending;           /* what unicorn still executes is not to happen */
+        uint32_t registers[15]; /* as they were */
+        uint32_t xpsr;
+    } fault; /* the access that ends the run of unicorn */
     cpu_flash_write_t flash_write[CPU_FLASH_WRITES];
     unsigned flash_writes;
     uc_hook alignment_hook;
@@ -132,8 +136,10 @@ bool cpu_load(cpu_t *cpu, uint32_t address, uint32_t *value); /* by the processo
 bool cpu_store(cpu_t *cpu, uint32_t address, uint32_t value);
 void cpu_map(cpu_t *cpu, cpu_region_t *region); /* as the MPU and stalls have it */
 void cpu_map_all(cpu_t *cpu);
+void cpu_close_again(cpu_t *cpu);
 void cpu_flush_flash_writes(cpu_t *cpu);
 void cpu_forget_blocks(cpu_t *cpu, uint32_t address, uint32_t size);
+void cpu_retranslate(cpu_t *cpu, uint32_t address, uint32_t size);
 void cpu_free_memory(cpu_t *cpu);
 
 /* cpu_block.c */
@@ -147,6 +153,7 @@ bool cpu_on_bad_memory(uc_engine *uc, uc_mem_type type, uint64_t address, int si
 void cpu_on_any_memory(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value,
                        void *user);
 void cpu_take_error(cpu_t *cpu, uc_err error);
+void cpu_take_fetch_fault(cpu_t *cpu, bool protection);
 uint32_t cpu_access_pc(cpu_t *cpu, uint32_t address, bool write, uint32_t *it);
 bool cpu_is_urgent(const cpu_t *cpu); /* in HardFault, NMI or with FAULTMASK */
 

@@ -125,6 +125,7 @@ static void write_cr(flash_t *flash, uint32_t before)
     uint32_t now = *cr;
     if ((before & LOCK) != 0u || busy(flash)) {
         cpu_fail(flash->chip->cpu, "FLASH_CR: write while %s", busy(flash) ? "busy" : "locked");
+        *cr = before;
         return;
     }
     if ((now & LOCK) != 0u) {

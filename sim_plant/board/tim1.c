@@ -142,6 +142,35 @@ static void trigger(void *owner, uint64_t cycle)
     plan_trigger(tim, cycle);
 }
 
+static void check_carrier(const tim1_t *tim)
+{
+    const plant_inverter_t *inverter = plant_inverter(tim->chip->plant);
+    if (!tim1_follows_plant(tim) || tim->reload != inverter->timer_counts) {
+        cpu_fail(
+            tim->chip->cpu,
+            "TIM1 is armed with ARR %u, RCR %u and update events at %s: the plant wants %.6g Hz of %u counts "
+            "and overflows",
+            (unsigned)tim->reload, (unsigned)tim->regs.value[TIM1_RCR / 4],
+            tim->top ? "overflows" : "underflows", inverter->f_pwm_Hz, (unsigned)inverter->timer_counts);
+    }
+}
+
+/* What the plant has to follow, on every rise of the main output; the carrier from the first update event on.
+ */
+static void check_arming(const tim1_t *tim)
+{
+    const plant_inverter_t *inverter = plant_inverter(tim->chip->plant);
+    double step_s = 0.0;
+    double dead_s = tim1_dead_time_s(tim, &step_s);
+    if (fabs(dead_s - inverter->dead_time_s) > 1.001 * step_s) {
+        cpu_fail(tim->chip->cpu, "TIM1_BDTR: dead time %.1f ns, the plant's is %.1f ns", 1e9 * dead_s,
+                 1e9 * inverter->dead_time_s);
+    }
+    if (tim->updates > 0u) {
+        check_carrier(tim);
+    }
+}
+
 static void load(tim1_t *tim)
 {
     tim->reload = tim->regs.value[TIM1_ARR / 4];
@@ -166,6 +195,9 @@ void tim1_update(tim1_t *tim)
     if (changed) {
         plan_trigger(tim, tim->extreme);
     }
+    if (tim->updates++ == 0u && tim1_main_output(tim)) {
+        check_carrier(tim);
+    }
 }
 
 static void check_leg(const tim1_t *tim, int leg)
@@ -180,30 +212,6 @@ static void check_leg(const tim1_t *tim, int leg)
     }
     if (mode(tim, leg) != PWM_1 || !preloaded(tim, leg)) {
         cpu_fail(cpu, "TIM1: channel %d is driven in a mode other than PWM 1 with preload", leg + 1);
-    }
-}
-
-/* What the plant has to follow, on every rise of the main output. */
-static void check_arming(const tim1_t *tim)
-{
-    cpu_t *cpu = tim->chip->cpu;
-    const plant_inverter_t *inverter = plant_inverter(tim->chip->plant);
-    double step_s = 0.0;
-    double dead_s = tim1_dead_time_s(tim, &step_s);
-    if (fabs(dead_s - inverter->dead_time_s) > 1.001 * step_s) {
-        cpu_fail(cpu, "TIM1_BDTR: dead time %.1f ns, the plant's is %.1f ns", 1e9 * dead_s,
-                 1e9 * inverter->dead_time_s);
-    }
-    if (tim->counting && !tim1_follows_plant(tim)) {
-        cpu_fail(cpu,
-                 "TIM1 is armed with %u counts, RCR %u and update events at %s: the plant wants %.6g Hz from "
-                 "overflows",
-                 (unsigned)tim->reload, (unsigned)tim->regs.value[TIM1_RCR / 4],
-                 tim->top ? "overflows" : "underflows", inverter->f_pwm_Hz);
-    }
-    if (tim->reload != inverter->timer_counts) {
-        cpu_fail(cpu, "TIM1_ARR is %u, the plant's timer_counts are %u", (unsigned)tim->reload,
-                 (unsigned)inverter->timer_counts);
     }
 }
 
@@ -248,6 +256,7 @@ static void start(tim1_t *tim)
     }
     tim->counting = true;
     tim->top = false;
+    tim->updates = 0u;
     tim->extreme = cpu_now(cpu);
     tim->update = tim->extreme + (tim->repetitions + 1u) * (uint64_t)tim->reload;
     plan_trigger(tim, tim->extreme);

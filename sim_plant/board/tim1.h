@@ -23,6 +23,7 @@ typedef struct {
     bool top;         /* the last update event was at the overflow ... */
     uint64_t extreme; /* ... at this cycle; before the first one: start at the underflow */
     uint64_t update;  /* next event */
+    uint64_t updates; /* since the start */
     bool armed_before;
 } tim1_t;
 

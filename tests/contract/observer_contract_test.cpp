@@ -91,7 +91,8 @@ class PulsatingSquare : public Source
     }
     void reset(const obs_in_t &in) override
     {
-        pulsating_square_reset(&state_, in.i);
+        pulsating_square_reset(&state_, &config_, in.i);
+        pulsating_square_slow(&state_, &config_, &in);
     }
     obs_out_t step(const obs_in_t &in) override
     {

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Count executed Cortex-M4 instructions per call of a function, under qemu-system-arm.
+"""Count executed instructions per call of a function, under QEMU: Cortex-M4, and what else machine.py knows.
 
 The counts are exact and the same on every run: a call costs what its executed instructions are, from the
 first of the function to its return, with everything it calls. See README.md in this folder.
@@ -14,44 +14,41 @@ import sys
 import tempfile
 from pathlib import Path
 
+from machine import machine_of, run
+
 HERE = Path(__file__).resolve().parent
-CALL = re.compile(r"blx?(eq|ne|cs|hs|cc|lo|mi|pl|vs|vc|hi|ls|ge|lt|gt|le|al)?$")
-INSTRUCTION = re.compile(r"\s*([0-9a-f]+):\t((?:[0-9a-f]{4,8} ?)+)\s*\t(\S+)")
+INSTRUCTION = re.compile(r"\s*([0-9a-f]+):\t((?:[0-9a-f]{4,8} ?)+)\s*\t(.+)")
 
 
-def run(command):
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
-
-
-def functions_of(elf):
+def functions_of(elf, machine):
     """Address -> name of every function; of aliases the first by name."""
     found = {}
-    for line in sorted(run(["arm-none-eabi-nm", elf]).splitlines(), key=lambda text: text.split()[-1]):
+    for line in sorted(run(machine.prefix + "nm", elf).splitlines(), key=lambda text: text.split()[-1]):
         parts = line.split()
-        if len(parts) == 3 and parts[1] in "TtWw" and not parts[2].startswith("$"):
+        if len(parts) == 3 and parts[1] in "TtWw" and not parts[2].startswith(("$", ".")):
             found.setdefault(int(parts[0], 16) & ~1, parts[2])
     return found
 
 
-def return_addresses(elf):
+def return_addresses(elf, machine):
     """The instruction after every call instruction."""
     found = []
-    for line in run(["arm-none-eabi-objdump", "-d", elf]).splitlines():
+    for line in run(machine.prefix + "objdump", "-d", elf).splitlines():
         match = INSTRUCTION.match(line)
-        if match and CALL.match(re.sub(r"\.[nw]$", "", match.group(3))):
+        if match and machine.call.match(match.group(3)):
             size = len(match.group(2).replace(" ", "")) // 2
             found.append(int(match.group(1), 16) + size)
     return sorted(set(found))
 
 
-def plugin_api():
+def plugin_api(qemu):
     """QEMU refuses plugins of another API generation; which one a version wants is fixed."""
-    version = re.search(r"version (\d+)\.(\d+)", run(["qemu-system-arm", "--version"]))
+    version = re.search(r"version (\d+)\.(\d+)", run(qemu, "--version"))
     return 2 if int(version.group(1)) >= 9 else 1
 
 
-def build_plugin(folder):
-    api = plugin_api()
+def build_plugin(folder, qemu):
+    api = plugin_api(qemu)
     source = HERE / "plugin_calls.c"
     plugin = folder / f"plugin_calls_v{api}.so"
     if not plugin.exists() or plugin.stat().st_mtime < source.stat().st_mtime:
@@ -74,19 +71,20 @@ def select(functions, patterns):
     return chosen
 
 
-def execute(elf, chosen, functions, arguments, timeout, echo):
+def execute(elf, machine, chosen, functions, arguments, timeout, echo):
     with tempfile.TemporaryDirectory(prefix="pm_count") as temporary:
         map_file = Path(temporary) / "map"
         out_file = Path(temporary) / "out"
         lines = [f"f {a:x} {functions[a][:95]}" for a in sorted(functions)]
         lines += [f"m {a:x}" for a in chosen]
-        lines += [f"r {a:x}" for a in return_addresses(elf)]
+        lines += [f"r {a:x}" for a in return_addresses(elf, machine)]
         map_file.write_text("\n".join(lines) + "\n")
         semihosting = "enable=on,target=native" + "".join(
             ",arg=" + word.replace(",", ",,") for word in [Path(elf).name, *arguments])
-        command = ["qemu-system-arm", "-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", "none",
+        plugin = build_plugin(Path(elf).resolve().parent, machine.qemu[0])
+        command = [*machine.qemu, "-display", "none", "-monitor", "none", "-serial", "none",
                    "-semihosting-config", semihosting, "-kernel", str(elf),
-                   "-plugin", f"{build_plugin(Path(elf).resolve().parent)},map={map_file},out={out_file}"]
+                   "-plugin", f"{plugin},map={map_file},out={out_file}"]
         result = subprocess.run(command, stdin=subprocess.DEVNULL, timeout=timeout,
                                 stdout=None if echo else subprocess.DEVNULL)
         if result.returncode != 0:
@@ -125,26 +123,27 @@ def print_tables(table, profile, measured_calls):
                   f"{100 * row['instructions'] / total:>6.1f}%")
 
 
-def check_limits(table, limits):
+def check_limits(table, limits, what):
     good = True
     for text in limits:
         name, _, bound = text.partition("=")
-        worst = table[name]["max"] if name in table else None
-        held = worst is not None and worst <= int(bound)
-        print(f"{'PASS' if held else 'FAIL'} {name} {worst} {bound} instructions")
+        got = table[name][what] if name in table else None
+        held = got is not None and got <= float(bound)
+        print(f"{'PASS' if held else 'FAIL'} {name} {what} {got if got is None else round(got, 2)} {bound} instructions")
         good = good and held
     return good
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], 
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0],
                                      epilog="Words after -- are the arguments of the program's main(). "
-                                            "Exit status 1: a --limit is exceeded.")
+                                            "Exit status 1: a --limit or --mean is exceeded.")
     parser.add_argument("elf", help="program made with pm_target_program()")
     parser.add_argument("--function", action="append", required=True, metavar="NAME",
                         help="function to measure, may be a pattern like 'pm_*'; may be repeated")
     parser.add_argument("--profile", action="store_true", help="also show where the instructions went, by function")
     parser.add_argument("--limit", action="append", default=[], metavar="NAME=N", help="fail if a call takes more")
+    parser.add_argument("--mean", action="append", default=[], metavar="NAME=N", help="fail if calls take more on average")
     parser.add_argument("--skip", type=int, default=0, metavar="N", help="leave out the first N calls")
     parser.add_argument("--json", metavar="FILE", help="write the result, with every call's count; - is stdout")
     parser.add_argument("--timeout", type=float, default=300.0, metavar="S", help="give up after S seconds (300)")
@@ -154,9 +153,10 @@ def main():
         own = own[:own.index("--")]
     options = parser.parse_args(own)
 
-    functions = functions_of(options.elf)
+    machine = machine_of(options.elf)
+    functions = functions_of(options.elf, machine)
     chosen = select(functions, options.function)
-    lines = execute(options.elf, chosen, functions, arguments, options.timeout, options.json != "-")
+    lines = execute(options.elf, machine, chosen, functions, arguments, options.timeout, options.json != "-")
     table, profile = evaluate(lines, options.skip)
     if not table:
         sys.exit("count.py: none of the functions was called and returned")
@@ -169,7 +169,8 @@ def main():
     if options.json != "-":
         calls = sum(row["calls"] for row in table.values()) + options.skip
         print_tables(table, profile if options.profile else {}, calls)
-    if not check_limits(table, options.limit):
+    held = [check_limits(table, options.limit, "max"), check_limits(table, options.mean, "mean")]
+    if not all(held):
         sys.exit(1)
 
 

@@ -4,9 +4,10 @@ Usage: no_float.py LIBRARY_OBJECT_OR_IMAGE...   Prints member, function and what
 Also lists, as information, who divides 64-bit numbers: __aeabi_ldivmod takes hundreds of instructions.
 """
 import re
-import subprocess
 import sys
 from pathlib import Path
+
+from machine import machine_of, run
 
 # Run-time ABI for Arm 4.1: f* and d* are float and double, *2f and *2d make them; libgcc's own names follow GCC's
 # modes (sf, df, hf). libm's functions are floating point too.
@@ -18,15 +19,15 @@ HELPER = re.compile(
 DIVISION = re.compile(r"__aeabi_u?ldivmod$|__u?(?:div|mod|divmod)di[34]$")
 MEMBER = re.compile(r"(\S+):\s+file format")
 FUNCTION = re.compile(r"[0-9a-f]+ <(.+)>:$")
-RELOCATION = re.compile(r"\s+[0-9a-f]+: R_ARM_\S+\s+([\w.$]+)")
+RELOCATION = re.compile(r"\s+[0-9a-f]+: R_(?:ARM|RISCV)_\S+\s+([\w.$]+)")
 INSTRUCTION = re.compile(r"\s*[0-9a-f]+:\t(?:[0-9a-f]{4,8} ?)+\s*\t(\S+)")
 
 
 def findings(archive):
     """Yields (member, function, kind, what); kind is 'float', 'divides' or 'function' once for each function."""
-    listing = subprocess.run(["arm-none-eabi-objdump", "-dr", archive], check=True, capture_output=True, text=True)
+    machine = machine_of(archive)
     member = function = "?"
-    for line in listing.stdout.splitlines():
+    for line in run(machine.prefix + "objdump", "-dr", archive).splitlines():
         match = MEMBER.search(line)
         if match:
             member = Path(match.group(1)).name
@@ -47,8 +48,7 @@ def findings(archive):
                 yield member, function, "divides", name
             continue
         match = INSTRUCTION.match(line)
-        # In Thumb-2 of this core every mnemonic in v belongs to the FPU.
-        if match and match.group(1).startswith("v"):
+        if match and machine.fpu.match(match.group(1)):
             yield member, function, "float", match.group(1)
 
 

@@ -1,11 +1,19 @@
 #include <cstdio>
+#include <fstream>
+#include <memory>
 
 #include <CLI/CLI.hpp>
 
 #include "tools/pmsim/commands.h"
 #include "tools/pmsim/drive_parameters.h"
+#include "tools/pmsim/machine_file.h"
 #include "tools/pmsim/metrics.h"
+#include "tools/pmsim/settings_option.h"
 #include "tools/pmsim/text.h"
+
+extern "C" {
+#include "tools/pmsim/parameter_page.h"
+}
 
 namespace pmsim
 {
@@ -22,6 +30,37 @@ static void print_parameters()
     }
 }
 
+namespace
+{
+
+struct PageOptions {
+    std::string machine, page;
+    std::vector<std::string> settings;
+};
+
+// The page of the parameter store that a board finds at its next start.
+void write_page(const PageOptions &options)
+{
+    const Setup setup = load_plant_file(options.machine, parse_settings(options.settings)).setup;
+    require_drive(setup);
+    uint32_t words[STORE_WORDS];
+    const char *refused = nullptr;
+    const char *reason = nullptr;
+    const uint32_t used = parameter_page(&setup.params, words, &refused, &reason);
+    if (used == 0) {
+        throw InputError(options.machine + ": drive refuses parameter " + refused + ": " + reason);
+    }
+    std::ofstream file(options.page, std::ios::binary);
+    file.write(reinterpret_cast<const char *>(words), std::streamsize(used * sizeof words[0]));
+    if (!file.flush()) {
+        throw InputError(options.page + ": cannot be written");
+    }
+    std::printf("%s: %u bytes, %s\n", options.page.c_str(), unsigned(used * sizeof words[0]),
+                setup.name.c_str());
+}
+
+} // namespace
+
 static void print_metrics()
 {
     for (const MetricInfo &info : metric_infos()) {
@@ -31,9 +70,26 @@ static void print_metrics()
 
 void add_params_command(CLI::App &app)
 {
-    app.add_subcommand("params", "Print the drive's parameters: name, unit, range, default, help")
-        ->footer("These names go into `drive:` of machine and scenario files and after --set, in SI.")
-        ->callback(print_parameters);
+    CLI::App *command =
+        app.add_subcommand("params", "Print the drive's parameters: name, unit, range, default, help; or "
+                                     "make the page of them that a board is given");
+    auto options = std::make_shared<PageOptions>();
+    CLI::Option *machine =
+        command->add_option("--machine", options->machine, "machine file whose parameters to take");
+    command->add_option("--set", options->settings, settings_help())->allow_extra_args(false)->needs(machine);
+    command->add_option("--page", options->page, "write them as a page of the board's parameter store")
+        ->needs(machine);
+    command->footer("These names go into `drive:` of machine and scenario files and after --set, in SI.\n\n"
+                    "Example:\n"
+                    "  pmsim params --machine my_motor.yaml --page my_motor.bin && tools/flash --parameters "
+                    "my_motor.bin");
+    command->callback([options] {
+        if (options->page.empty()) {
+            print_parameters();
+        } else {
+            write_page(*options);
+        }
+    });
 }
 
 void add_metrics_command(CLI::App &app)

@@ -14,9 +14,10 @@
 
 #include <stdint.h>
 
-#define RECORD_MAGIC "PMREC001"
+#define RECORD_MAGIC "PMREC002"
 #define RECORD_LEGS  3
 
+enum { RECORD_LAYOUT = 24 }; /* figures of record_layout() */
 enum { RECORD_COMMAND = 1, RECORD_CLEAR = 2 };
 
 typedef struct {
@@ -24,7 +25,8 @@ typedef struct {
     uint32_t parameters; /* count */
     uint32_t periods;    /* count */
     uint32_t slow_divider;
-    uint32_t period_bytes; /* sizeof(record_period_t) */
+    uint32_t period_bytes;          /* sizeof(record_period_t) */
+    uint32_t layout[RECORD_LAYOUT]; /* of the recorder's drive_t */
 } record_header_t;
 
 typedef struct {

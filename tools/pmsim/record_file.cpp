@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include "tools/pmsim/loop.h"
+#include "tools/pmsim/rig.h"
 
 namespace pmsim
 {
@@ -61,7 +62,8 @@ void put_period(Bytes &bytes, const record_period_t &period)
 
 } // namespace
 
-static_assert(sizeof(record_period_t) == 44 && sizeof(record_header_t) == 24, "record.h must have no holes");
+static_assert(sizeof(record_period_t) == 44 && sizeof(record_header_t) == 24 + 4 * RECORD_LAYOUT,
+              "record.h must have no holes");
 
 Recording record_scenario(const Scenario &scenario, uint64_t most_periods)
 {
@@ -86,6 +88,11 @@ void write_recording(const Recording &recording, const std::string &path)
     bytes.put(static_cast<uint32_t>(recording.periods.size()));
     bytes.put(recording.slow_divider);
     bytes.put(static_cast<uint32_t>(sizeof(record_period_t)));
+    uint32_t layout[RECORD_LAYOUT];
+    rig_layout(layout);
+    for (const uint32_t word : layout) {
+        bytes.put(word);
+    }
     for (int id = 0; id < DRIVE_PARAM_COUNT; ++id) {
         bytes.put(drive_param_get(&recording.params, static_cast<drive_param_id_t>(id)));
     }

@@ -69,6 +69,7 @@ void rig_step(rig_t *rig, rig_sample_t *sample);
 uint32_t rig_slow_divider(const rig_t *rig);
 
 /* What went into and came out of the drive in the last period. */
+void rig_layout(uint32_t layout[RECORD_LAYOUT]); /* record_layout.h */
 void rig_record(const rig_t *rig, record_period_t *record);
 
 /* Half of a period each, driven by a record: the plant alone, and the drive alone. The latter says whether

@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "tools/pmsim/record_layout.h"
+
 _Static_assert((int)RIG_OFF == (int)DRIVE_OFF && (int)RIG_CALIBRATING == (int)DRIVE_CALIBRATING &&
                    (int)RIG_FINDING == (int)DRIVE_FINDING && (int)RIG_RUNNING == (int)DRIVE_RUNNING &&
                    (int)RIG_STOPPING == (int)DRIVE_STOPPING && (int)RIG_FAULT == (int)DRIVE_FAULT,
@@ -84,4 +86,9 @@ void rig_record_legs(const drive_in_t *in, const drive_out_t *out, record_period
         record->compare[leg][1] = out->compare[leg][1];
         record->driven[leg] = out->driven[leg];
     }
+}
+
+void rig_layout(uint32_t layout[RECORD_LAYOUT])
+{
+    record_layout(layout);
 }

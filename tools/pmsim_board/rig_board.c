@@ -150,7 +150,8 @@ static void trace(void *owner, int exception, bool entry)
 static bool boot(rig_t *rig, const drive_params_t *params)
 {
     uint32_t words[STORE_WORDS];
-    const uint32_t used = app_page(params, 1, words);
+    const uint32_t used =
+        app_page(params, 1, words); /* refused ones too: the image has to refuse them itself */
     board_program(rig->board, STORE_ADDRESS, words, used * sizeof words[0]);
     if (!board_boot(rig->board, BOOT_S)) {
         return false;

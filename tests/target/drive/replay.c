@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "firmware/drive/drive_state.h"
-#include "tools/pmsim/record.h"
+#include "tools/pmsim/record_layout.h"
 
 /* Wrappers tell the modes apart; each adds its call, two instructions and its mark. */
 #define MODE(name, mark)                                                                                     \
@@ -71,6 +71,21 @@ static bool open_record(FILE *file, record_header_t *header)
     return fread(&params, sizeof params, 1, file) == 1 && drive_init(&drive, &params).ok;
 }
 
+static bool same_layout(const record_header_t *header)
+{
+    uint32_t layout[RECORD_LAYOUT];
+    record_layout(layout);
+    bool same = true;
+    for (unsigned k = 0; k < RECORD_LAYOUT; k++) {
+        if (layout[k] != header->layout[k]) {
+            printf("replay: item %u of record_layout() is %lu, on the host %lu\n", k,
+                   (unsigned long)layout[k], (unsigned long)header->layout[k]);
+            same = false;
+        }
+    }
+    return same;
+}
+
 int main(int argc, char **argv)
 {
     FILE *file = argc > 1 ? fopen(argv[1], "rb") : NULL;
@@ -79,8 +94,11 @@ int main(int argc, char **argv)
         printf("replay: no record of this firmware in the file given\n");
         return 1;
     }
+    if (!same_layout(&header)) {
+        return 1;
+    }
     uint32_t different = 0;
-    static record_period_t r[256];
+    static record_period_t r[64]; /* 16 KiB of RAM must do on the smallest board */
     for (uint32_t k = 0; k < header.periods;) {
         const uint32_t n = (uint32_t)fread(r, sizeof r[0], sizeof r / sizeof r[0], file);
         if (n == 0U) {

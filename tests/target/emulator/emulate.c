@@ -53,6 +53,10 @@ static void on_call(void *owner, uint32_t address)
         return;
     }
     const uint32_t return_to = cpu_register(counter->cpu, 14) & ~1U;
+    if (counter->opened > 0 && counter->open[counter->opened - 1].name == function->name &&
+        counter->open[counter->opened - 1].return_to == return_to) {
+        return; /* a loop whose head is the function's */
+    }
     counter->open[counter->opened].name = function->name;
     counter->open[counter->opened].return_to = return_to;
     counter->open[counter->opened].start = cpu_instructions(counter->cpu);

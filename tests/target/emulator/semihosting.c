@@ -26,7 +26,8 @@ static FILE *file_of(uint32_t handle)
 
 static uint32_t open_file(const char *name, uint32_t mode)
 {
-    static const char *const modes[] = {"r", "rb", "r+", "r+b", "w", "wb", "w+", "w+b", "a", "ab", "a+", "a+b"};
+    static const char *const modes[] = {"r",  "rb",  "r+", "r+b", "w",  "wb",
+                                        "w+", "w+b", "a",  "ab",  "a+", "a+b"};
     FILE *file = NULL;
     if (mode >= sizeof modes / sizeof modes[0]) {
         return UINT32_MAX;

@@ -6,9 +6,16 @@ import unittest
 from pathlib import Path
 
 CHECK = Path(__file__).parents[1] / "no_float.py"
-CORE = ["-mcpu=cortex-m4", "-mthumb", "-O2"]
+CORE = ["arm-none-eabi-gcc", "-mcpu=cortex-m4", "-mthumb", "-O2"]
 SOFT = [*CORE, "-mfloat-abi=soft"]
 HARD = [*CORE, "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"]
+FPU_ADD = "vadd.f32"
+if "--riscv" in sys.argv:
+    sys.argv.remove("--riscv")
+    CORE = ["riscv64-unknown-elf-gcc", "-O2"]
+    SOFT = [*CORE, "-march=rv32imac", "-mabi=ilp32", "--specs=picolibc.specs"]
+    HARD = [*CORE, "-march=rv32imafc", "-mabi=ilp32f"]
+    FPU_ADD = "fadd.s"
 
 FLOATING = {
     "float add": "float f(float a, float b) { return a + b; }",
@@ -29,11 +36,11 @@ CLEAN = {
 }
 
 
-def check(source, flags):
+def check(source, compiler):
     with tempfile.TemporaryDirectory() as folder:
         c, o = Path(folder) / "x.c", Path(folder) / "x.o"
         c.write_text(source + "\n")
-        subprocess.run(["arm-none-eabi-gcc", *flags, "-c", c, "-o", o], check=True)
+        subprocess.run([*compiler, "-c", c, "-o", o], check=True)
         return subprocess.run([sys.executable, CHECK, o], capture_output=True, text=True)
 
 
@@ -48,7 +55,7 @@ class NoFloat(unittest.TestCase):
     def test_fpu_instructions_are_found(self):
         result = check(FLOATING["float add"], HARD)
         self.assertEqual(result.returncode, 1, result.stdout)
-        self.assertIn("vadd.f32", result.stdout)
+        self.assertIn(FPU_ADD, result.stdout)
 
     def test_helpers_are_found_in_an_image(self):
         for name, source, status in (("float", "int f(float a); int main(void) { return f(1); }"

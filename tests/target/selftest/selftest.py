@@ -28,12 +28,19 @@ def main():
     if count(elf, "--limit", "known_nested=12").returncode != 0:
         wrong["limit held"] = None
         print("a limit that holds was refused")
+    for mean, status in (("known_loop=12", 0), ("known_loop=11.9", 1)):
+        if count(elf, "--mean", mean).returncode != status:
+            wrong["mean"] = None
+            print(f"--mean {mean} did not end with status {status}")
     if count(elf, "--limit", "known_nested=11").returncode != 1:
         wrong["limit exceeded"] = None
         print("a limit that is exceeded was accepted")
     if count(elf, "--", "fail").returncode == 0:
         wrong["exit status"] = None
         print("a program that fails was accepted")
+    if "status 99" not in count(elf, "--", "fault").stderr:
+        wrong["fault"] = None
+        print("a processor fault did not end the program")
     sys.exit(1 if wrong else 0)
 
 

@@ -17,7 +17,7 @@ using bench::real;
 
 // A leg is rounded to the nearest count; the scale is cut, relative (v + 1/v) 2^-16 of half the counts.
 constexpr double kLeg_counts = 1.0;
-// Compensation is rounded down once more, and the positive end of the zone is one below its full value.
+// Compensation is rounded once more, and the positive end of the zone is one below its full value.
 constexpr double kCompensation_counts = 2.0;
 // METHODS.md 1.3.2.1 (e).
 constexpr double kFundamental = 0.005;
@@ -32,6 +32,7 @@ modulator_config_t plain(int counts = kCounts)
 {
     modulator_config_t c = {};
     c.counts = counts;
+    c.per_unit = pm_counts_make(static_cast<uint32_t>(counts));
     return c;
 }
 
@@ -43,7 +44,8 @@ modulator_config_t compensating(int counts = kCounts)
     modulator_config_t c = plain(counts);
     c.dead_counts = static_cast<int32_t>(std::lround(kDead * counts));
     c.drop = fixed(kDrop, 28);
-    c.zone_gain = fixed(1 / kZone, 15 + 4); // 2^15 at the edge: zone 2^28 gain 2^-32
+    c.zone_alpha = fixed(1 / kZone, PM_ZONE_BITS + 6); // 2^PM_ZONE_BITS at the edge: zone/4 2^28 gain 2^-32
+    c.zone_beta = fixed(std::sqrt(0.75) / kZone, PM_ZONE_BITS + 6);
     c.compensate = true;
     return c;
 }
@@ -90,8 +92,11 @@ Complex realised(const modulator_out_t &out, int counts, double v_dc)
 
 modulator_out_t step(const modulator_config_t &c, Complex v, double v_dc, Complex i = 0)
 {
+    modulator_t self = {};
     modulator_out_t out;
-    modulator_step(&c, bench::ab(v), fixed(v_dc, 28), bench::ab(i), &out);
+    modulator_slow(&self, &c, fixed(v_dc, 28));
+    modulator_step(&self, &c, bench::ab(v), fixed(v_dc, 28), bench::ab(i / 4.0), &out);
+    EXPECT_EQ(self.limited, out.limited);
     return out;
 }
 

@@ -120,7 +120,7 @@ TEST(OpenLoop, HandOverKeepsCurrentAndVoltage)
         x.d.position.quality = PM_ONE;
         x.d.position.pll.omega = x.d.omega_open;
         x.d.position.pll.theta = x.d.theta_open - bench::turns(lag_deg * kDegree);
-        x.d.u = bench::dq({-0.05, 0.12});
+        x.d.u = {bench::fixed(-0.05, PM_WIDE_BITS), bench::fixed(0.12, PM_WIDE_BITS)};
         const Complex u = Complex{-0.05, 0.12} * std::polar(1.0, bench::rad(x.d.theta_open));
         const Complex i = current_vector(x);
         int ms = 0;
@@ -163,7 +163,7 @@ TEST(OpenLoop, ResumeKeepsCurrentAndVoltage)
         x.d.position.pll.theta = PM_TURN(0.9);
         x.d.position.pll.omega = PM_Q(0.05);
         x.d.status.i = bench::dq(i);
-        x.d.u = bench::dq({-0.03, 0.08});
+        x.d.u = {bench::fixed(-0.03, PM_WIDE_BITS), bench::fixed(0.08, PM_WIDE_BITS)};
         open_loop_resume(&x.d);
         EXPECT_EQ(x.d.stage, STAGE_OPEN_LOOP);
         EXPECT_EQ(x.d.omega_open, PM_Q(0.05));

@@ -28,8 +28,8 @@ constexpr double kLow = 0.12, kHigh = 0.24;
 pm_pll_config_t loop(double hertz)
 {
     const double w = 2 * bench::kPi * hertz, t = bench::kIpmBase.period_s, base = bench::kIpmBase.omega_rad_s;
-    return {fixed(1.8 * w * t, 32), fixed(w * w * t / base, 32), fixed(16 * base * t / (2 * bench::kPi), 30),
-            PM_Q(1.25)};
+    return {fixed(1.8 * w * t * 2 / bench::kPi, 32), fixed(w * w * t / base, 32),
+            fixed(16 * base * t / (2 * bench::kPi), 30)};
 }
 
 position_config_t config(bool injection = true)
@@ -76,8 +76,9 @@ TEST(Position, WeightIsTheSpeedBetweenItsLimits)
         EXPECT_NEAR(real(self.weight), expected, kWeight) << omega;
         EXPECT_GE(self.weight, 0);
         EXPECT_LE(self.weight, PM_ONE);
-        EXPECT_NEAR(self.gains.kp, c.pll_low.kp + expected * (c.pll_high.kp - c.pll_low.kp),
-                    1e-3 * c.pll_high.kp);
+        EXPECT_NEAR(self.gains.kp_turn,
+                    c.pll_low.kp_turn + expected * (c.pll_high.kp_turn - c.pll_low.kp_turn),
+                    1e-3 * c.pll_high.kp_turn);
         EXPECT_NEAR(self.gains.ki, c.pll_low.ki + expected * (c.pll_high.ki - c.pll_low.ki),
                     1e-3 * c.pll_high.ki);
     }
@@ -144,7 +145,13 @@ class Running
         for (int k = 0; k < 10 * ms; ++k) {
             rotation.advance();
             const obs_in_t in = rotation.seen(rotation.theta_rad, rotation.omega_rad_s);
-            position_step(&self, &c_, in.v, in.i, imposed, &out);
+            if (imposed != nullptr) {
+                position_lead(&self, &c_, imposed);
+            }
+            position_step(&self, &c_, in.v, in.i, &out);
+            if (imposed != nullptr) {
+                position_follow(&self, imposed);
+            }
             if (k % 10 == 9) {
                 position_slow(&self, &c_, out.i);
             }
@@ -201,7 +208,7 @@ TEST(Position, QualityFallsWithoutAVoltageOrACurrentThatFits)
     int ms = 0;
     for (; r.self.quality > 0 && ms < 500; ++ms) {
         for (int k = 0; k < 10; ++k) {
-            position_step(&r.self, &c, {0, 0}, {0, 0}, nullptr, &r.out);
+            position_step(&r.self, &c, {0, 0}, {0, 0}, &r.out);
         }
         position_slow(&r.self, &c, r.out.i);
     }
@@ -216,7 +223,7 @@ TEST(Position, QualityFallsWhenTheCarrierIsGone)
     for (; self.quality > 0 && ms < 500; ++ms) {
         for (int k = 0; k < 10; ++k) {
             position_out_t out;
-            position_step(&self, &c, {0, 0}, {0, 0}, nullptr, &out);
+            position_step(&self, &c, {0, 0}, {0, 0}, &out);
         }
         position_slow(&self, &c, {0, 0});
     }

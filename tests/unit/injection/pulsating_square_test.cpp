@@ -80,7 +80,7 @@ class Carrier
             double i_q_A = 0)
         : c_(c), l_(l), error_(error_rad), omega_(omega_pu * kBase.omega_rad_s), i_q_A_(i_q_A)
     {
-        pulsating_square_reset(&self, measured());
+        pulsating_square_reset(&self, &c_, measured());
     }
 
     // Sample k: demodulation, then the voltage for [k+1, k+2), in the frame of its middle.
@@ -92,6 +92,7 @@ class Carrier
         in.dir = bench::direction(theta_hat);
         in.omega = fixed(omega_ / kBase.omega_rad_s, 28);
         in.i_dq = bench::dq(i_fundamental() / kBase.i_A * std::polar(1.0, -theta_hat));
+        pulsating_square_slow(&self, &c_, &in);
         fundamental = bench::complex(pulsating_square_fundamental(&self, in.i)) * kBase.i_A;
         obs_out_t out;
         pulsating_square_demodulate(&self, &c_, &in, &out);
@@ -259,7 +260,7 @@ TEST(PulsatingSquare, VoltageAlternatesAlongD)
 {
     const pulsating_square_config_t c = config(kUnloaded, 0);
     pulsating_square_t self;
-    pulsating_square_reset(&self, {0, 0});
+    pulsating_square_reset(&self, &c, {0, 0});
     pm_q_t last = 0;
     for (int k = 0; k < 10; ++k) {
         const pm_dq_t v = pulsating_square_output(&self, &c);

@@ -73,6 +73,14 @@ TEST(MathFixed, UpperProductIsRoundedExactly)
     for_pairs([](int32_t a, int32_t b) { CHECK_PAIR(rounded_product(a, b), pm_mulh(a, b), a, b); });
 }
 
+TEST(MathFixed, UpperProductFromHalvesIsTheSame) // that of ARMv6-M
+{
+    for_pairs([](int32_t a, int32_t b) {
+        CHECK_PAIR(rounded_product(a, b), pm_mulh_halves(a, b, 0), a, b);
+        CHECK_PAIR(-rounded_negative_product(a, b), pm_mulh_halves(a, b, 1), a, b);
+    });
+}
+
 TEST(MathFixed, UpperProductAccumulatesAndWraps)
 {
     Random random;
@@ -168,6 +176,22 @@ TEST(MathFixed, SaturationToBits)
             EXPECT_EQ(pm_sat(x, n), std::clamp<int64_t>(x, -top, top - 1)) << x << " to " << n;
         }
         EXPECT_EQ(pm_abs(x), std::min<int64_t>(std::abs(int64_t{x}), INT32_MAX));
+        EXPECT_EQ(pm_magnitude(x), x == INT32_MIN ? x : std::abs(x));
+    }
+}
+
+TEST(MathFixed, ZoneIsLinearToItsEdgesAndFlatBeyond)
+{
+    const double edge = 1 << PM_ZONE_BITS;
+    Random random;
+    for (const double height : {0.0, 0.3, 85.0, 8191.0}) {
+        const auto h = static_cast<int32_t>(std::lround(std::ldexp(height, 32 - PM_ZONE_BITS)));
+        for (int n = 0; n < 20000; ++n) {
+            const int32_t x = random.word() >> (n % 24);
+            const double expected = height * std::clamp(x / edge, -1.0, 1 - 1 / edge);
+            ASSERT_NEAR(pm_zone_add(1000, x, h) - 1000, expected, 0.501) << x;
+            ASSERT_NEAR(pm_zone_sub(1000, x, h) - 1000, -expected, 0.501) << x;
+        }
     }
 }
 

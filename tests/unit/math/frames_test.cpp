@@ -150,6 +150,25 @@ TEST(MathFrames, ParkAgainstRotation)
     EXPECT_LE(lsb(backward), kParkError);
 }
 
+// The forms without their shifts: the factors that the headers state, to the rounding of the products.
+TEST(MathFrames, ScaledFormsAreTheTransforms)
+{
+    double half = 0, quarter = 0;
+    Random random;
+    for_vectors(1.9, [&](pm_ab_t x) {
+        const double a = random.within(-M_PI, M_PI), b = random.within(-M_PI, M_PI);
+        const pm_dir_t dir = exact_dir(a);
+        const Eigen::Vector2d d = vector(pm_park_half(x, dir)) - Eigen::Rotation2Dd(-a) * vector(x) / 2;
+        half = std::max(half, d.lpNorm<Eigen::Infinity>());
+        const pm_half_dir_t sum = pm_dir_sum(dir, exact_dir(b));
+        const Eigen::Vector2d e = vector(pm_park_inverse_quarter({x.alpha, x.beta}, sum)) -
+                                  Eigen::Rotation2Dd(a + b) * vector(x) / 4;
+        quarter = std::max(quarter, e.lpNorm<Eigen::Infinity>());
+    });
+    EXPECT_LE(lsb(half), kParkError / 2);
+    EXPECT_LE(lsb(quarter), kParkError / 2);
+}
+
 TEST(MathFrames, ParkAtTheAxes)
 {
     const pm_ab_t x = {q(1.5), q(-0.5)};

@@ -30,11 +30,11 @@ struct Design {
     double w_n_rad_s, zeta;
 };
 
-pm_pll_config_t fixed(const Design &d, double limit = 2.0)
+pm_pll_config_t fixed(const Design &d)
 {
-    return {static_cast<pm_frac_t>(std::lround(2 * d.zeta * d.w_n_rad_s * kPeriod_s * 0x1p32)),
+    return {static_cast<pm_frac_t>(std::lround(2 * d.zeta * d.w_n_rad_s * kPeriod_s * 2 / M_PI * 0x1p32)),
             static_cast<pm_frac_t>(std::lround(d.w_n_rad_s * d.w_n_rad_s * kPeriod_s / kBase_rad_s * 0x1p32)),
-            static_cast<int32_t>(std::lround(16 * kBase_rad_s * kPeriod_s / (2 * M_PI) * 0x1p30)), q(limit)};
+            static_cast<int32_t>(std::lround(16 * kBase_rad_s * kPeriod_s / (2 * M_PI) * 0x1p30))};
 }
 
 struct DoublePll {
@@ -89,7 +89,7 @@ TEST(MathPll, FollowsTheDoubleModel)
 TEST(MathPll, RampErrorIsAccelerationOverBandwidthSquared)
 {
     const Design d = {2 * M_PI * 40, 0.8};
-    const pm_pll_config_t c = fixed(d, 4.0);
+    const pm_pll_config_t c = fixed(d);
     for (const double acceleration_rad_s2 : {-3000.0, 500.0, 3000.0}) {
         pm_pll_t pll = {};
         double eps = 0;
@@ -118,25 +118,25 @@ TEST(MathPll, LocksAcrossTheWrapInBothDirections)
 
 TEST(MathPll, SpeedSaturatesAtTheLimit)
 {
-    const pm_pll_config_t c = fixed({2 * M_PI * 200, 1.0}, 4.0);
+    const pm_pll_config_t c = fixed({2 * M_PI * 200, 1.0});
     pm_pll_t pll = {};
     for (int k = 0; k < 5000; ++k) {
         pm_pll_correct(&pll, &c, q(M_PI));
     }
-    EXPECT_EQ(pll.omega, PM_Q(4.0));
+    EXPECT_EQ(pll.omega, PM_Q(2.0) - 1);
     for (int k = 0; k < 10000; ++k) {
         pm_pll_correct(&pll, &c, q(-M_PI));
     }
-    EXPECT_EQ(pll.omega, PM_Q(-4.0));
+    EXPECT_EQ(pll.omega, PM_Q(-2.0));
 
     pm_pll_config_t largest = c; // the ends of every constant, for the sanitizers
     largest.ki = INT32_MAX;
-    largest.kp = INT32_MIN;
+    largest.kp_turn = INT32_MIN;
     for (const double eps : {M_PI, -M_PI}) {
         for (int k = 0; k < 10; ++k) {
             pm_pll_correct(&pll, &largest, q(eps));
         }
-        EXPECT_EQ(pll.omega, q(std::copysign(4.0, eps)));
+        EXPECT_EQ(pll.omega, eps < 0 ? PM_Q(-2.0) : PM_Q(2.0) - 1);
     }
 }
 

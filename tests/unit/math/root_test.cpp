@@ -167,13 +167,14 @@ TEST(MathRoot, CountsPerUnit)
         for (const int32_t counts : {0, 1, 100, 4250, 32767}) {
             const double exact = 16 * counts / real(static_cast<pm_q_t>(v * 0x1p28));
             const double limit = exact * kCountsRelative * (v + 1 / v);
-            const double actual = pm_counts_per_unit(counts, static_cast<pm_q_t>(v * 0x1p28));
+            const double actual = pm_counts_per_unit(pm_counts_make(static_cast<uint32_t>(counts)),
+                                                     static_cast<pm_q_t>(v * 0x1p28));
             ASSERT_LE(actual, exact + limit) << v << " " << counts;
             ASSERT_GE(actual, exact - limit - 1) << v << " " << counts;
         }
     }
     // Half the link voltage is half the counts, to the count.
-    EXPECT_EQ(pm_mulh(PM_Q(0.75), pm_counts_per_unit(4000, PM_Q(1.5))), 2000);
+    EXPECT_EQ(pm_mulh(PM_Q(0.75), pm_counts_per_unit(pm_counts_make(4000), PM_Q(1.5))), 2000);
 }
 
 } // namespace

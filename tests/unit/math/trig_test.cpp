@@ -82,8 +82,8 @@ TEST(MathTrig, TableIsWhatItsGeneratorPromises)
         const auto q31 = [](double x) {
             return std::clamp<double>(std::nearbyint(x * 0x1p31), -INT32_MAX, INT32_MAX);
         };
-        EXPECT_EQ(pm_dir_table[k].cos, q31(std::cos(k * M_PI / 64))) << k;
-        EXPECT_EQ(pm_dir_table[k].sin, q31(std::sin(k * M_PI / 64))) << k;
+        EXPECT_EQ(pm_dir_table[k].first, q31(std::cos(k * M_PI / 64))) << k;
+        EXPECT_EQ(pm_dir_table[k].second, q31(std::sin(k * M_PI / 64))) << k;
     }
 }
 

@@ -264,7 +264,7 @@ TEST(ActiveFlux, AWrongFluxDecaysAtTheRateDerived)
             active_flux_reset(&state, &f.config, &first);
             state.k_seed = 0;
             const double wrong = 0.1;
-            state.psi.alpha += bench::fixed(wrong, 28);
+            state.psi.alpha += bench::fixed(wrong, 26);
             const double rate = g * std::abs(rotation.omega_rad_s) / 2;
             const double swing = std::abs(rotation.omega_rad_s) * std::sqrt(1 - g * g / 4);
             // over whole half periods of the oscillation the envelope is seen without its phase
@@ -351,7 +351,7 @@ TEST(ActiveFlux, ErrorSignalIsLimited)
     for (const double factor : {-20.0, 20.0}) {
         active_flux_t state;
         active_flux_reset(&state, &f.config, &first);
-        state.psi = {0, bench::fixed(factor * real(f.config.psi_m), 28)};
+        state.psi = {0, bench::fixed(factor * real(f.config.psi_m), 26)};
         rotation.advance();
         const obs_in_t in = rotation.seen(rotation.theta_rad, rotation.omega_rad_s);
         obs_out_t out;

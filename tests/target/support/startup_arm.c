@@ -1,4 +1,4 @@
-/* Start-up and semihosting system calls for measurement programs on QEMU's mps2-an386 (Cortex-M4).
+/* Start-up and semihosting system calls for measurement programs on QEMU's Cortex-M boards.
  * main(argc, argv) is called with the arguments given to count.py; its result is QEMU's exit status.
  * printf, fopen and fread work on the host's files through newlib. No interrupts are used. */
 #include <errno.h>
@@ -7,17 +7,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-enum {
-    SYS_OPEN = 0x01,
-    SYS_CLOSE = 0x02,
-    SYS_WRITE = 0x05,
-    SYS_READ = 0x06,
-    SYS_SEEK = 0x0A,
-    SYS_FLEN = 0x0C,
-    SYS_GET_CMDLINE = 0x15,
-    SYS_EXIT_EXTENDED = 0x20,
-    EXIT_APPLICATION = 0x20026,
-};
+#include "tests/target/support/semihost.h"
 
 extern uint32_t pm_data_load[], pm_data_start[], pm_data_end[], pm_bss_start[], pm_bss_end[], pm_heap_start[],
     pm_heap_end[], pm_stack_top[];
@@ -37,20 +27,9 @@ int _getpid(void);
 void *_sbrk(ptrdiff_t step);
 void _exit(int status) __attribute__((noreturn));
 
-static int semihost(uint32_t operation, const void *arguments)
-{
-    register uint32_t r0 __asm("r0") = operation;
-    register const void *r1 __asm("r1") = arguments;
-    __asm volatile("bkpt 0xab" : "+r"(r0) : "r"(r1) : "memory");
-    return (int)r0;
-}
-
 void _exit(int status)
 {
-    const uint32_t arguments[2] = {EXIT_APPLICATION, (uint32_t)status};
-    (void)semihost(SYS_EXIT_EXTENDED, arguments);
-    for (;;) {
-    }
+    semihost_exit(status);
 }
 
 /* newlib's 0, 1, 2 are the console, which semihosting opens by name: "r" for input, "w" for output. The host
@@ -148,28 +127,12 @@ void *_sbrk(ptrdiff_t step)
     return old;
 }
 
-/* The command line, split at blanks; the first word is the program's path. */
-static int split_command_line(char *line, uint32_t size, char **argv, int most)
-{
-    uintptr_t arguments[2] = {(uintptr_t)line, size};
-    int argc = 0;
-    if (semihost(SYS_GET_CMDLINE, arguments) != 0) {
-        return 0;
-    }
-    for (char *word = strtok(line, " "); word != NULL && argc < most; word = strtok(NULL, " ")) {
-        argv[argc] = word;
-        argc++;
-    }
-    return argc;
-}
-
 void pm_reset_handler(void)
 {
-    static char line[1024];
-    static char *argv[17];
+    static char *argv[SEMIHOST_WORDS + 1];
     memcpy(pm_data_start, pm_data_load, (size_t)((char *)pm_data_end - (char *)pm_data_start));
     memset(pm_bss_start, 0, (size_t)((char *)pm_bss_end - (char *)pm_bss_start));
-    int argc = split_command_line(line, sizeof line, argv, 16);
+    int argc = semihost_arguments(argv);
     extern void exit(int) __attribute__((noreturn));
     exit(main(argc, argv));
 }

@@ -1,0 +1,14 @@
+/* The page of the parameter store that holds these parameters, as the firmware itself would write it. */
+#ifndef PMSIM_PARAMETER_PAGE_H
+#define PMSIM_PARAMETER_PAGE_H
+
+#include <stdint.h>
+
+#include "firmware/drive/parameters.h"
+#include "firmware/params/store.h"
+
+/* Returns the number of words that are used; 0, with *refused and *reason, when the drive refuses one. */
+uint32_t parameter_page(const drive_params_t *params, uint32_t words[STORE_WORDS], const char **refused,
+                        const char **reason);
+
+#endif
