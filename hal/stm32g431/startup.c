@@ -18,7 +18,7 @@ enum {
 };
 
 /* Places, from the link script */
-extern uint32_t port_stack_guard[], port_stack_low[], port_stack_top[];
+extern uint32_t port_stack_guard[], port_stack_bottom[], port_stack_top[];
 extern uint32_t port_data[], port_data_end[], port_data_load[];
 extern uint32_t port_bss[], port_bss_end[];
 extern uint32_t port_ccm[], port_ccm_begin[], port_ccm_end[], port_ccm_load[];
@@ -56,7 +56,7 @@ __attribute__((used)) void port_fault(const uint32_t *frame, uint32_t exception)
 {
     hal_last_words_t words = {.cause = exception, .status = SCB.CFSR};
     /* r0 to r3, r12, lr, pc, xPSR, if they could be stacked at all */
-    if (frame >= port_stack_low && frame + 8 <= FIRST_VECTORS.stack) {
+    if (frame >= port_stack_bottom && frame + 8 <= FIRST_VECTORS.stack) {
         words.lr = frame[5];
         words.pc = frame[6];
     }
@@ -160,7 +160,7 @@ __attribute__((noreturn)) void port_reset(void)
 {
     const uint32_t *stack;
     __asm volatile("mov %0, sp" : "=r"(stack));
-    fill(port_stack_low, stack, STACK_PAINT);
+    fill(port_stack_bottom, stack, STACK_PAINT);
     copy(port_ccm_begin, port_ccm_end, port_ccm_load);
     copy(port_data, port_data_end, port_data_load);
     fill(port_bss, port_bss_end, 0U);
