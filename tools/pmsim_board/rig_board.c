@@ -34,7 +34,7 @@ struct rig {
     drive_command_t sent;
     bool clear;
     uint32_t since_sent;
-    uint64_t instructions[FIGURE_INTERRUPTS], cycles[FIGURE_INTERRUPTS];
+    cpu_exception_stats_t counted[FIGURE_INTERRUPTS]; /* up to the last return */
     figures_t figures;
 };
 
@@ -82,23 +82,24 @@ static int interrupt_of(int exception)
     }
 }
 
+static void add(interrupt_figure_t *figure, const cpu_exception_stats_t *before,
+                const cpu_exception_stats_t *now)
+{
+    figure_add(&figure->instructions, now->instructions - before->instructions);
+    figure_add(&figure->cycles, now->cycles_typical - before->cycles_typical);
+    figure->cycles_low += now->cycles_low - before->cycles_low;
+    figure->cycles_high += now->cycles_high - before->cycles_high;
+}
+
 static void count(rig_t *rig, int interrupt, int exception)
 {
-    const cpu_exception_stats_t *stats = cpu_exception_stats(board_cpu(rig->board), exception);
-    const uint64_t instructions = stats->instructions - rig->instructions[interrupt];
-    const uint64_t cycles = stats->cycles_typical - rig->cycles[interrupt];
-    rig->instructions[interrupt] = stats->instructions;
-    rig->cycles[interrupt] = stats->cycles_typical;
-    interrupt_figure_t *all = &rig->figures.interrupt[interrupt];
-    figure_add(&all->instructions, instructions);
-    figure_add(&all->cycles, cycles);
-    all->cycles_low = stats->cycles_low;
-    all->cycles_high = stats->cycles_high;
+    const cpu_exception_stats_t *now = cpu_exception_stats(board_cpu(rig->board), exception);
+    cpu_exception_stats_t *before = &rig->counted[interrupt];
+    add(&rig->figures.interrupt[interrupt], before, now);
     if (interrupt == FIGURE_CONTROL) {
-        interrupt_figure_t *mode = &rig->figures.mode[mode_of(&rig->before)];
-        figure_add(&mode->instructions, instructions);
-        figure_add(&mode->cycles, cycles);
+        add(&rig->figures.mode[mode_of(&rig->before)], before, now);
     }
+    *before = *now;
 }
 
 /* The same step on the host, from the same memory. */
