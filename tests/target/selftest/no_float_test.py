@@ -64,7 +64,7 @@ class NoFloat(unittest.TestCase):
             with self.subTest(name), tempfile.TemporaryDirectory() as folder:
                 c, elf = Path(folder) / "x.c", Path(folder) / "x.elf"
                 c.write_text(source + "\n")
-                subprocess.run(["arm-none-eabi-gcc", *SOFT, "-fno-inline", "-fno-ipa-cp", "-nostdlib", "-e", "main", c,
+                subprocess.run([*SOFT, "-fno-inline", "-fno-ipa-cp", "-nostdlib", "-e", "main", c,
                                 "-lgcc", "-o", elf], check=True)
                 result = subprocess.run([sys.executable, CHECK, elf], capture_output=True, text=True)
                 self.assertEqual(result.returncode, status, result.stdout + result.stderr)
