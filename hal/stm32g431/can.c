@@ -45,7 +45,7 @@ hal_status_t can_start(const hal_config_t *config)
     return known ? HAL_OK : HAL_CAN_BIT_RATE;
 }
 
-static void take_element(port_can_t *can, const fdcan_element_t *element)
+void can_take_element(port_can_t *can, const fdcan_element_t *element)
 {
     if (can->put - can->taken >= PORT_CAN_FRAMES) {
         can->lost++;
@@ -70,7 +70,7 @@ void port_can_received(void)
     FDCAN1.IR = FDCAN_IR_RF0N | FDCAN_IR_RF0L;
     while ((FDCAN1.RXF0S & FDCAN_RXF0S_F0FL) != 0U) {
         const uint32_t index = reg_value(FDCAN_RXF0S_F0GI, FDCAN1.RXF0S);
-        take_element(can, &FDCANRAM1.RXFIFO0[index]);
+        can_take_element(can, &FDCANRAM1.RXFIFO0[index]);
         FDCAN1.RXF0A = index;
     }
 }

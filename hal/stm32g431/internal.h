@@ -3,7 +3,7 @@
 #define STM32G431_INTERNAL_H
 
 #include "hal/stm32g431/port.h"
-#include "hal/stm32g431/registers/register.h"
+#include "hal/stm32g431/registers/fdcan.h"
 
 #define PORT_CLOCK_HZ 170000000U
 /* Of the upper four bits. Faults are at 0. */
@@ -12,7 +12,8 @@
 #define PORT_PRIO_IO      0x30U
 #define PORT_PRIO_SLOW    0x40U
 
-extern hal_t port_hal; /* the one there is */
+extern hal_t port_hal;                                                 /* the one there is */
+extern uint32_t port_store[HAL_STORE_PAGES][HAL_STORE_PAGE_SIZE / 4U]; /* from the link script */
 
 /* --- clock.c */
 bool clock_start(void); /* false: without the crystal. Starts the microseconds. */
@@ -36,6 +37,7 @@ void bridge_run(void);
 void measure_start(void);
 void measure_run(void);
 hal_status_t can_start(const hal_config_t *config);
+void can_take_element(port_can_t *can, const fdcan_element_t *element); /* into the ring */
 void console_start(void);
 
 /* --- exceptions: the vector table is in startup.c */

@@ -21,7 +21,7 @@ static const pin_t PINS[] = {
     {&GPIOC, 13, MODE_FUNCTION, 4, PULL_DOWN, SLOW, false}, /* TIM1_CH1N; this pin cannot be fast */
     {&GPIOA, 12, MODE_FUNCTION, 6, PULL_DOWN, FAST, false}, /* TIM1_CH2N */
     {&GPIOB, 15, MODE_FUNCTION, 4, PULL_DOWN, FAST, false}, /* TIM1_CH3N */
-    {&GPIOA, 15, MODE_FUNCTION, 9, PULL_DOWN, SLOW, false}, /* TIM1_BKIN: pad PWM of J3, high switches off */
+    {&GPIOA, 15, MODE_FUNCTION, 9, PULL_DOWN, SLOW, false}, /* TIM1_BKIN: pad PWM; high switches off */
     {&GPIOA, 11, MODE_FUNCTION, 9, PULL_UP, SLOW, false},   /* FDCAN1_RX */
     {&GPIOB, 9, MODE_FUNCTION, 9, PULL_NONE, MEDIUM, true}, /* FDCAN1_TX */
     {&GPIOB, 3, MODE_FUNCTION, 7, PULL_NONE, SLOW, false},  /* USART2_TX */

@@ -9,14 +9,20 @@
 #include "hal/stm32g431/registers/tim.h"
 
 #define STACK_PAINT 0xC5C5C5C5U
-enum { EXCEPTION_NMI = 2, EXCEPTION_PENDSV = 14, EXCEPTION_SYSTICK = 15, EXCEPTIONS = 16 };
+enum {
+    EXCEPTION_RESET = 1,
+    EXCEPTION_NMI = 2,
+    EXCEPTION_PENDSV = 14,
+    EXCEPTION_SYSTICK = 15,
+    EXCEPTIONS = 16
+};
 
 /* Places, from the link script */
-extern uint32_t port_stack_guard[], port_stack_low[], port_stack_top[];
+extern uint32_t port_stack_guard[], port_stack_bottom[], port_stack_top[];
 extern uint32_t port_data[], port_data_end[], port_data_load[];
 extern uint32_t port_bss[], port_bss_end[];
 extern uint32_t port_ccm[], port_ccm_begin[], port_ccm_end[], port_ccm_load[];
-extern uint32_t port_flash[], port_ram[], port_store[];
+extern uint32_t port_flash[], port_ram[];
 
 int main(void);
 
@@ -38,11 +44,19 @@ __attribute__((naked)) static void fault_entry(void)
                    "b port_fault");
 }
 
+typedef void (*handler_t)(void);
+
+/* Until the vectors in CCM SRAM are set: nothing else is enabled. */
+__attribute__((section(".vectors"), used)) static const struct {
+    uint32_t *stack;
+    handler_t reset, nmi, fault;
+} FIRST_VECTORS = {port_stack_top, port_reset, port_nmi, fault_entry};
+
 __attribute__((used)) void port_fault(const uint32_t *frame, uint32_t exception)
 {
     hal_last_words_t words = {.cause = exception, .status = SCB.CFSR};
     /* r0 to r3, r12, lr, pc, xPSR, if they could be stacked at all */
-    if (frame >= port_stack_low && frame + 8 <= port_stack_top) {
+    if (frame >= port_stack_bottom && frame + 8 <= FIRST_VECTORS.stack) {
         words.lr = frame[5];
         words.pc = frame[6];
     }
@@ -72,23 +86,16 @@ void port_nmi(void)
     port_bury(&words);
 }
 
-typedef void (*handler_t)(void);
-
-/* Until the vectors in CCM SRAM are set: nothing else is enabled. */
-__attribute__((section(".vectors"), used)) static const struct {
-    uint32_t *stack;
-    handler_t reset, nmi, fault;
-} FIRST_VECTORS = {port_stack_top, port_reset, port_nmi, fault_entry};
-
 /* Read without wait states. Aligned to the power of two above its size. */
 __attribute__((section(".vectors_ccm"), aligned(256))) static handler_t vectors[EXCEPTIONS + IRQ_LAST + 1];
 
 static void set_vectors(void)
 {
     for (uint32_t n = 0; n < sizeof vectors / sizeof vectors[0]; ++n) {
-        vectors[n] = fault_entry;
+        vectors[n] = FIRST_VECTORS.fault;
     }
-    vectors[EXCEPTION_NMI] = port_nmi;
+    vectors[EXCEPTION_RESET] = FIRST_VECTORS.reset;
+    vectors[EXCEPTION_NMI] = FIRST_VECTORS.nmi;
     vectors[EXCEPTION_PENDSV] = port_slow;
     vectors[EXCEPTION_SYSTICK] = port_monitor;
     vectors[EXCEPTIONS + IRQ_ADC1_2] = port_control;
@@ -98,18 +105,23 @@ static void set_vectors(void)
     SCB.SHCSR = SCB_SHCSR_MEMFAULTENA | SCB_SHCSR_BUSFAULTENA | SCB_SHCSR_USGFAULTENA;
 }
 
+static uint32_t words_between(const volatile uint32_t *from, const uint32_t *to)
+{
+    return ((uint32_t)(uintptr_t)to - (uint32_t)(uintptr_t)from) / sizeof *to;
+}
+
 /* Volatile: no call of memcpy, which may itself be among what is copied. */
 static void copy(volatile uint32_t *to, const uint32_t *end, const uint32_t *from)
 {
-    while ((uintptr_t)to < (uintptr_t)end) {
-        *to++ = *from++;
+    for (uint32_t n = 0; n < words_between(to, end); ++n) {
+        to[n] = from[n];
     }
 }
 
 static void fill(volatile uint32_t *to, const uint32_t *end, uint32_t value)
 {
-    while ((uintptr_t)to < (uintptr_t)end) {
-        *to++ = value;
+    for (uint32_t n = 0; n < words_between(to, end); ++n) {
+        to[n] = value;
     }
 }
 
@@ -128,7 +140,7 @@ static void protect_memory(void)
     const region_t regions[] = {
         {NULL, 28, NO_ACCESS, false}, /* null pointers, up to the first memory */
         {port_flash, 17, READ_ONLY, true},
-        {port_store, 12, READ_WRITE, false},
+        {port_store[0], 12, READ_WRITE, false},
         {port_ccm, 14, READ_ONLY, true},
         {port_ram, 15, READ_WRITE, false},
         {port_stack_guard, 5, NO_ACCESS, false},
@@ -148,7 +160,7 @@ __attribute__((noreturn)) void port_reset(void)
 {
     const uint32_t *stack;
     __asm volatile("mov %0, sp" : "=r"(stack));
-    fill(port_stack_low, stack, STACK_PAINT);
+    fill(port_stack_bottom, stack, STACK_PAINT);
     copy(port_ccm_begin, port_ccm_end, port_ccm_load);
     copy(port_data, port_data_end, port_data_load);
     fill(port_bss, port_bss_end, 0U);

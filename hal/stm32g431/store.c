@@ -6,7 +6,6 @@ enum {
     FIRST_PAGE = 62, /* the last two of 64 */
     ERASE_US = 50000,
     WRITE_US = 1000,
-    PAGE_WORDS = HAL_STORE_PAGE_SIZE / 4,
     PATIENCE_MS = 100, /* of the watchdog: the processor stands still while a page is erased */
     WATCHDOG_MS = 20,
 };
@@ -14,8 +13,6 @@ enum {
 #define FLASH_ERRORS                                                                                         \
     (FLASH_SR_OPERR | FLASH_SR_PROGERR | FLASH_SR_WRPERR | FLASH_SR_PGAERR | FLASH_SR_SIZERR |               \
      FLASH_SR_PGSERR | FLASH_SR_MISERR | FLASH_SR_FASTERR)
-
-extern uint32_t port_store[HAL_STORE_PAGES][PAGE_WORDS]; /* from the link script */
 
 const uint32_t *hal_store_page(const hal_t *hal, uint32_t page)
 {

@@ -56,6 +56,8 @@ class Arrows(unittest.TestCase):
     def test_hal(self):
         self.refused("firmware/drive/x.c", '#include "hal/hal.h"\n', 1, "drive", "hal")
         self.refused("hal/sim/x.c", '#include "observers/active_flux.h"\n', 1, "hal_sim", "observers")
+        self.refused("hal/stm32g431/x.c", '#include "sim_plant/plant.h"\n', 1, "hal", "sim_plant")
+        self.refused("hal/template/x.c", '#include "observers/active_flux.h"\n', 1, "hal", "observers")
         self.refused("hal/linux/x.c", '#include "sim_plant/plant.h"\n', 1, "hal", "sim_plant")
 
     def test_plant_shares_nothing(self):

@@ -86,7 +86,7 @@ def main():
     good &= check("stack of the start", stack(image, frames, False), STACK_MOST)
     print("stack by rising priority, with interrupts:")
     good &= check("stack", stack(image, frames, True), STACK_MOST)
-    reserved = image.symbols["port_stack_top"] - image.symbols["port_stack_low"]
+    reserved = image.symbols["port_stack_top"] - image.symbols["port_stack_bottom"]
     good &= check("stack beside what is reserved", STACK_MOST, reserved)
     print(f"     CCM SRAM: {sizes['.vectors_ccm'] + sizes['.ccm']} of 10240 bytes")
     for name in outside_ccm(image):
