@@ -214,6 +214,7 @@ static void account(cpu_t *cpu, cpu_block_t *block)
         cpu_spend(cpu, cycles_of_fetch(&block->region->fetch, block->address, block->size));
     }
     cpu->total.instructions += block->cost.instructions;
+    cpu->event = cpu->event || block->cost.sends_event;
     block->hits++;
     cpu->block = block;
     cpu->block_end = block->address + block->size;
@@ -567,7 +568,7 @@ void cpu_reset(cpu_t *cpu, uint32_t vector_table)
     system_block_reset(cpu);
     for (unsigned i = 0; i < cpu->regions; i++) {
         if (cpu->region[i].is.writable) {
-            cpu_forget_blocks(cpu, cpu->region[i].is.base, cpu->region[i].is.size);
+            cpu_code_changed(cpu, cpu->region[i].is.base, cpu->region[i].is.size);
         }
     }
     cpu->system.vtor = vector_table;

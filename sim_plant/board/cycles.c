@@ -79,6 +79,7 @@ void cycles_of_block(cycles_block_t *block, const uint8_t *code, uint32_t size)
         block->instructions++;
         block->divisions += insn.kind == INSN_DIVIDE ? 1 : 0;
         block->floating = block->floating || insn.floating;
+        block->sends_event = block->sends_event || insn.kind == INSN_SEND_EVENT;
         block->ends_in_branch_if = insn.kind == INSN_BRANCH_IF;
         pipeline.memory = insn.kind == INSN_LOAD || insn.kind == INSN_STORE;
         pipeline.loaded = insn.target;
