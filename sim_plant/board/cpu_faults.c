@@ -39,10 +39,8 @@ uint32_t cpu_access_pc(cpu_t *cpu, uint32_t address, bool write, uint32_t *it)
     }
     const uint8_t *code = block->region->host + (block->address - block->region->is.base);
     for (uint32_t at = 0; at + 2 <= block->size;) {
-        const uint16_t first = (uint16_t)(code[at] | code[at + 1] << 8);
-        const uint16_t second = at + 4 <= block->size ? (uint16_t)(code[at + 2] | code[at + 3] << 8) : 0;
         insn_t insn;
-        insn_decode(&insn, first, second);
+        insn_decode_at(&insn, code + at, block->size - at);
         if (touches(&insn, block->address + at, registers, address, write)) {
             *it = state;
             return block->address + at;
@@ -53,8 +51,8 @@ uint32_t cpu_access_pc(cpu_t *cpu, uint32_t address, bool write, uint32_t *it)
     return block->address;
 }
 
-/* Within an IT block unicorn 2.0.1 goes on behind a store that failed, up to the next store: registers are put
- * back and devices do not hear of it (fault.pending), but one store to memory can slip through. */
+/* Within an IT block unicorn 2.0.1 goes on behind a store that failed, up to the next store: registers are
+ * put back and devices do not hear of it (fault.pending), but one store to memory can slip through. */
 static void give_fault(cpu_t *cpu, uint32_t address, bool write, bool protection)
 {
     if (cpu->fault.pending) {
@@ -104,8 +102,7 @@ bool cpu_on_bad_memory(uc_engine *uc, uc_mem_type type, uint64_t where, int size
     cpu_t *cpu = user;
     const uint32_t address = (uint32_t)where;
     if (type == UC_MEM_FETCH_UNMAPPED || type == UC_MEM_FETCH_PROT) {
-        give_fault(cpu, address, false,
-                   !mpu_allows(&cpu->mpu, address, MPU_EXECUTE, cpu_is_urgent(cpu)));
+        give_fault(cpu, address, false, !mpu_allows(&cpu->mpu, address, MPU_EXECUTE, cpu_is_urgent(cpu)));
         return false;
     }
     const bool write = type == UC_MEM_WRITE_UNMAPPED || type == UC_MEM_WRITE_PROT;
@@ -128,8 +125,8 @@ bool cpu_on_bad_memory(uc_engine *uc, uc_mem_type type, uint64_t where, int size
     if (write && !region->is.writable) {
         return to_flash(cpu, address, (unsigned)size, (uint32_t)value);
     }
-    /* Allowed after all: unicorn's finest grain is a page. It now takes reads as allowed everywhere in it, until
-     * the end of the block. */
+    /* Allowed after all: unicorn's finest grain is a page. It now takes reads as allowed everywhere in it,
+     * until the end of the block. */
     cpu->close_again = true;
     cpu->want_stop = true;
     return true;

@@ -289,6 +289,16 @@ void insn_decode(insn_t *insn, uint16_t first, uint16_t second)
     }
 }
 
+static uint16_t half_word(const uint8_t *code)
+{
+    return (uint16_t)((unsigned)code[0] | (unsigned)code[1] << 8);
+}
+
+void insn_decode_at(insn_t *insn, const uint8_t *code, uint32_t left)
+{
+    insn_decode(insn, half_word(code), left >= 4 ? half_word(code + 2) : 0);
+}
+
 uint32_t insn_address(const insn_t *insn, uint32_t pc, const uint32_t registers[16])
 {
     uint32_t address = insn->base == PC ? (pc + 4) & ~3U : registers[insn->base & 15];

@@ -52,6 +52,9 @@ typedef struct {
 /* `second` is the following half-word, of use to 32-bit instructions alone. */
 void insn_decode(insn_t *insn, uint16_t first, uint16_t second);
 
+/* The one at the start of `left` bytes of code. */
+void insn_decode_at(insn_t *insn, const uint8_t *code, uint32_t left);
+
 static inline bool insn_is_wide(uint16_t first)
 {
     return first >= 0xE800;

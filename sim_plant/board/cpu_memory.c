@@ -44,6 +44,8 @@ bool cpu_store(cpu_t *cpu, uint32_t address, uint32_t value)
     return true;
 }
 
+enum { MPU_FINEST = 32 }; /* bytes of its smallest region */
+
 static uint32_t permissions_of(const cpu_t *cpu, const cpu_region_t *region, uint32_t page)
 {
     uint32_t permissions = UC_PROT_EXEC;
@@ -51,9 +53,12 @@ static uint32_t permissions_of(const cpu_t *cpu, const cpu_region_t *region, uin
         return permissions; /* a load has to wait */
     }
     if (!mpu_is_open(&cpu->mpu, page, CPU_PAGE)) {
-        /* Not writable memory is most often closed to writes by the MPU too, which costs nothing. */
-        const bool readable = !region->is.writable && mpu_allows(&cpu->mpu, page, MPU_READ, false) &&
-                              mpu_allows(&cpu->mpu, page + CPU_PAGE - 32, MPU_READ, false);
+        /* Code and constants are most often closed to writes alone, and a trap for each load would cost much.
+         */
+        bool readable = true;
+        for (uint32_t at = 0; at < CPU_PAGE; at += MPU_FINEST) {
+            readable = readable && mpu_allows(&cpu->mpu, page + at, MPU_READ, false);
+        }
         return readable ? permissions | UC_PROT_READ : permissions;
     }
     return permissions | UC_PROT_READ | (region->is.writable ? UC_PROT_WRITE : 0U);

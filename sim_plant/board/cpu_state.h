@@ -123,12 +123,21 @@ struct cpu {
 };
 
 /* cpu.c */
+extern const int cpu_core_register[16]; /* unicorn's names of r0 to r15 */
 uint32_t cpu_get(const cpu_t *cpu, int unicorn_register);
 void cpu_set(cpu_t *cpu, int unicorn_register, uint32_t value);
 void cpu_get_core(const cpu_t *cpu, uint32_t registers[16]);
 void cpu_spend(cpu_t *cpu, cycles_t cycles);
 bool cpu_hook(cpu_t *cpu, uc_hook *hook, int type, void (*call)(void), uint64_t begin, uint64_t end);
 void cpu_fail_at(cpu_t *cpu, uint32_t pc, const char *format, ...);
+
+/* cpu_hooks.c */
+void cpu_on_block(uc_engine *uc, uint64_t address, uint32_t size, void *user);
+void cpu_on_interrupt(uc_engine *uc, uint32_t number, void *user);
+void cpu_serve_attention(cpu_t *cpu, cpu_block_t *block); /* with the processor at rest */
+
+/* cpu_window.c */
+bool cpu_open_windows(cpu_t *cpu);
 
 /* cpu_memory.c */
 cpu_region_t *cpu_region_of(cpu_t *cpu, uint32_t address);

@@ -71,14 +71,13 @@ void cycles_of_block(cycles_block_t *block, const uint8_t *code, uint32_t size)
     *block = (cycles_block_t){.instructions = 0};
     pipeline_t pipeline = {false, INSN_NO_REGISTER};
     for (uint32_t at = 0; at + 2 <= size;) {
-        const uint16_t first = (uint16_t)(code[at] | code[at + 1] << 8);
-        const uint16_t second = at + 4 <= size ? (uint16_t)(code[at + 2] | code[at + 3] << 8) : 0;
         insn_t insn;
-        insn_decode(&insn, first, second);
+        insn_decode_at(&insn, code + at, size - at);
         block->cycles = plus(block->cycles, of_instruction(&insn, &pipeline));
         block->instructions++;
         block->divisions += insn.kind == INSN_DIVIDE ? 1 : 0;
         block->floating = block->floating || insn.floating;
+        block->sends_event = block->sends_event || insn.kind == INSN_SEND_EVENT;
         block->ends_in_branch_if = insn.kind == INSN_BRANCH_IF;
         pipeline.memory = insn.kind == INSN_LOAD || insn.kind == INSN_STORE;
         pipeline.loaded = insn.target;

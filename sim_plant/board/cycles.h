@@ -29,14 +29,16 @@ typedef struct {
     uint32_t instructions;
     uint32_t divisions;
     bool ends_in_branch_if;
-    bool floating; /* has instructions that need the floating-point unit */
+    bool floating;    /* has instructions that need the floating-point unit */
+    bool sends_event; /* has SEV */
 } cycles_block_t;
 
 void cycles_of_block(cycles_block_t *block, const uint8_t *code, uint32_t size);
 
 static inline cycles_t cycles_taken(void) /* in addition to the branch itself */
 {
-    return (cycles_t){1, 2, 3};
+    const cycles_t refill = {1, 2, 3};
+    return refill;
 }
 
 uint32_t cycles_of_division(uint32_t numerator, uint32_t denominator, bool is_signed);

@@ -206,6 +206,15 @@ static void deactivate(cpu_t *cpu, int exception)
         cpu_set(cpu, UC_ARM_REG_FAULTMASK, 0);
     }
     cpu->event = true;
+}
+
+/* The cycles of unstacking are the exception's own; a chained one takes over the frame. */
+static void leave(cpu_t *cpu, int exception, bool chained, bool extended)
+{
+    if (!chained) {
+        const uint32_t high = CYCLES_RETURN + (extended ? CYCLES_FP_FRAME : 0U);
+        cpu_spend(cpu, (cycles_t){CYCLES_RETURN, CYCLES_RETURN, high});
+    }
     cpu_stats_leave(cpu, exception);
     if (cpu->trace.call != NULL) {
         cpu->trace.call(cpu->trace.owner, exception, false);
@@ -243,21 +252,19 @@ void exceptions_return(cpu_t *cpu, uint32_t exc_return)
 {
     const int exception = (int)(cpu_get(cpu, UC_ARM_REG_XPSR) & XPSR_EXCEPTION);
     const bool legal = return_is_legal(cpu, exception, exc_return);
+    const bool extended = (exc_return & RETURN_BASIC) == 0;
+    deactivate(cpu, exception);
     if (!legal) {
-        deactivate(cpu, exception);
         exceptions_raise_usage(cpu, CFSR_INVPC);
-    } else {
-        deactivate(cpu, exception);
     }
     int next = exceptions_next(cpu);
     uint32_t words[FRAME_WORDS] = {0};
     const uint32_t frame = cpu_get(cpu, (exc_return & RETURN_PSP) != 0 ? UC_ARM_REG_PSP : UC_ARM_REG_SP);
-    if (next == 0 && legal) {
-        const unsigned count = ((exc_return & RETURN_BASIC) == 0 ? FRAME_EXTENDED : FRAME_BASIC) / 4;
-        if (!stack_words(cpu, frame, words, count, false)) {
-            next = exceptions_next(cpu);
-        }
+    if (next == 0 && legal &&
+        !stack_words(cpu, frame, words, (extended ? FRAME_EXTENDED : FRAME_BASIC) / 4U, false)) {
+        next = exceptions_next(cpu);
     }
+    leave(cpu, exception, next != 0, extended);
     if (cpu->locked_up) {
         return;
     }

@@ -1,170 +1,4 @@
-#include "sim_plant/board/system_block.h"
-
-#include "sim_plant/board/cpu_state.h"
-#include "sim_plant/board/exceptions.h"
-
-/* Offsets in the system control space, 0xE000E000 */
-enum {
-    ICTR = 0x004,
-    ACTLR = 0x008,
-    SYST_CSR = 0x010,
-    SYST_RVR = 0x014,
-    SYST_CVR = 0x018,
-    SYST_CALIB = 0x01C,
-    NVIC_ISER = 0x100,
-    NVIC_ICER = 0x180,
-    NVIC_ISPR = 0x200,
-    NVIC_ICPR = 0x280,
-    NVIC_IABR = 0x300,
-    NVIC_IPR = 0x400,
-    NVIC_IPR_END = NVIC_IPR + NVIC_LINES,
-    CPUID = 0xD00,
-    ICSR = 0xD04,
-    VTOR = 0xD08,
-    AIRCR = 0xD0C,
-    SCR = 0xD10,
-    CCR = 0xD14,
-    SHPR1 = 0xD18,
-    SHPR3 = 0xD20,
-    SHCSR = 0xD24,
-    CFSR = 0xD28,
-    HFSR = 0xD2C,
-    DFSR = 0xD30,
-    MMFAR = 0xD34,
-    BFAR = 0xD38,
-    AFSR = 0xD3C,
-    CPACR = 0xD88,
-    MPU = 0xD90,
-    MPU_END = 0xDBC,
-    DHCSR = 0xDF0,
-    DEMCR = 0xDFC,
-    STIR = 0xF00,
-    FPCCR = 0xF34,
-    FPCAR = 0xF38,
-    FPDSCR = 0xF3C,
-};
-
-enum { SYSTICK_ENABLE = 1, SYSTICK_INTERRUPT = 2, SYSTICK_CORE_CLOCK = 4 };
-
-#define TRACE_ENABLE UINT32_C(0x01000000)
-
-static uint64_t now(const cpu_t *cpu)
-{
-    return cpu->total.typical;
-}
-
-/* --- SysTick ------------------------------------------------------------------------------------------ */
-
-static uint64_t tick(const cpu_t *cpu)
-{
-    return (cpu->system.systick.control & SYSTICK_CORE_CLOCK) != 0 ? 1 : 8;
-}
-
-static void systick_zero(void *owner, uint64_t cycle)
-{
-    /* The alarm belongs to SysTick's own state, so that the processor's address stays free for others. */
-    char *system = (char *)owner - offsetof(system_block_t, systick);
-    cpu_t *cpu = (cpu_t *)(void *)(system - offsetof(struct cpu, system));
-    cpu->system.systick.passed_zero = true;
-    if ((cpu->system.systick.control & SYSTICK_INTERRUPT) != 0) {
-        nvic_pend(&cpu->nvic, EXCEPTION_SYSTICK, cycle);
-    }
-    const uint64_t period = (cpu->system.systick.reload + UINT64_C(1)) * tick(cpu);
-    cpu->system.systick.zero_at = cpu->system.systick.reload == 0 ? UINT64_MAX : cycle + period;
-    cpu_alarm(cpu, owner, cpu->system.systick.zero_at, systick_zero);
-}
-
-static void systick_start(cpu_t *cpu, uint32_t from)
-{
-    const bool runs =
-        (cpu->system.systick.control & SYSTICK_ENABLE) != 0 && (from != 0 || cpu->system.systick.reload != 0);
-    const uint64_t ticks = from != 0 ? from : cpu->system.systick.reload + UINT64_C(1);
-    cpu->system.systick.zero_at = runs ? now(cpu) + ticks * tick(cpu) : UINT64_MAX;
-    cpu_alarm(cpu, &cpu->system.systick, cpu->system.systick.zero_at, systick_zero);
-}
-
-static uint32_t systick_value(const cpu_t *cpu)
-{
-    if ((cpu->system.systick.control & SYSTICK_ENABLE) == 0) {
-        return cpu->system.systick.value;
-    }
-    if (cpu->system.systick.zero_at == UINT64_MAX || cpu->system.systick.zero_at <= now(cpu)) {
-        return 0;
-    }
-    const uint64_t left = (cpu->system.systick.zero_at - now(cpu) + tick(cpu) - 1) / tick(cpu);
-    return left > cpu->system.systick.reload ? 0 : (uint32_t)left;
-}
-
-static void systick_control(cpu_t *cpu, uint32_t value)
-{
-    const uint32_t count = systick_value(cpu);
-    cpu->system.systick.control = value & 7U;
-    cpu->system.systick.value = count;
-    systick_start(cpu, count);
-}
-
-/* --- NVIC ---------------------------------------------------------------------------------------------- */
-
-static uint32_t lines(cpu_t *cpu, uint32_t offset, bool (*is)(const nvic_t *, int))
-{
-    uint32_t value = 0;
-    for (int bit = 0; bit < 32; bit++) {
-        const int exception = EXCEPTION_IRQ0 + (int)(offset / 4) * 32 + bit;
-        if (exception < NVIC_EXCEPTIONS && is(&cpu->nvic, exception)) {
-            value |= UINT32_C(1) << bit;
-        }
-    }
-    return value;
-}
-
-static void set_line(cpu_t *cpu, uint32_t kind, int exception)
-{
-    switch (kind) {
-    case NVIC_ISER:
-    case NVIC_ICER:
-        nvic_enable(&cpu->nvic, exception, kind == NVIC_ISER);
-        break;
-    case NVIC_ISPR:
-        nvic_pend(&cpu->nvic, exception, now(cpu));
-        break;
-    default:
-        nvic_unpend(&cpu->nvic, exception);
-        break;
-    }
-}
-
-static void set_lines(cpu_t *cpu, uint32_t kind, uint32_t offset, uint32_t value)
-{
-    for (uint32_t left = value; left != 0; left &= left - 1) {
-        const int exception = EXCEPTION_IRQ0 + (int)(offset / 4) * 32 + __builtin_ctz(left);
-        if (exception < NVIC_EXCEPTIONS) {
-            set_line(cpu, kind, exception);
-        }
-    }
-}
-
-static uint32_t priorities(const cpu_t *cpu, int first)
-{
-    uint32_t value = 0;
-    for (int i = 0; i < 4; i++) {
-        value |= (uint32_t)(uint8_t)cpu->nvic.priority[first + i] << (8 * i);
-    }
-    return value;
-}
-
-static void set_priorities(cpu_t *cpu, int first, uint32_t value, uint32_t mask)
-{
-    for (int i = 0; i < 4; i++) {
-        const int exception = first + i;
-        const bool exists = exception >= EXCEPTION_MEM_MANAGE &&
-                            (exception <= EXCEPTION_USAGE_FAULT || exception >= EXCEPTION_SVC);
-        if (exists && ((mask >> (8 * i)) & 0xFFU) != 0) {
-            nvic_set_priority(&cpu->nvic, exception, (uint8_t)(value >> (8 * i)));
-        }
-    }
-}
-
-/* --- System control block ------------------------------------------------------------------------------ */
+#include "sim_plant/board/system_block_parts.h"
 
 static uint32_t bit_if(bool set, unsigned bit)
 {
@@ -187,15 +21,15 @@ static uint32_t read_icsr(const cpu_t *cpu)
 static void write_icsr(cpu_t *cpu, uint32_t value)
 {
     if ((value >> 31 & 1U) != 0) {
-        nvic_pend(&cpu->nvic, EXCEPTION_NMI, now(cpu));
+        nvic_pend(&cpu->nvic, EXCEPTION_NMI, cpu->total.typical);
     }
     if ((value >> 28 & 1U) != 0) {
-        nvic_pend(&cpu->nvic, EXCEPTION_PENDSV, now(cpu));
+        nvic_pend(&cpu->nvic, EXCEPTION_PENDSV, cpu->total.typical);
     } else if ((value >> 27 & 1U) != 0) {
         nvic_unpend(&cpu->nvic, EXCEPTION_PENDSV);
     }
     if ((value >> 26 & 1U) != 0) {
-        nvic_pend(&cpu->nvic, EXCEPTION_SYSTICK, now(cpu));
+        nvic_pend(&cpu->nvic, EXCEPTION_SYSTICK, cpu->total.typical);
     } else if ((value >> 25 & 1U) != 0) {
         nvic_unpend(&cpu->nvic, EXCEPTION_SYSTICK);
     }
@@ -252,7 +86,7 @@ static bool write_shcsr(cpu_t *cpu, uint32_t value)
             nvic_enable(&cpu->nvic, exception, (value >> handlers[i].enable & 1U) != 0);
         }
         if (handlers[i].pended != 0xFF && (value >> handlers[i].pended & 1U) != 0) {
-            nvic_pend(&cpu->nvic, exception, now(cpu));
+            nvic_pend(&cpu->nvic, exception, cpu->total.typical);
         } else if (handlers[i].pended != 0xFF) {
             nvic_unpend(&cpu->nvic, exception);
         }
@@ -303,52 +137,6 @@ static uint32_t *plain_register(cpu_t *cpu, uint32_t offset)
     }
 }
 
-static bool read_nvic(cpu_t *cpu, uint32_t offset, uint32_t *value)
-{
-    const uint32_t index = offset & 0x7FU;
-    switch (offset & ~0x7FU) {
-    case NVIC_ISER:
-    case NVIC_ICER:
-        *value = lines(cpu, index, nvic_enabled);
-        return true;
-    case NVIC_ISPR:
-    case NVIC_ICPR:
-        *value = lines(cpu, index, nvic_pending);
-        return true;
-    case NVIC_IABR:
-        *value = lines(cpu, index, nvic_active);
-        return true;
-    default:
-        break;
-    }
-    if (offset >= NVIC_IPR && offset < NVIC_IPR_END) {
-        *value = priorities(cpu, EXCEPTION_IRQ0 + (int)(offset - NVIC_IPR));
-        return true;
-    }
-    return false;
-}
-
-static bool read_systick(cpu_t *cpu, uint32_t offset, uint32_t *value)
-{
-    switch (offset) {
-    case SYST_CSR:
-        *value = cpu->system.systick.control | bit_if(cpu->system.systick.passed_zero, 16);
-        cpu->system.systick.passed_zero = false;
-        return true;
-    case SYST_RVR:
-        *value = cpu->system.systick.reload;
-        return true;
-    case SYST_CVR:
-        *value = systick_value(cpu);
-        return true;
-    case SYST_CALIB:
-        *value = 0;
-        return true;
-    default:
-        return false;
-    }
-}
-
 static bool read_control(void *self, uint32_t offset, uint32_t *value)
 {
     cpu_t *cpu = self;
@@ -387,44 +175,8 @@ static bool read_control(void *self, uint32_t offset, uint32_t *value)
     if (offset >= MPU && offset < MPU_END) {
         return mpu_read(&cpu->mpu, offset - MPU, value);
     }
-    return read_systick(cpu, offset, value) || read_nvic(cpu, offset, value);
+    return systick_read(cpu, offset, value) || lines_read(cpu, offset, value);
 }
-
-static bool write_nvic(cpu_t *cpu, uint32_t offset, uint32_t value, uint32_t mask)
-{
-    const uint32_t kind = offset & ~0x7FU;
-    if (kind == NVIC_ISER || kind == NVIC_ICER || kind == NVIC_ISPR || kind == NVIC_ICPR) {
-        set_lines(cpu, kind, offset & 0x7FU, value);
-        return true;
-    }
-    if (offset >= NVIC_IPR && offset < NVIC_IPR_END) {
-        set_priorities(cpu, EXCEPTION_IRQ0 + (int)(offset - NVIC_IPR), value, mask);
-        return true;
-    }
-    return false;
-}
-
-static bool write_systick(cpu_t *cpu, uint32_t offset, uint32_t value)
-{
-    switch (offset) {
-    case SYST_CSR:
-        systick_control(cpu, value);
-        return true;
-    case SYST_RVR:
-        cpu->system.systick.reload = value & 0xFFFFFFU;
-        return true;
-    case SYST_CVR:
-        cpu->system.systick.passed_zero = false;
-        cpu->system.systick.value = 0;
-        systick_start(cpu, 0);
-        return true;
-    default:
-        return false;
-    }
-}
-
-static void dwt_sync(cpu_t *cpu, uint32_t value);
-static uint32_t dwt_count(const cpu_t *cpu);
 
 static bool write_control(void *self, uint32_t offset, uint32_t value, uint32_t mask)
 {
@@ -449,14 +201,11 @@ static bool write_control(void *self, uint32_t offset, uint32_t value, uint32_t 
     case DFSR:
         *plain &= ~value; /* a one clears */
         return true;
-    case DEMCR: {
-        const uint32_t count = dwt_count(cpu);
-        cpu->system.demcr = value;
-        dwt_sync(cpu, count);
+    case DEMCR:
+        dwt_enable(cpu, value);
         return (value & UINT32_C(0x000F0000)) == 0; /* the debug monitor */
-    }
     case STIR:
-        set_line(cpu, NVIC_ISPR, EXCEPTION_IRQ0 + (int)(value % NVIC_LINES));
+        nvic_pend(&cpu->nvic, EXCEPTION_IRQ0 + (int)(value % NVIC_LINES), cpu->total.typical);
         return true;
     default:
         break;
@@ -477,95 +226,15 @@ static bool write_control(void *self, uint32_t offset, uint32_t value, uint32_t 
         cpu->want_stop = true;
         return mpu_write(&cpu->mpu, offset - MPU, value);
     }
-    return write_systick(cpu, offset, value) || write_nvic(cpu, offset, value, mask);
-}
-
-/* --- DWT and ITM --------------------------------------------------------------------------------------- */
-
-enum {
-    DWT_CTRL = 0x000,
-    DWT_CYCCNT = 0x004,
-    LOCK_ACCESS = 0xFB0,
-    ITM_TER = 0xE00,
-    ITM_TPR = 0xE40,
-    ITM_TCR = 0xE80
-};
-
-static bool dwt_counts(const cpu_t *cpu)
-{
-    return (cpu->system.dwt.control & 1U) != 0 && (cpu->system.demcr & TRACE_ENABLE) != 0;
-}
-
-static uint32_t dwt_count(const cpu_t *cpu)
-{
-    return dwt_counts(cpu) ? (uint32_t)(now(cpu) - cpu->system.dwt.origin) : cpu->system.dwt.value;
-}
-
-static void dwt_sync(cpu_t *cpu, uint32_t value)
-{
-    cpu->system.dwt.value = value;
-    cpu->system.dwt.origin = now(cpu) - value;
-}
-
-static bool read_dwt(void *self, uint32_t offset, uint32_t *value)
-{
-    cpu_t *cpu = self;
-    switch (offset) {
-    case DWT_CTRL:
-        *value = UINT32_C(0x40000000) | cpu->system.dwt.control;
-        return true;
-    case DWT_CYCCNT:
-        *value = dwt_count(cpu);
-        return true;
-    default:
-        return false;
-    }
-}
-
-static bool write_dwt(void *self, uint32_t offset, uint32_t value, uint32_t mask)
-{
-    cpu_t *cpu = self;
-    (void)mask;
-    switch (offset) {
-    case DWT_CTRL: {
-        const uint32_t count = dwt_count(cpu);
-        cpu->system.dwt.control = value & 1U;
-        dwt_sync(cpu, count);
-        return (value & ~1U & UINT32_C(0x0FFFFFFF)) == 0; /* the other counters */
-    }
-    case DWT_CYCCNT:
-        dwt_sync(cpu, value);
-        return true;
-    case LOCK_ACCESS:
-        return true;
-    default:
-        return false;
-    }
-}
-
-/* Ports read as zero, which is "full": nobody takes the data. */
-static bool read_itm(void *self, uint32_t offset, uint32_t *value)
-{
-    (void)self;
-    *value = 0;
-    return offset < 0x80 || offset == ITM_TER || offset == ITM_TPR || offset == ITM_TCR;
-}
-
-static bool write_itm(void *self, uint32_t offset, uint32_t value, uint32_t mask)
-{
-    (void)self;
-    (void)value;
-    (void)mask;
-    return offset < 0x80 || offset == ITM_TER || offset == ITM_TPR || offset == ITM_TCR ||
-           offset == LOCK_ACCESS;
+    return systick_write(cpu, offset, value) || lines_write(cpu, offset, value, mask);
 }
 
 void system_block_attach(cpu_t *cpu)
 {
     const cpu_device_t devices[] = {
         {"system control space", UINT32_C(0xE000E000), 0x1000, cpu, read_control, write_control},
-        {"DWT", UINT32_C(0xE0001000), 0x1000, cpu, read_dwt, write_dwt},
-        {"ITM", UINT32_C(0xE0000000), 0x1000, cpu, read_itm, write_itm},
+        {"DWT", UINT32_C(0xE0001000), 0x1000, cpu, dwt_read, dwt_write},
+        {"ITM", UINT32_C(0xE0000000), 0x1000, cpu, itm_read, itm_write},
     };
     for (unsigned i = 0; i < sizeof devices / sizeof devices[0]; i++) {
         (void)bus_add(&cpu->bus, &devices[i]);
