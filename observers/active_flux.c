@@ -34,7 +34,7 @@ static void set_operating_point(active_flux_t *self, const active_flux_config_t 
 {
     const pm_q_t L_q = config->L_q + pm_mul(config->L_q2, pm_mul(in->i_dq.q, in->i_dq.q));
     self->drop = to_drop(pm_frac(self->R, config->t_s));
-    self->inductance = to_inductance(L_q) + self->drop / 4; /* R T_s / 2 */
+    self->inductance = pm_add_sat(to_inductance(L_q), self->drop / 4); /* R T_s / 2 */
     self->k_amplitude = to_feedback(pm_mul(pm_abs(in->omega), config->g));
 }
 

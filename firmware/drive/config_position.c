@@ -22,6 +22,8 @@ static void make_flux(maker_t *m, active_flux_config_t *c)
     c->R = per_unit(m, DRIVE_PARAM_R_s, m->impedance);
     c->L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
     c->L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);
+    /* the observer holds it in Q29 */
+    (void)fixed(m, pm_num_div(si(m, DRIVE_PARAM_L_q), m->inductance), Q_BITS + 1, DRIVE_PARAM_L_q);
     c->L_q2 = 0;
     if (m->params->saturation_comp != 0) {
         c->L_q2 = fixed(m, pm_num_div(pm_num_div(change, m->inductance), square(i_rated)), Q_BITS,
