@@ -1,27 +1,57 @@
 #include "sim_plant/comparator.h"
 
+#include <assert.h>
 #include <math.h>
+#include <stddef.h>
+#include <string.h>
 
 #define WATCH_S 1e-6
 #define FOUND_S 0.05e-6
 #define NEAR    0.5
 
-bool comparator_sees(const comparator_t *comparator, const circuit_t *circuit, double share)
+/* What moves in a segment: everything but the machine, which is large and stands first. */
+static_assert(offsetof(circuit_t, machine) == 0, "the machine stands first");
+#define MOVING (sizeof(circuit_t) - offsetof(circuit_t, bridge))
+
+static void keep(const circuit_t *circuit, circuit_t *kept)
 {
-    const plant_break_t *levels = &comparator->levels;
+    memcpy((char *)kept + offsetof(circuit_t, bridge), (const char *)circuit + offsetof(circuit_t, bridge),
+           MOVING);
+}
+
+static void give_back(const circuit_t *kept, circuit_t *circuit)
+{
+    memcpy((char *)circuit + offsetof(circuit_t, bridge), (const char *)kept + offsetof(circuit_t, bridge),
+           MOVING);
+}
+
+static double inverse(double level_A)
+{
+    return level_A > 0.0 ? 1.0 / level_A : 0.0;
+}
+
+void comparator_init(comparator_t *comparator, const plant_break_t *levels, bool in_line)
+{
+    *comparator = (comparator_t){.delay_s = levels->delay_s, .in_line = in_line};
+    for (int k = 0; k < PLANT_LEGS; k++) {
+        comparator->inv_above_1_A[k] = inverse(levels->above_A[k]);
+        comparator->inv_below_1_A[k] = -inverse(levels->below_A[k]);
+    }
+}
+
+double comparator_sees(const comparator_t *comparator, const circuit_t *circuit)
+{
+    double most = 0.0;
     for (int k = 0; k < circuit->bridge.legs; k++) {
         leg_t leg = circuit->bridge.leg[k];
         bool low = leg == LEG_LOW || leg == LEG_DIODE_LOW || leg == LEG_BOTH;
-        if (leg == LEG_FLOATING || !(low || comparator->in_line)) {
-            continue;
-        }
-        double i_A = circuit_leg_A(circuit, &circuit->now, k);
-        if ((levels->above_A[k] > 0.0 && i_A > share * levels->above_A[k]) ||
-            (levels->below_A[k] > 0.0 && i_A < -share * levels->below_A[k])) {
-            return true;
+        if (low || (comparator->in_line && leg != LEG_FLOATING)) {
+            double i_A = circuit_leg_A(circuit, &circuit->now, k);
+            double seen = i_A * (i_A > 0.0 ? comparator->inv_above_1_A[k] : comparator->inv_below_1_A[k]);
+            most = seen > most ? seen : most;
         }
     }
-    return false;
+    return most;
 }
 
 /* The level is passed between `from` and length h after it: moves the circuit just beyond. */
@@ -31,38 +61,36 @@ static double find(const comparator_t *comparator, const circuit_t *from, double
     double beyond = h;
     while (beyond - below > FOUND_S) {
         double middle = 0.5 * (below + beyond);
-        *circuit = *from;
+        give_back(from, circuit);
         circuit_advance(circuit, middle);
-        *(comparator_sees(comparator, circuit, 1.0) ? &beyond : &below) = middle;
+        *(comparator_sees(comparator, circuit) > 1.0 ? &beyond : &below) = middle;
     }
-    *circuit = *from;
+    give_back(from, circuit);
     circuit_advance(circuit, beyond);
     return beyond;
 }
 
 bool comparator_advance(const comparator_t *comparator, circuit_t *circuit, double *duration_s)
 {
-    if (comparator_sees(comparator, circuit, 1.0)) {
-        *duration_s = 0.0;
-        return true;
-    }
-    bool near = comparator_sees(comparator, circuit, NEAR);
-    for (double taken = 0.0; taken < *duration_s;) {
+    circuit_t before;
+    double sees = comparator_sees(comparator, circuit);
+    double taken = 0.0;
+    bool watch = sees > NEAR;
+    while (sees <= 1.0 && taken < *duration_s) {
         double left = *duration_s - taken;
-        double h = near ? fmin(left, WATCH_S) : left;
-        circuit_t before = *circuit;
+        double h = watch ? fmin(left, WATCH_S) : left;
+        keep(circuit, &before);
         circuit_advance(circuit, h);
-        bool was_near = near;
-        near = comparator_sees(comparator, circuit, NEAR);
-        if (near && !was_near && h > WATCH_S) {
-            *circuit = before; /* it may have passed the level and come back: again, closer */
+        sees = comparator_sees(comparator, circuit);
+        if (sees > NEAR && !watch && h > WATCH_S) {
+            give_back(&before, circuit); /* it may have passed the level and come back: again, closer */
+            watch = true;
+            sees = 0.0;
             continue;
         }
-        if (comparator_sees(comparator, circuit, 1.0)) {
-            *duration_s = taken + find(comparator, &before, h, circuit);
-            return true;
-        }
-        taken += h;
+        taken += sees > 1.0 ? find(comparator, &before, h, circuit) : h;
+        watch = sees > NEAR;
     }
-    return false;
+    *duration_s = taken;
+    return sees > 1.0;
 }

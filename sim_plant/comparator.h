@@ -9,12 +9,15 @@
 #include "sim_plant/circuit.h"
 
 typedef struct {
-    plant_break_t levels;
+    double inv_above_1_A[PLANT_LEGS], inv_below_1_A[PLANT_LEGS]; /* 0: never */
+    double delay_s;
     bool in_line; /* shunts see their currents always */
 } comparator_t;
 
-/* Whether one sees more than that share of its level. */
-bool comparator_sees(const comparator_t *comparator, const circuit_t *circuit, double share);
+void comparator_init(comparator_t *comparator, const plant_break_t *levels, bool in_line);
+
+/* What they see, the nearest one in units of its level: beyond 1 it acts. */
+double comparator_sees(const comparator_t *comparator, const circuit_t *circuit);
 
 /* By *duration_s, or less when a comparator acts: then *duration_s is what was taken, and true. */
 bool comparator_advance(const comparator_t *comparator, circuit_t *circuit, double *duration_s);

@@ -98,7 +98,7 @@ static void advance_until(plant_t *plant, double t_s)
     double duration_s = t_s - plant->t_s;
     if (watched && comparator_advance(&plant->comparator, &plant->circuit, &duration_s)) {
         plant->t_s += duration_s;
-        plant->break_s = plant->t_s + plant->comparator.levels.delay_s;
+        plant->break_s = plant->t_s + plant->comparator.delay_s;
         t_s = fmin(t_s, plant->break_s);
         watched = false;
     }
@@ -329,8 +329,7 @@ void plant_set_break(plant_t *plant, const plant_break_t *comparators)
     plant->break_s = (double)INFINITY;
     if (comparators) {
         assert(comparators->delay_s >= 0.0 && comparators->delay_s < plant->gates.period_s);
-        plant->comparator.levels = *comparators;
-        plant->comparator.in_line = plant->config.sensor.shunt == PLANT_IN_LINE;
+        comparator_init(&plant->comparator, comparators, plant->config.sensor.shunt == PLANT_IN_LINE);
     }
 }
 
@@ -344,7 +343,7 @@ bool plant_broke(plant_t *plant, double *after_s)
 
 bool plant_break_held(const plant_t *plant)
 {
-    return plant->has_break && comparator_sees(&plant->comparator, &plant->circuit, 1.0);
+    return plant->has_break && comparator_sees(&plant->comparator, &plant->circuit) > 1.0;
 }
 
 void plant_run_voltages(plant_t *plant, const double v_leg_V[], double rate_rad_s2, double duration_s)

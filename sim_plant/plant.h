@@ -130,8 +130,8 @@ void plant_sample_at(plant_t *plant, double after_s, plant_adc_t *adc);
 void plant_drive(plant_t *plant,
                  const bool driven[]); /* the legs change now, until the next PWM takes effect */
 
-/* Comparators that trip like plant_trip() at their instant, found to 0.05 us; NULL: none. Costs 1 % while the
- * currents are below half of the level. */
+/* Comparators that trip like plant_trip() at their instant, found to 0.05 us; NULL: none. A period
+ * costs a quarter more. */
 void plant_set_break(plant_t *plant, const plant_break_t *comparators);
 bool plant_broke(plant_t *plant, double *after_s); /* since asked last; counts from that period's start */
 bool plant_break_held(const plant_t *plant);       /* a comparator sees too much now */

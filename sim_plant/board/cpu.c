@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { TEXT = 160 }; /* of an error, without its place */
+
 const int cpu_core_register[16] = {
     UC_ARM_REG_R0,  UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3, UC_ARM_REG_R4,  UC_ARM_REG_R5,
     UC_ARM_REG_R6,  UC_ARM_REG_R7, UC_ARM_REG_R8, UC_ARM_REG_R9, UC_ARM_REG_R10, UC_ARM_REG_R11,
@@ -38,15 +40,13 @@ void cpu_spend(cpu_t *cpu, cycles_t cycles)
     cpu->total.high += cycles.high;
 }
 
-static void fail(cpu_t *cpu, uint32_t pc, const char *format, va_list arguments)
+static void fail(cpu_t *cpu, uint32_t pc, const char *text)
 {
     if (cpu->failed) {
         return; /* the first error is the cause of the rest */
     }
     cpu->failed = true;
     cpu->want_stop = true;
-    char text[160];
-    (void)vsnprintf(text, sizeof text, format, arguments);
     elf_symbol_t symbol;
     if (cpu->symbols != NULL && elf_image_function_at(cpu->symbols, pc, &symbol)) {
         (void)snprintf(cpu->error, sizeof cpu->error, "%s; PC 0x%08x, %s + 0x%x", text, pc, symbol.name,
@@ -59,17 +59,21 @@ static void fail(cpu_t *cpu, uint32_t pc, const char *format, va_list arguments)
 void cpu_fail_at(cpu_t *cpu, uint32_t pc, const char *format, ...)
 {
     va_list arguments;
+    char text[TEXT];
     va_start(arguments, format);
-    fail(cpu, pc, format, arguments);
+    (void)vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
+    fail(cpu, pc, text);
 }
 
 void cpu_fail(cpu_t *cpu, const char *format, ...)
 {
     va_list arguments;
+    char text[TEXT];
     va_start(arguments, format);
-    fail(cpu, cpu->block != NULL ? cpu->block->address : cpu_pc(cpu), format, arguments);
+    (void)vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
+    fail(cpu, cpu->block != NULL ? cpu->block->address : cpu_pc(cpu), text);
 }
 
 bool cpu_hook(cpu_t *cpu, uc_hook *hook, int type, void (*call)(void), uint64_t begin, uint64_t end)

@@ -69,8 +69,9 @@ void cpu_reset(cpu_t *cpu, uint32_t vector_table);
 /* Runs until that cycle. False when stopped by an error: cpu_error(). A halted processor lets time pass. */
 bool cpu_run(cpu_t *cpu, uint64_t until_cycle);
 const char *cpu_error(const cpu_t *cpu);
-void cpu_fail(cpu_t *cpu, const char *format, ...); /* for devices: ends the run */
-void cpu_halt(cpu_t *cpu, bool halted);             /* as a debugger does */
+/* For devices: ends the run. */
+__attribute__((format(printf, 2, 3))) void cpu_fail(cpu_t *cpu, const char *format, ...);
+void cpu_halt(cpu_t *cpu, bool halted); /* as a debugger does */
 /* Whatever the processor fetches from or loads of that memory until then waits. From within a device's write.
  */
 void cpu_stall(cpu_t *cpu, uint32_t base, uint64_t until_cycle);

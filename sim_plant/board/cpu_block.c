@@ -8,8 +8,8 @@ cpu_block_t *cpu_block_at(cpu_t *cpu, uint32_t address, uint32_t size)
     if (region == NULL || address - region->is.base + size > region->is.size) {
         return NULL;
     }
-    cpu_block_t **place = &region->block[(address - region->is.base) / 2];
-    cpu_block_t *block = *place;
+    cpu_slot_t *slot = &region->block[(address - region->is.base) / 2];
+    cpu_block_t *block = slot->at;
     if (block != NULL && block->size == size) {
         return block;
     }
@@ -18,7 +18,7 @@ cpu_block_t *cpu_block_at(cpu_t *cpu, uint32_t address, uint32_t size)
         if (block == NULL) {
             return NULL;
         }
-        *place = block;
+        slot->at = block;
     }
     /* The same start with another length: the newest counts, its hits go on. */
     block->address = address;
@@ -35,8 +35,8 @@ static void for_all(const cpu_t *cpu, void (*act)(cpu_block_t *block))
     for (unsigned i = 0; i < cpu->regions; i++) {
         const cpu_region_t *region = &cpu->region[i];
         for (uint32_t k = 0; k < region->is.size / 2; k++) {
-            if (region->block[k] != NULL) {
-                act(region->block[k]);
+            if (region->block[k].at != NULL) {
+                act(region->block[k].at);
             }
         }
     }
@@ -55,7 +55,7 @@ void cpu_block_all_need_attention(cpu_t *cpu)
 void cpu_free_blocks(cpu_region_t *region)
 {
     for (uint32_t k = 0; k < region->is.size / 2; k++) {
-        free(region->block[k]);
+        free(region->block[k].at);
     }
     free(region->block);
 }
@@ -65,7 +65,7 @@ void cpu_forget_blocks(cpu_t *cpu, uint32_t address, uint32_t size)
     for (unsigned i = 0; i < cpu->regions; i++) {
         cpu_region_t *region = &cpu->region[i];
         for (uint32_t k = 0; k < region->is.size / 2; k++) {
-            cpu_block_t *block = region->block[k];
+            cpu_block_t *block = region->block[k].at;
             if (block != NULL && block->address < address + size && address < block->address + block->size) {
                 block->size = 0; /* decoded anew when it is next executed; its hits stay */
             }
@@ -78,7 +78,7 @@ void cpu_visit_blocks(const cpu_t *cpu, cpu_block_visitor_t visit, void *context
     for (unsigned i = 0; i < cpu->regions; i++) {
         const cpu_region_t *region = &cpu->region[i];
         for (uint32_t k = 0; k < region->is.size / 2; k++) {
-            const cpu_block_t *block = region->block[k];
+            const cpu_block_t *block = region->block[k].at;
             if (block != NULL && block->hits != 0) {
                 visit(context, block->address, block->size, block->cost.instructions, block->hits);
             }
@@ -107,7 +107,7 @@ void cpu_watch(cpu_t *cpu, uint32_t address, void *owner, cpu_watch_t watch)
     cpu->watch[i] = (cpu_watch_entry_t){address, owner, watch};
     cpu->watches = i == cpu->watches ? i + 1 : cpu->watches;
     cpu_region_t *region = cpu_region_of(cpu, address);
-    if (region != NULL && region->block[(address - region->is.base) / 2] != NULL) {
-        region->block[(address - region->is.base) / 2]->attention = true;
+    if (region != NULL && region->block[(address - region->is.base) / 2].at != NULL) {
+        region->block[(address - region->is.base) / 2].at->attention = true;
     }
 }

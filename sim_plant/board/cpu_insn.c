@@ -33,11 +33,6 @@ static void multiple(insn_t *insn, bool load, unsigned base, unsigned list, bool
     insn->writes_pc = load && (list & 0x8000U) != 0;
 }
 
-static void branch(insn_t *insn, insn_kind_t kind)
-{
-    insn->kind = kind;
-}
-
 /* 0101 to 1001: single loads and stores of the low registers. */
 static void narrow_access(insn_t *insn, uint16_t w)
 {
@@ -78,7 +73,7 @@ static void hint(insn_t *insn, unsigned number)
 static void narrow_miscellaneous(insn_t *insn, uint16_t w)
 {
     if ((w & 0xF500U) == 0xB100U) {
-        branch(insn, INSN_BRANCH_IF);
+        insn->kind = INSN_BRANCH_IF;
     } else if ((w & 0xFE00U) == 0xB400U) {
         multiple(insn, false, SP, w & 0x1FFU, true);
     } else if ((w & 0xFE00U) == 0xBC00U) {
@@ -101,10 +96,8 @@ static void decode_narrow(insn_t *insn, uint16_t w)
     case 4:
         if ((w & 0xF800U) == 0x4800U) {
             access(insn, true, 4, PC, (int32_t)(4 * field(w, 0, 8)), field(w, 8, 3));
-        } else if ((w & 0xFF00U) == 0x4700U) {
-            branch(insn, INSN_BRANCH);
-        } else if ((w & 0xFD87U) == 0x4487U) { /* ADD or MOV to the PC */
-            branch(insn, INSN_BRANCH);
+        } else if ((w & 0xFF00U) == 0x4700U || (w & 0xFD87U) == 0x4487U) { /* BX, BLX; ADD or MOV to the PC */
+            insn->kind = INSN_BRANCH;
         }
         break;
     case 5:
@@ -122,11 +115,11 @@ static void decode_narrow(insn_t *insn, uint16_t w)
         break;
     case 0xD:
         if (field(w, 8, 4) < 14) {
-            branch(insn, INSN_BRANCH_IF);
+            insn->kind = INSN_BRANCH_IF;
         }
         break;
     case 0xE:
-        branch(insn, INSN_BRANCH);
+        insn->kind = INSN_BRANCH;
         break;
     default:
         break;
@@ -143,7 +136,7 @@ static void wide_dual(insn_t *insn, uint16_t w, uint16_t v)
     if ((w & 0xFFE0U) == 0xE840U) {
         access(insn, load, 4, rn, immediate, rt);
     } else if ((w & 0xFFE0U) == 0xE8C0U && field(v, 5, 3) == 0) {
-        branch(insn, INSN_TABLE_BRANCH);
+        insn->kind = INSN_TABLE_BRANCH;
     } else if ((w & 0xFFE0U) == 0xE8C0U) {
         access(insn, load, field(v, 4, 1) != 0 ? 2 : 1, rn, 0, rt);
     } else {
@@ -240,9 +233,9 @@ static void coprocessor(insn_t *insn, uint16_t w, uint16_t v)
 static void wide_control(insn_t *insn, uint16_t w, uint16_t v)
 {
     if ((v & 0x5000U) != 0) {
-        branch(insn, INSN_BRANCH);
+        insn->kind = INSN_BRANCH;
     } else if ((w & 0x0380U) != 0x0380U) {
-        branch(insn, INSN_BRANCH_IF);
+        insn->kind = INSN_BRANCH_IF;
     } else if ((w & 0xFFE0U) == 0xF380U || (w & 0xFFE0U) == 0xF3E0U) {
         insn->kind = INSN_SPECIAL;
     } else if ((w & 0xFFF0U) == 0xF3A0U && (v & 0x0700U) == 0) {

@@ -27,11 +27,15 @@ typedef struct {
     bool attention; /* look before executing: new, watched, or the MPU has changed */
 } cpu_block_t;
 
+typedef struct {
+    cpu_block_t *at; /* NULL: none begins here */
+} cpu_slot_t;
+
 struct cpu_region {
     cpu_memory_t is;
     uint8_t *host;
     cpu_region_t *original; /* of an alias; else itself */
-    cpu_block_t **block;    /* by half-word; those of an original only hold its own addresses */
+    cpu_slot_t *block;      /* by half-word; of its own addresses alone */
     cycles_flash_t fetch;
     uint64_t stalled_until;
     struct {
@@ -129,10 +133,10 @@ void cpu_set(cpu_t *cpu, int unicorn_register, uint32_t value);
 void cpu_get_core(const cpu_t *cpu, uint32_t registers[16]);
 void cpu_spend(cpu_t *cpu, cycles_t cycles);
 bool cpu_hook(cpu_t *cpu, uc_hook *hook, int type, void (*call)(void), uint64_t begin, uint64_t end);
-void cpu_fail_at(cpu_t *cpu, uint32_t pc, const char *format, ...);
+__attribute__((format(printf, 3, 4))) void cpu_fail_at(cpu_t *cpu, uint32_t pc, const char *format, ...);
 
 /* cpu_hooks.c */
-void cpu_on_block(uc_engine *uc, uint64_t address, uint32_t size, void *user);
+void cpu_on_block(uc_engine *uc, uint64_t where, uint32_t size, void *user);
 void cpu_on_interrupt(uc_engine *uc, uint32_t number, void *user);
 void cpu_serve_attention(cpu_t *cpu, cpu_block_t *block); /* with the processor at rest */
 
@@ -157,10 +161,8 @@ void cpu_block_all_need_attention(cpu_t *cpu);
 void cpu_free_blocks(cpu_region_t *region);
 
 /* cpu_faults.c */
-bool cpu_on_bad_memory(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value,
-                       void *user);
-void cpu_on_any_memory(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value,
-                       void *user);
+bool cpu_on_bad_memory(uc_engine *uc, uc_mem_type type, uint64_t where, int size, int64_t value, void *user);
+void cpu_on_any_memory(uc_engine *uc, uc_mem_type type, uint64_t where, int size, int64_t value, void *user);
 void cpu_take_error(cpu_t *cpu, uc_err error);
 void cpu_take_fetch_fault(cpu_t *cpu, bool protection);
 uint32_t cpu_access_pc(cpu_t *cpu, uint32_t address, bool write, uint32_t *it);

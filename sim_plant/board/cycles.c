@@ -28,26 +28,32 @@ static cycles_t of_load(const insn_t *insn, const pipeline_t *before)
     return (cycles_t){before->memory ? 1 : 2, follows ? 1 : 2, 2};
 }
 
-static cycles_t of_instruction(const insn_t *insn, const pipeline_t *before)
+static cycles_t of_access(const insn_t *insn, const pipeline_t *before)
 {
-    const cycles_t refill = cycles_taken();
-    const cycles_t one = all(1);
-    cycles_t cycles = one;
     switch (insn->kind) {
     case INSN_LOAD:
-        cycles = of_load(insn, before);
-        break;
+        return of_load(insn, before);
     case INSN_STORE:
-        cycles = (cycles_t){1, insn->index != INSN_NO_REGISTER || insn->floating ? 2 : 1, 2};
-        break;
+        return (cycles_t){1, insn->index != INSN_NO_REGISTER || insn->floating ? 2 : 1, 2};
+    default:
+        return all(1U + insn->count);
+    }
+}
+
+static cycles_t of_instruction(const insn_t *insn, const pipeline_t *before)
+{
+    switch (insn->kind) {
+    case INSN_LOAD:
+    case INSN_STORE:
     case INSN_LOADS:
-    case INSN_STORES:
-        cycles = all(1U + insn->count);
-        break;
+    case INSN_STORES: {
+        const cycles_t cycles = of_access(insn, before);
+        return insn->writes_pc ? plus(cycles, cycles_taken()) : cycles;
+    }
     case INSN_BRANCH:
-        return plus(one, refill);
+        return plus(all(1), cycles_taken());
     case INSN_TABLE_BRANCH:
-        return plus(all(2), refill);
+        return plus(all(2), cycles_taken());
     case INSN_DIVIDE:
         return all(0);
     case INSN_IT:
@@ -61,9 +67,8 @@ static cycles_t of_instruction(const insn_t *insn, const pipeline_t *before)
     case INSN_FLOAT_DIVIDE:
         return all(14);
     default:
-        return one;
+        return all(1);
     }
-    return insn->writes_pc ? plus(cycles, refill) : cycles;
 }
 
 void cycles_of_block(cycles_block_t *block, const uint8_t *code, uint32_t size)
