@@ -29,60 +29,70 @@ void bridge_init(bridge_t *bridge, const plant_config_t *config, int legs)
 
 /* What each kind of leg is */
 static const struct {
-    int floating, swinging, diode;
-    double upper;      /* tied to the upper rail */
-    double diode_drop; /* in units of v_diode, as it adds to the terminal's voltage */
-    double switched, both, source;
+    int floating, swinging, diode, both, source;
+    bool low_diode, high_diode;
+    double upper; /* tied to the upper rail */
+    double switched;
 } facts[] = {
     [LEG_FLOATING] = {.floating = 1},
     [LEG_SWINGING] = {.swinging = 1},
     [LEG_LOW] = {.switched = 1.0},
     [LEG_HIGH] = {.switched = 1.0, .upper = 1.0},
-    [LEG_BOTH] = {.both = 1.0, .upper = 0.5},
-    [LEG_DIODE_LOW] = {.diode = 1, .diode_drop = -1.0},
-    [LEG_DIODE_HIGH] = {.diode = 1, .diode_drop = 1.0, .upper = 1.0},
-    [LEG_SOURCE] = {.source = 1.0},
+    [LEG_BOTH] = {.both = 1, .upper = 0.5},
+    [LEG_DIODE_LOW] = {.diode = 1, .low_diode = true},
+    [LEG_DIODE_HIGH] = {.diode = 1, .high_diode = true, .upper = 1.0},
+    [LEG_SOURCE] = {.source = 1},
 };
 
-/* The usual three-phase star, which is all that many runs have */
-static void summarise_star(bridge_t *b)
+/* Voltages that the legs have whatever the currents, by coordinate; only where all are tied or swing. */
+static void sum_rails(bridge_t *b, const winding_t *w, int sources)
 {
-    abc_t upper, diode_V, source_V;
-    for (int k = 0; k < 3; k++) {
-        upper.x[k] = b->upper[k];
-        diode_V.x[k] = facts[b->leg[k]].diode_drop * b->v_diode_V;
-        source_V.x[k] = facts[b->leg[k]].source * b->v_source_V[k];
+    for (int a = 0; a < w->active; a++) {
+        b->rail[a] = 0.0;
+        b->source_V[a] = 0.0;
+        b->diode_V[a] = 0.0;
     }
-    ab_t rail = frame_from_abc(upper);
-    ab_t diode = frame_from_abc(diode_V);
-    ab_t source = frame_from_abc(source_V);
-    b->rail[0] = rail.alpha;
-    b->rail[1] = rail.beta;
-    b->diode_V[0] = diode.alpha;
-    b->diode_V[1] = diode.beta;
-    b->source_V[0] = source.alpha;
-    b->source_V[1] = source.beta;
+    for (int side = 0; side < b->legs / 3; side++) {
+        unsigned upper = 0u, high = 0u, low = 0u;
+        for (int n = 0; n < 3; n++) {
+            leg_t leg = b->leg[3 * side + n];
+            upper |= (unsigned)(facts[leg].upper == 1.0) << n;
+            high |= (unsigned)facts[leg].high_diode << n;
+            low |= (unsigned)facts[leg].low_diode << n;
+        }
+        for (int a = 0; a < w->active; a++) {
+            b->rail[a] += w->side[side][upper][a];
+            b->diode_V[a] += b->v_diode_V * (w->side[side][high][a] - w->side[side][low][a]);
+        }
+    }
+    for (int k = 0; k < b->legs && sources > 0; k++) {
+        for (int a = 0; a < w->active && b->leg[k] == LEG_SOURCE; a++) {
+            b->source_V[a] += w->share[k][a] * b->v_source_V[k];
+        }
+    }
 }
 
-void bridge_summarise(bridge_t *b, const winding_t *winding)
+void bridge_summarise(bridge_t *b, const winding_t *w)
 {
-    double both = 0.0;
+    int sources = 0;
     b->floating = 0;
     b->swinging = 0;
     b->diodes = 0;
-    b->r_series_ohm = b->leg[0] == LEG_SOURCE ? 0.0 : b->r_on_ohm;
+    b->both = 0;
     for (int k = 0; k < b->legs; k++) {
         leg_t leg = b->leg[k];
         b->floating += facts[leg].floating;
         b->swinging += facts[leg].swinging;
         b->diodes += facts[leg].diode;
+        b->both += facts[leg].both;
+        sources += facts[leg].source;
         b->inv_zone_1_A[k] = facts[leg].switched * b->switched_1_A;
         b->upper[k] = facts[leg].upper;
-        both += facts[leg].both;
     }
-    b->g_through_S = both > 0.0 ? 0.5 * both / fmax(b->r_on_ohm, R_THROUGH_OHM) : 0.0;
-    if (winding->active == 2) {
-        summarise_star(b);
+    b->g_through_S = b->both > 0 ? 0.5 * b->both / fmax(b->r_on_ohm, R_THROUGH_OHM) : 0.0;
+    b->r_series_ohm = sources > 0 ? 0.0 : (w->legs > w->phases ? 2.0 : 1.0) * b->r_on_ohm;
+    if (b->floating == 0 && b->both == 0) {
+        sum_rails(b, w, sources);
     }
 }
 

@@ -13,12 +13,12 @@
 #define SLOPE_MARGIN  4.0   /* of v_dc / L: EMF, saturation */
 #define SMALL_CURRENT 1e-12 /* of the converter's full scale: nothing, for a floating leg */
 
-static void take_state(const machine_t *machine, const machine_state_t *s, const machine_point_t *m,
-                       point_t *p)
+static void take_state(circuit_t *c, const machine_state_t *s, const machine_point_t *m)
 {
-    memcpy(&p->x[U], s->u, sizeof s->u);
-    memcpy(&p->x[EDDY], s->eddy_A, sizeof s->eddy_A);
-    circuit_take(machine, m, p);
+    memcpy(&c->now.x[U], s->u, sizeof s->u);
+    memcpy(&c->now.x[EDDY], s->eddy_A, sizeof s->eddy_A);
+    circuit_take(&c->machine, m, &c->now);
+    c->field_known = false;
 }
 
 /* A plain machine with every terminal tied or swinging */
@@ -34,7 +34,7 @@ static void plain_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *n
 void circuit_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *nodes)
 {
     const winding_t *w = &c->machine.winding;
-    if (circuit_plain(c) && w->flux_terms == 0 && w->inductance_terms == 0) {
+    if (circuit_symmetrical(c) && c->machine.plain && w->flux_terms == 0 && w->inductance_terms == 0) {
         plain_nodes(c, p, nodes);
         return;
     }
@@ -216,7 +216,7 @@ static void project(circuit_t *c)
     machine_state_t state = circuit_machine_state(&c->now);
     machine_point_t point;
     floating_project(&c->bridge, &c->machine, SMALL_CURRENT / c->inv_i_scale_1_A, &state, &point);
-    take_state(&c->machine, &state, &point, &c->now);
+    take_state(c, &state, &point);
 }
 
 static void stop_diodes(circuit_t *c)
@@ -426,5 +426,5 @@ void circuit_init(circuit_t *c, const plant_config_t *config, double theta_e_rad
     }
     machine_point_t point;
     machine_evaluate(&c->machine, &state, &point);
-    take_state(&c->machine, &state, &point, &c->now);
+    take_state(c, &state, &point);
 }

@@ -20,7 +20,7 @@
 
 #include "sim_plant/bridge.h"
 #include "sim_plant/dclink.h"
-#include "sim_plant/machine.h"
+#include "sim_plant/field.h"
 #include "sim_plant/mechanics.h"
 #include "sim_plant/probe.h"
 
@@ -54,7 +54,6 @@ typedef struct {
     double x[ELEMENTS];
     rotor_t rotor;
     double i_A[ACTIVE];
-    double psi_theta_Wb[2]; /* of the magnet's harmonics in a plain machine */
     double torque_Nm;
 } point_t;
 
@@ -65,6 +64,9 @@ typedef struct {
     mechanics_t mech;
     probe_t probe;
     point_t now;
+    field_t field; /* of the present point, when a symmetrical machine knows it */
+    bool field_known;
+    int events; /* since the end of a segment */
     double t_s;
     double period_start_s;
     double low_since_s[PLANT_LEGS];  /* when switch or diode of the negative rail began to conduct */
@@ -101,7 +103,8 @@ bool circuit_ignores(const circuit_t *circuit, const gates_t *gates, unsigned le
 void circuit_wire(circuit_t *circuit, int leg, bool off);
 void circuit_short(circuit_t *circuit, int leg_a, int leg_b, double R_ohm);
 void circuit_sources(circuit_t *circuit, const double v_leg_V[]);
-void circuit_advance(circuit_t *circuit, double duration_s);
+/* Advances until the first event at most; returns the time left. */
+double circuit_advance(circuit_t *circuit, double duration_s);
 
 static inline double circuit_leg_A(const circuit_t *c, const point_t *p, int k)
 {

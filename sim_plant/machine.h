@@ -33,12 +33,15 @@ typedef struct {
     double psi_m_Wb;
     double torque_gain; /* 1.5 P */
     double pole_pairs;
+    double scale_Wb; /* of its fluxes */
     bool plain;
+    bool symmetrical; /* see field.h */
     bool loose;  /* nothing links the cores but the magnet: see machine_rates.h */
     bool biased; /* has eddy circuits or a map */
     double loose_gamma_1_H[ACTIVE];
     double gamma_sum_1_H; /* bounds, without current: of any current's response, */
-    double fastest_1_s;   /* and of the rate of decay of any */
+    double fastest_1_s;   /* and of the rate of decay of any; */
+    double gamma_leg_1_H; /* largest response of a leg's current to its own voltage */
     const map_table_t *map;
     double gamma_eddy_d_1_H, gamma_eddy_q_1_H, R_eddy_ohm; /* zero: no eddy circuits */
     winding_t winding;

@@ -78,19 +78,19 @@ static void run_until(plant_t *plant, double t_s)
         return;
     }
     circuit_settle(circuit);
-    unsigned changed = gates_update(gates, plant->t_s);
+    double next_s = plant->t_s; /* when the gates change next: they are those of then */
+    unsigned changed = gates_update(gates, next_s);
     while (plant->t_s < t_s) {
-        double next_s = plant->t_s;
-        do {
+        while (next_s < t_s &&
+               (next_s <= plant->t_s || circuit_ignores(circuit, gates, changed, next_s - plant->t_s))) {
             if (changed != 0u) {
                 circuit_switch(circuit, gates, changed);
             }
             next_s = gates_next_s(gates, next_s);
             changed = next_s < t_s ? gates_update(gates, next_s) : 0u;
-        } while (next_s < t_s && circuit_ignores(circuit, gates, changed, next_s - plant->t_s));
-        next_s = next_s < t_s ? next_s : t_s;
-        circuit_advance(circuit, next_s - plant->t_s);
-        plant->t_s = next_s;
+        }
+        double end_s = next_s < t_s ? next_s : t_s;
+        plant->t_s = end_s - circuit_advance(circuit, end_s - plant->t_s);
     }
 }
 
@@ -257,8 +257,7 @@ void plant_run_voltages(plant_t *plant, const double v_leg_V[], double rate_rad_
     for (double left_s = duration_s; left_s > 0.0;) {
         double part_s = fmin(left_s, longest_s);
         circuit_settle(circuit);
-        circuit_advance(circuit, part_s);
-        left_s -= part_s;
+        left_s -= part_s - circuit_advance(circuit, part_s);
         circuit_align(circuit);
     }
     circuit->mech.imposed_rate_rad_s2 = 0.0;
