@@ -28,72 +28,74 @@ void bridge_init(bridge_t *bridge, const plant_config_t *config, int legs)
 }
 
 /* What each kind of leg is */
-static const struct {
-    int floating, swinging, diode, both, source;
-    bool low_diode, high_diode;
-    double upper; /* tied to the upper rail */
+typedef struct {
+    unsigned counts; /* 4 bits each: floating, swinging, diode, both, source */
+    unsigned masks;  /* a byte each: tied to the upper rail; by a diode to it, and to the lower one */
+    double upper;
     double switched;
-} facts[] = {
-    [LEG_FLOATING] = {.floating = 1},
-    [LEG_SWINGING] = {.swinging = 1},
+} facts_t;
+
+static const facts_t facts[] = {
+    [LEG_FLOATING] = {.counts = 0x1},
+    [LEG_SWINGING] = {.counts = 0x10},
     [LEG_LOW] = {.switched = 1.0},
-    [LEG_HIGH] = {.switched = 1.0, .upper = 1.0},
-    [LEG_BOTH] = {.both = 1, .upper = 0.5},
-    [LEG_DIODE_LOW] = {.diode = 1, .low_diode = true},
-    [LEG_DIODE_HIGH] = {.diode = 1, .high_diode = true, .upper = 1.0},
-    [LEG_SOURCE] = {.source = 1},
+    [LEG_HIGH] = {.switched = 1.0, .masks = 0x1, .upper = 1.0},
+    [LEG_BOTH] = {.counts = 0x1000, .upper = 0.5},
+    [LEG_DIODE_LOW] = {.counts = 0x100, .masks = 0x10000},
+    [LEG_DIODE_HIGH] = {.counts = 0x100, .masks = 0x101, .upper = 1.0},
+    [LEG_SOURCE] = {.counts = 0x10000},
 };
 
-/* Voltages that the legs have whatever the currents, by coordinate; only where all are tied or swing. */
-static void sum_rails(bridge_t *b, const winding_t *w, int sources)
+/* Voltages that the legs have whatever the currents, by coordinate; only where all are tied or swing. Of a
+ * single star the other side adds nothing. */
+static void sum_rails(bridge_t *b, const winding_t *w, const unsigned masks[PLANT_SETS])
+{
+    const double *upper[PLANT_SETS], *high[PLANT_SETS], *low[PLANT_SETS];
+    for (int side = 0; side < PLANT_SETS; side++) {
+        upper[side] = w->side[side][masks[side] & 7u];
+        high[side] = w->side[side][masks[side] >> 8 & 7u];
+        low[side] = w->side[side][masks[side] >> 16 & 7u];
+    }
+    for (int a = 0; a < ACTIVE; a++) {
+        b->rail[a] = upper[0][a] + upper[1][a];
+        b->diode_V[a] = b->v_diode_V * (high[0][a] + high[1][a] - low[0][a] - low[1][a]);
+    }
+}
+
+static void sum_sources(bridge_t *b, const winding_t *w)
 {
     for (int a = 0; a < w->active; a++) {
-        b->rail[a] = 0.0;
         b->source_V[a] = 0.0;
-        b->diode_V[a] = 0.0;
-    }
-    for (int side = 0; side < b->legs / 3; side++) {
-        unsigned upper = 0u, high = 0u, low = 0u;
-        for (int n = 0; n < 3; n++) {
-            leg_t leg = b->leg[3 * side + n];
-            upper |= (unsigned)(facts[leg].upper == 1.0) << n;
-            high |= (unsigned)facts[leg].high_diode << n;
-            low |= (unsigned)facts[leg].low_diode << n;
-        }
-        for (int a = 0; a < w->active; a++) {
-            b->rail[a] += w->side[side][upper][a];
-            b->diode_V[a] += b->v_diode_V * (w->side[side][high][a] - w->side[side][low][a]);
-        }
-    }
-    for (int k = 0; k < b->legs && sources > 0; k++) {
-        for (int a = 0; a < w->active && b->leg[k] == LEG_SOURCE; a++) {
-            b->source_V[a] += w->share[k][a] * b->v_source_V[k];
+        for (int k = 0; k < b->legs; k++) {
+            b->source_V[a] += b->leg[k] == LEG_SOURCE ? w->share[k][a] * b->v_source_V[k] : 0.0;
         }
     }
 }
 
 void bridge_summarise(bridge_t *b, const winding_t *w)
 {
-    int sources = 0;
-    b->floating = 0;
-    b->swinging = 0;
-    b->diodes = 0;
-    b->both = 0;
+    unsigned counts = 0u, masks[PLANT_SETS] = {0u};
     for (int k = 0; k < b->legs; k++) {
-        leg_t leg = b->leg[k];
-        b->floating += facts[leg].floating;
-        b->swinging += facts[leg].swinging;
-        b->diodes += facts[leg].diode;
-        b->both += facts[leg].both;
-        sources += facts[leg].source;
-        b->inv_zone_1_A[k] = facts[leg].switched * b->switched_1_A;
-        b->upper[k] = facts[leg].upper;
+        const facts_t *is = &facts[b->leg[k]];
+        counts += is->counts;
+        masks[k / 3] |= is->masks << k % 3;
+        b->inv_zone_1_A[k] = is->switched * b->switched_1_A;
+        b->upper[k] = is->upper;
     }
+    b->floating = (int)(counts & 15u);
+    b->swinging = (int)(counts >> 4 & 15u);
+    b->diodes = (int)(counts >> 8 & 15u);
+    b->both = (int)(counts >> 12 & 15u);
+    bool sources = counts >> 16 > 0u;
     b->g_through_S = b->both > 0 ? 0.5 * b->both / fmax(b->r_on_ohm, R_THROUGH_OHM) : 0.0;
-    b->r_series_ohm = sources > 0 ? 0.0 : (w->legs > w->phases ? 2.0 : 1.0) * b->r_on_ohm;
-    if (b->floating == 0 && b->both == 0) {
-        sum_rails(b, w, sources);
+    b->r_series_ohm = sources ? 0.0 : (w->legs > w->phases ? 2.0 : 1.0) * b->r_on_ohm;
+    if (b->floating == 0) {
+        sum_rails(b, w, masks);
     }
+    if (sources || b->sources) {
+        sum_sources(b, w);
+    }
+    b->sources = sources;
 }
 
 static double no_current_A(const bridge_t *bridge)

@@ -39,6 +39,7 @@ typedef struct {
     double v_source_V[PLANT_LEGS];
     /* what follows from leg[] */
     int floating, swinging, diodes, both;
+    bool sources;
     double rail[ACTIVE];             /* by active coordinate: share of the upper rail, */
     double source_V[ACTIVE];         /* of given sources */
     double diode_V[ACTIVE];          /* and of diode drops, with their sign */

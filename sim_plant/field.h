@@ -23,10 +23,11 @@
 #define DOUBLE ((shape_t){4, 2, 6})
 
 #define FIELD_ROUNDS 20
-#define FIELD_NEAR   3e-6 /* of the magnet's flux: a correction whose square is nothing */
+#define FIELD_NEAR   3e-5 /* of the magnet's flux: a correction whose square is nothing */
 
 typedef struct {
-    double flux[ACTIVE]; /* linkages by set in stationary coordinates, Wb; of a zero sequence its current, A */
+    double
+        flux[ACTIVE]; /* linkages by set in stationary coordinates, Wb; of a zero sequence its current, A */
     double i_A[ACTIVE];
     double slope_Wb[ACTIVE], bend_Wb[ACTIVE]; /* of the magnet's harmonics: by the angle, once and twice */
     dq_t core_Wb[PLANT_SETS], i_dq_A[PLANT_SETS];
@@ -49,7 +50,8 @@ INLINE void field_cores(const machine_t *m, const field_t *f, shape_t shape, con
     }
     dq_t other = field_mutual(m, times(f->gamma_1_H[1], psi[1]));
     dq_t rest = {psi[0].d - other.d, psi[0].q - other.q};
-    core[0] = (dq_t){f->split[0] * rest.d + f->split[1] * rest.q, f->split[2] * rest.d + f->split[3] * rest.q};
+    core[0] =
+        (dq_t){f->split[0] * rest.d + f->split[1] * rest.q, f->split[2] * rest.d + f->split[3] * rest.q};
     dq_t back = field_mutual(m, times(f->gamma_1_H[0], core[0]));
     core[1] = (dq_t){psi[1].d - back.d, psi[1].q - back.q};
 }
@@ -82,8 +84,8 @@ INLINE void field_solve(const machine_t *m, const dq_t psi[], field_t *f)
         }
         for (int set = 0; set < 2; set++) {
             dq_t other = field_mutual(m, f->i_dq_A[1 - set]);
-            miss[set] = (dq_t){psi[set].d - f->core_Wb[set].d - other.d,
-                               psi[set].q - f->core_Wb[set].q - other.q};
+            miss[set] =
+                (dq_t){psi[set].d - f->core_Wb[set].d - other.d, psi[set].q - f->core_Wb[set].q - other.q};
         }
         field_split(m, f);
         field_cores(m, f, DOUBLE, miss, move);
@@ -157,8 +159,8 @@ INLINE void field_at(const machine_t *m, rotor_t rotor, shape_t shape, field_t *
 }
 
 /* The same from the cores. */
-INLINE void field_from_cores(const machine_t *m, rotor_t rotor, shape_t shape, const double core[], double zero_A,
-                             field_t *f)
+INLINE void field_from_cores(const machine_t *m, rotor_t rotor, shape_t shape, const double core[],
+                             double zero_A, field_t *f)
 {
     for (int set = 0; set < shape.sets; set++) {
         f->core_Wb[set] = frame_to_dq(of_set(core, set), rotor);
@@ -208,7 +210,8 @@ INLINE void field_rates(const machine_t *m, rotor_t rotor, double omega_e, shape
 {
     dq_t psi[PLANT_SETS];
     for (int set = 0; set < shape.sets; set++) {
-        ab_t turned = {rate[2 * set] + omega_e * f->flux[2 * set + 1], rate[2 * set + 1] - omega_e * f->flux[2 * set]};
+        ab_t turned = {rate[2 * set] + omega_e * f->flux[2 * set + 1],
+                       rate[2 * set + 1] - omega_e * f->flux[2 * set]};
         psi[set] = frame_to_dq(turned, rotor);
     }
     field_cores(m, f, shape, psi, core_V);

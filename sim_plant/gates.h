@@ -33,7 +33,8 @@ typedef struct {
         gate_t gate;           /* of healthy switches */
         bool opening;          /* the conducting switch opens at off_s */
         double off_s;
-        double on_s; /* the commanded one closes, when gate != command */
+        double on_s;   /* the commanded one closes, when gate != command */
+        double next_s; /* nothing happens to the leg before */
         plant_leg_fault_t fault;
     } leg[PLANT_LEGS];
 } gates_t;

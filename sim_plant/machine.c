@@ -114,7 +114,8 @@ void machine_set(machine_t *machine, const plant_config_t *config, double windin
     winding_init(&machine->winding, w, machine->R_s_ohm, psi_m_Wb, psi_core_Wb, magnet);
     machine->biased = machine->map != NULL || machine->gamma_eddy_d_1_H + machine->gamma_eddy_q_1_H > 0.0;
     machine->loose = is_loose(machine);
-    machine->symmetrical = machine->winding.symmetrical && !machine->biased && machine->winding.cogging_terms == 0;
+    machine->symmetrical =
+        machine->winding.symmetrical && !machine->biased && machine->winding.cogging_terms == 0;
     machine->scale_Wb = fmax(psi_m_Wb, 0.1 * p->L_d0_H * config->sensor.i_full_scale_A);
     machine->plain = machine->loose && machine->winding.active == 2 && machine->winding.even;
     set_bounds(machine);

@@ -36,8 +36,8 @@ typedef struct {
     double scale_Wb; /* of its fluxes */
     bool plain;
     bool symmetrical; /* see field.h */
-    bool loose;  /* nothing links the cores but the magnet: see machine_rates.h */
-    bool biased; /* has eddy circuits or a map */
+    bool loose;       /* nothing links the cores but the magnet: see machine_rates.h */
+    bool biased;      /* has eddy circuits or a map */
     double loose_gamma_1_H[ACTIVE];
     double gamma_sum_1_H; /* bounds, without current: of any current's response, */
     double fastest_1_s;   /* and of the rate of decay of any; */

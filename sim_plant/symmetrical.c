@@ -1,33 +1,38 @@
 /* Steps of a symmetrical machine on legs that are tied or swing.
  *
  * The first and second derivative of the state are known in closed form at every point, as all follows from
- * the currents and these move by the tangent of the field. A step is the Taylor series of second order, and the
- * rates at its end add the third:
+ * the currents and these move by the tangent of the field. A step is the Taylor series of second order, and
+ * the rates at its end add the third:
  *
  *   y' = y + h f + h^2/2 f',   d = h/3 (f(y') - f - h f'),   y(h) = y' + d
  *
- * d is also what the second order misses, which is the error that is controlled. So a step takes one evaluation
- * of the field, and a change of the legs none. Of the voltages of swinging terminals the third derivative is known
- * at the start as well, so that they gain an order. */
+ * d is also what the second order misses, which is the error that is controlled. So a step takes one
+ * evaluation of the field, and a change of the legs none. Of the voltages of swinging terminals the third
+ * derivative is known at the start as well, so that they gain an order. */
 #include "sim_plant/field.h"
 #include "sim_plant/steps.h"
 
 #include <math.h>
 
-/* Rates at the start of a step, and what they say about it. */
-typedef struct {
-    double rate[ELEMENTS], bend[ELEMENTS]; /* first and second derivative */
-    double omega_jerk;                     /* third derivative of the angle */
-    double v_leg_V_s3[PLANT_LEGS];         /* and of swinging terminals, nearly, */
-    double v_V_s2[ACTIVE], flux_V_s2[ACTIVE]; /* and what these do to voltages and linkages */
-    dq_t core_V[PLANT_SETS];
-} start_t;
+/* Of d, where all is smooth: about what the embedded solution of a Runge-Kutta pair of this order misses. */
+#define PART 0.125
 
+/* Of the legs at a point */
 typedef struct {
     double v_V[ACTIVE], drop_V[ACTIVE];
-    double i_leg_A[PLANT_LEGS];
+    double i_leg_A[PLANT_LEGS], share[PLANT_LEGS]; /* of the drop of closed switches, when there is one */
     double i_dc_A;
 } tied_t;
+
+/* Rates at the start of a step, and what they say about it. */
+typedef struct {
+    double rate[ELEMENTS], bend[ELEMENTS];    /* first and second derivative */
+    double omega_jerk;                        /* third derivative of the angle */
+    double v_leg_V_s3[PLANT_LEGS];            /* and of swinging terminals, nearly, */
+    double v_V_s2[ACTIVE], flux_V_s2[ACTIVE]; /* and what these do to voltages and linkages */
+    dq_t core_V[PLANT_SETS];
+    tied_t tied;
+} start_t;
 
 /* Coordinates of leg k: of two stars those of its own set. */
 INLINE int leg_first(shape_t shape, int k)
@@ -75,11 +80,12 @@ INLINE void tied_at(const circuit_t *c, const field_t *f, const double x[], shap
     bool each = swings || b->v_switch_V != 0.0;
     for (int k = 0; k < shape.legs; k++) {
         t->i_leg_A[k] = each ? along(w, shape, k, f->i_A) : 0.0;
+        t->share[k] = 0.0;
     }
     if (b->v_switch_V != 0.0) {
         for (int k = 0; k < shape.legs; k++) {
-            spread(w, shape, k, b->v_switch_V * bridge_switch_share(t->i_leg_A[k] * b->inv_zone_1_A[k]),
-                   t->drop_V);
+            t->share[k] = bridge_switch_share(t->i_leg_A[k] * b->inv_zone_1_A[k]);
+            spread(w, shape, k, b->v_switch_V * t->share[k], t->drop_V);
         }
     }
     if (swings) {
@@ -176,8 +182,8 @@ INLINE void flux_bends(const circuit_t *c, const field_t *f, const tied_t *t, co
     tied_bends(c, t, i_A_s, shape, swings, s, drop_V_s, v_V_s);
     for (int a = 0; a < shape.active; a++) {
         double i = weight(shape, a) * f->i_A[a], moves = weight(shape, a) * i_A_s[a];
-        s->bend[U + a] = v_V_s[a] - m->R_s_ohm * i_A_s[a] - omega_e_s * f->slope_Wb[a] -
-                         omega_e * omega_e * f->bend_Wb[a];
+        s->bend[U + a] =
+            v_V_s[a] - m->R_s_ohm * i_A_s[a] - omega_e_s * f->slope_Wb[a] - omega_e * omega_e * f->bend_Wb[a];
         i_dc_A_s += b->rail[a] * moves;
         source_W_s += b->source_V[a] * moves;
         copper += i * i_A_s[a];
@@ -220,11 +226,10 @@ INLINE void begin(const circuit_t *c, shape_t shape, bool swings, start_t *s)
     const field_t *f = &c->field;
     const machine_t *m = &c->machine;
     double i_A_s[ACTIVE];
-    tied_t tied;
-    rates_at(c, f, c->now.x, shape, swings, &tied, s->rate);
+    rates_at(c, f, c->now.x, shape, swings, &s->tied, s->rate);
     field_rates(m, c->now.rotor, s->rate[THETA_E], shape, f, &s->rate[U], s->core_V, i_A_s);
-    flux_bends(c, f, &tied, i_A_s, shape, swings, s);
-    link_bends(c, tied.i_dc_A, s);
+    flux_bends(c, f, &s->tied, i_A_s, shape, swings, s);
+    link_bends(c, s->tied.i_dc_A, s);
     s->omega_jerk = m->pole_pairs * s->bend[OMEGA_MECH];
     if (swings) {
         dq_t core_V_s[PLANT_SETS];
@@ -246,6 +251,16 @@ INLINE void begin(const circuit_t *c, shape_t shape, bool swings, start_t *s)
             s->flux_V_s2[2 * shape.sets] *= m->loose_gamma_1_H[2 * shape.sets];
         }
     }
+}
+
+/* Whether the drop of a closed switch has moved: then nothing is smooth. */
+INLINE bool turned_over(const bridge_t *b, const tied_t *from, const tied_t *to, shape_t shape)
+{
+    bool moved = false;
+    for (int k = 0; k < shape.legs && b->v_switch_V != 0.0; k++) {
+        moved = moved || from->share[k] != to->share[k];
+    }
+    return moved;
 }
 
 INLINE double error_norm(const circuit_t *c, const double miss[], shape_t shape, bool swings)
@@ -326,7 +341,8 @@ INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape
         to->x[U + 2 * set + 1] = core.beta;
     }
     to->torque_Nm = f->torque_Nm;
-    return error_norm(c, miss, shape, swings);
+    bool smooth = !swings && !turned_over(&c->bridge, &s->tied, &tied, shape);
+    return (smooth ? PART : 1.0) * error_norm(c, miss, shape, swings);
 }
 
 static void retake(const circuit_t *c, const void *start, double h, point_t *to)
