@@ -1,6 +1,7 @@
 #include "sim_plant/bridge.h"
 
 #include <math.h>
+#include <string.h>
 
 /* Margins against rounding: what counts as no current, and how far beyond a diode's threshold a floating
  * terminal must be, so that a diode never stops and starts for the same instant. */
@@ -50,15 +51,21 @@ static const facts_t facts[] = {
  * single star the other side adds nothing. */
 static void sum_rails(bridge_t *b, const winding_t *w, const unsigned masks[PLANT_SETS])
 {
-    const double *upper[PLANT_SETS], *high[PLANT_SETS], *low[PLANT_SETS];
-    for (int side = 0; side < PLANT_SETS; side++) {
-        upper[side] = w->side[side][masks[side] & 7u];
-        high[side] = w->side[side][masks[side] >> 8 & 7u];
-        low[side] = w->side[side][masks[side] >> 16 & 7u];
-    }
+    const double *upper = w->side[0][masks[0] & 7u];
+    const double *other = w->side[1][masks[1] & 7u];
+    double rail[ACTIVE];
     for (int a = 0; a < ACTIVE; a++) {
-        b->rail[a] = upper[0][a] + upper[1][a];
-        b->diode_V[a] = b->v_diode_V * (high[0][a] + high[1][a] - low[0][a] - low[1][a]);
+        rail[a] = upper[a] + other[a];
+    }
+    memcpy(b->rail, rail, sizeof rail);
+    for (int side = 0; side < PLANT_SETS && b->v_diode_V != 0.0; side++) {
+        const double *high = w->side[side][masks[side] >> 8 & 7u];
+        const double *low = w->side[side][masks[side] >> 16 & 7u];
+        double diode_V[ACTIVE];
+        for (int a = 0; a < ACTIVE; a++) {
+            diode_V[a] = (side > 0 ? b->diode_V[a] : 0.0) + b->v_diode_V * (high[a] - low[a]);
+        }
+        memcpy(b->diode_V, diode_V, sizeof diode_V);
     }
 }
 
@@ -75,12 +82,14 @@ static void sum_sources(bridge_t *b, const winding_t *w)
 void bridge_summarise(bridge_t *b, const winding_t *w)
 {
     unsigned counts = 0u, masks[PLANT_SETS] = {0u};
-    for (int k = 0; k < b->legs; k++) {
-        const facts_t *is = &facts[b->leg[k]];
-        counts += is->counts;
-        masks[k / 3] |= is->masks << k % 3;
-        b->inv_zone_1_A[k] = is->switched * b->switched_1_A;
-        b->upper[k] = is->upper;
+    for (int side = 0; side < b->legs / 3; side++) {
+        for (int n = 0; n < 3; n++) {
+            const facts_t *is = &facts[b->leg[3 * side + n]];
+            counts += is->counts;
+            masks[side] |= is->masks << n;
+            b->inv_zone_1_A[3 * side + n] = is->switched * b->switched_1_A;
+            b->upper[3 * side + n] = is->upper;
+        }
     }
     b->floating = (int)(counts & 15u);
     b->swinging = (int)(counts >> 4 & 15u);

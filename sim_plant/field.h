@@ -103,20 +103,22 @@ INLINE void field_solve(const machine_t *m, const dq_t psi[], field_t *f)
 
 INLINE void field_harmonics(const winding_t *w, rotor_t rotor, shape_t shape, field_t *f)
 {
+    double slope_Wb[ACTIVE] = {0.0}, bend_Wb[ACTIVE] = {0.0};
     rotor_t turn = {1.0, 0.0};
     int order = 0;
-    for (int a = 0; a < shape.active; a++) {
-        f->slope_Wb[a] = 0.0;
-        f->bend_Wb[a] = 0.0;
-    }
     for (int t = 0; t < w->flux_series_terms; t++) {
         const flux_series_t *term = &w->flux_series[t];
         turn = winding_next(rotor, turn, &order, term->order);
-        double n = term->order, n2 = n * n;
+        double n = term->order, nc = n * turn.c, ns = n * turn.s;
+        double n2c = n * nc, n2s = n * ns;
         for (int a = 0; a < shape.active; a++) {
-            f->slope_Wb[a] += n * (term->sine[a] * turn.c - term->cosine[a] * turn.s);
-            f->bend_Wb[a] -= n2 * (term->cosine[a] * turn.c + term->sine[a] * turn.s);
+            slope_Wb[a] += nc * term->sine[a] - ns * term->cosine[a];
+            bend_Wb[a] -= n2c * term->cosine[a] + n2s * term->sine[a];
         }
+    }
+    for (int a = 0; a < shape.active; a++) {
+        f->slope_Wb[a] = slope_Wb[a];
+        f->bend_Wb[a] = bend_Wb[a];
     }
 }
 

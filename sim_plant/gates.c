@@ -111,7 +111,7 @@ unsigned gates_update(gates_t *gates, double t_s)
     return changed;
 }
 
-gate_t gates_conducting(const gates_t *gates, int k)
+gate_t gates_faulty(const gates_t *gates, int k)
 {
     gate_t gate = gates->leg[k].gate;
     bool upper = gate == GATE_HIGH;

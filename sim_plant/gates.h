@@ -51,7 +51,11 @@ void gates_off(gates_t *gates);
 unsigned gates_update(gates_t *gates, double t_s);
 
 /* What conducts in leg k, with its fault. */
-gate_t gates_conducting(const gates_t *gates, int k);
+gate_t gates_faulty(const gates_t *gates, int k);
+static inline gate_t gates_conducting(const gates_t *gates, int k)
+{
+    return gates->leg[k].fault == PLANT_HEALTHY ? gates->leg[k].gate : gates_faulty(gates, k);
+}
 
 /* The next instant after t at which gates_update() has something to do; T when nothing is left. */
 double gates_next_s(const gates_t *gates, double t_s);

@@ -114,7 +114,7 @@ INLINE void rates_at(const circuit_t *c, const field_t *f, const double x[], sha
     for (int a = 0; a < shape.active; a++) {
         double power = weight(shape, a) * f->i_A[a];
         rate[U + a] = t->v_V[a] - m->R_s_ohm * f->i_A[a] - omega_e * f->slope_Wb[a];
-        in_W += power * b->source_V[a];
+        in_W += b->sources ? power * b->source_V[a] : 0.0;
         copper += power * f->i_A[a];
         device_W += power * t->drop_V[a];
     }
@@ -185,7 +185,7 @@ INLINE void flux_bends(const circuit_t *c, const field_t *f, const tied_t *t, co
         s->bend[U + a] =
             v_V_s[a] - m->R_s_ohm * i_A_s[a] - omega_e_s * f->slope_Wb[a] - omega_e * omega_e * f->bend_Wb[a];
         i_dc_A_s += b->rail[a] * moves;
-        source_W_s += b->source_V[a] * moves;
+        source_W_s += b->sources ? b->source_V[a] * moves : 0.0;
         copper += i * i_A_s[a];
         device_W_s += i * drop_V_s[a] + moves * t->drop_V[a];
         harmonic += moves * f->slope_Wb[a] + omega_e * i * f->bend_Wb[a];
