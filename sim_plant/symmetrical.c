@@ -19,50 +19,67 @@
 
 /* Of the legs at a point */
 typedef struct {
-    double v_V[ACTIVE], drop_V[ACTIVE];
+    pair_t v_V[PAIRS], drop_V[PAIRS];
     double i_leg_A[PLANT_LEGS], share[PLANT_LEGS]; /* of the drop of closed switches, when there is one */
     double i_dc_A;
 } tied_t;
 
 /* Rates at the start of a step, and what they say about it. */
 typedef struct {
-    double rate[ELEMENTS], bend[ELEMENTS];    /* first and second derivative */
-    double omega_jerk;                        /* third derivative of the angle */
-    double v_leg_V_s3[PLANT_LEGS];            /* and of swinging terminals, nearly, */
-    double v_V_s2[ACTIVE], flux_V_s2[ACTIVE]; /* and what these do to voltages and linkages */
-    dq_t core_V[PLANT_SETS];
+    double rate[ELEMENTS], bend[ELEMENTS];  /* first and second derivative, */
+    pair_t flux_V[PAIRS], flux_V_s[PAIRS];  /* and of the field's flux */
+    double omega_jerk;                      /* third derivative of the angle */
+    double v_leg_V_s3[PLANT_LEGS];          /* and of swinging terminals, nearly, */
+    pair_t v_V_s2[PAIRS], flux_V_s2[PAIRS]; /* and what these do to voltages and linkages */
+    pair_t core_V[PLANT_SETS];
     tied_t tied;
 } start_t;
 
-/* Coordinates of leg k: of two stars those of its own set. */
+/* Coordinates that leg k has a part in: of two stars those of its own set. */
 INLINE int leg_first(shape_t shape, int k)
 {
-    return shape.sets == 2 ? 2 * (k / 3) : 0;
+    return shape.sets > 1 ? k / 3 : 0;
 }
 
 INLINE int leg_end(shape_t shape, int k)
 {
-    return shape.sets == 2 ? 2 * (k / 3) + 2 : shape.active;
+    return shape.sets > 1 ? k / 3 + 1 : pairs(shape);
 }
 
-INLINE double weight(shape_t shape, int a)
+INLINE double along(const winding_t *w, shape_t shape, int k, const pair_t x[])
 {
-    return a < 2 * shape.sets ? 1.5 : 3.0;
-}
-
-INLINE double along(const winding_t *w, shape_t shape, int k, const double x[])
-{
-    double sum = 0.0;
-    for (int a = leg_first(shape, k); a < leg_end(shape, k); a++) {
-        sum += w->axis[k][a] * x[a];
+    pair_t sum = {0.0};
+    for (int p = leg_first(shape, k); p < leg_end(shape, k); p++) {
+        sum += pair_at(&w->axis[k][2 * p]) * x[p];
     }
-    return sum;
+    return total(sum);
 }
 
-INLINE void spread(const winding_t *w, shape_t shape, int k, double v_V, double to_V[])
+INLINE void spread(const winding_t *w, shape_t shape, int k, double v_V, pair_t to_V[])
 {
-    for (int a = leg_first(shape, k); a < leg_end(shape, k); a++) {
-        to_V[a] += w->share[k][a] * v_V;
+    for (int p = leg_first(shape, k); p < leg_end(shape, k); p++) {
+        to_V[p] += pair_at(&w->share[k][2 * p]) * both(v_V);
+    }
+}
+
+/* Into the rates of the state: that of a zero sequence is a current. */
+INLINE pair_t of_state(const machine_t *m, shape_t shape, int p, pair_t flux)
+{
+    return p < shape.sets ? flux : flux * both(m->loose_gamma_1_H[2 * shape.sets]);
+}
+
+INLINE void add_drops(const circuit_t *c, const field_t *f, shape_t shape, bool swings, tied_t *t)
+{
+    const bridge_t *b = &c->bridge;
+    const winding_t *w = &c->machine.winding;
+    bool each = swings || b->v_switch_V != 0.0;
+    for (int k = 0; k < shape.legs; k++) {
+        t->i_leg_A[k] = each ? along(w, shape, k, f->i_A) : 0.0;
+        t->share[k] = 0.0;
+    }
+    for (int k = 0; k < shape.legs && b->v_switch_V != 0.0; k++) {
+        t->share[k] = bridge_switch_share(t->i_leg_A[k] * b->inv_zone_1_A[k]);
+        spread(w, shape, k, b->v_switch_V * t->share[k], t->drop_V);
     }
 }
 
@@ -71,55 +88,41 @@ INLINE void tied_at(const circuit_t *c, const field_t *f, const double x[], shap
 {
     const bridge_t *b = &c->bridge;
     const winding_t *w = &c->machine.winding;
-    double i_dc_A = 0.0;
-    double v_swing_V[ACTIVE] = {0.0};
-    for (int a = 0; a < shape.active; a++) {
-        t->drop_V[a] = b->r_series_ohm * f->i_A[a] - b->diode_V[a];
-        i_dc_A += weight(shape, a) * b->rail[a] * f->i_A[a];
+    pair_t i_dc_A = {0.0}, swing_V[PAIRS] = {{0.0}};
+    for (int p = 0; p < pairs(shape); p++) {
+        t->drop_V[p] = both(b->r_series_ohm) * f->i_A[p] - pair_at(&b->diode_V[2 * p]);
+        i_dc_A += weights(shape, p) * pair_at(&b->rail[2 * p]) * f->i_A[p];
     }
-    bool each = swings || b->v_switch_V != 0.0;
-    for (int k = 0; k < shape.legs; k++) {
-        t->i_leg_A[k] = each ? along(w, shape, k, f->i_A) : 0.0;
-        t->share[k] = 0.0;
-    }
-    if (b->v_switch_V != 0.0) {
-        for (int k = 0; k < shape.legs; k++) {
-            t->share[k] = bridge_switch_share(t->i_leg_A[k] * b->inv_zone_1_A[k]);
-            spread(w, shape, k, b->v_switch_V * t->share[k], t->drop_V);
+    add_drops(c, f, shape, swings, t);
+    for (int k = 0; k < shape.legs && swings; k++) {
+        if (b->leg[k] == LEG_SWINGING) {
+            spread(w, shape, k, x[V_LEG(k)], swing_V);
+            spread(w, shape, k, -b->r_on_ohm * t->i_leg_A[k], t->drop_V);
         }
     }
-    if (swings) {
-        for (int k = 0; k < shape.legs; k++) {
-            if (b->leg[k] == LEG_SWINGING) {
-                spread(w, shape, k, x[V_LEG(k)], v_swing_V);
-                spread(w, shape, k, -b->r_on_ohm * t->i_leg_A[k], t->drop_V);
-            }
-        }
+    for (int p = 0; p < pairs(shape); p++) {
+        t->v_V[p] = pair_at(&b->rail[2 * p]) * both(x[V_DC]) + pair_at(&b->source_V[2 * p]) - t->drop_V[p];
+        t->v_V[p] = swings ? t->v_V[p] + swing_V[p] : t->v_V[p];
     }
-    for (int a = 0; a < shape.active; a++) {
-        t->v_V[a] = b->rail[a] * x[V_DC] + b->source_V[a] - t->drop_V[a] + (swings ? v_swing_V[a] : 0.0);
-    }
-    t->i_dc_A = i_dc_A;
+    t->i_dc_A = total(i_dc_A);
 }
 
 INLINE void rates_at(const circuit_t *c, const field_t *f, const double x[], shape_t shape, bool swings,
-                     tied_t *t, double rate[])
+                     tied_t *t, double rate[], pair_t flux_V[])
 {
     const machine_t *m = &c->machine;
     const bridge_t *b = &c->bridge;
     double omega = x[OMEGA_MECH], v_dc = x[V_DC];
     double omega_e = m->pole_pairs * omega;
-    double in_W = 0.0, copper = 0.0, device_W = 0.0;
+    pair_t in_W = {0.0}, copper = {0.0}, device_W = {0.0};
     tied_at(c, f, x, shape, swings, t);
-    for (int a = 0; a < shape.active; a++) {
-        double power = weight(shape, a) * f->i_A[a];
-        rate[U + a] = t->v_V[a] - m->R_s_ohm * f->i_A[a] - omega_e * f->slope_Wb[a];
-        in_W += b->sources ? power * b->source_V[a] : 0.0;
-        copper += power * f->i_A[a];
-        device_W += power * t->drop_V[a];
-    }
-    if (shape.active > 2 * shape.sets) {
-        rate[U + 2 * shape.sets] *= m->loose_gamma_1_H[2 * shape.sets];
+    for (int p = 0; p < pairs(shape); p++) {
+        pair_t power = weights(shape, p) * f->i_A[p];
+        pair_t rest_V = t->v_V[p] - both(m->R_s_ohm) * f->i_A[p] - both(omega_e) * f->slope_Wb[p];
+        flux_V[p] = of_state(m, shape, p, rest_V);
+        in_W = b->sources ? in_W + power * pair_at(&b->source_V[2 * p]) : in_W;
+        copper += power * f->i_A[p];
+        device_W += power * t->drop_V[p];
     }
     for (int k = 0; k < shape.legs && swings; k++) {
         rate[V_LEG(k)] = b->leg[k] == LEG_SWINGING ? -t->i_leg_A[k] * b->inv_c_leg_1_F : 0.0;
@@ -127,129 +130,124 @@ INLINE void rates_at(const circuit_t *c, const field_t *f, const double x[], sha
     rate[THETA_E] = omega_e;
     rate[OMEGA_MECH] = mechanics_rate(&c->mech, omega, f->torque_Nm);
     rate[V_DC] = dclink_rate(&c->link, v_dc, t->i_dc_A, 0.0);
-    rate[INT_V_ALPHA] = t->v_V[0];
-    rate[INT_V_BETA] = t->v_V[1];
-    rate[INT_IN] = v_dc * t->i_dc_A + in_W;
-    rate[INT_COPPER] = m->R_s_ohm * copper;
-    rate[INT_DEVICE] = device_W;
+    rate[INT_V_ALPHA] = t->v_V[0][0];
+    rate[INT_V_BETA] = t->v_V[0][1];
+    rate[INT_IN] = v_dc * t->i_dc_A + total(in_W);
+    rate[INT_COPPER] = m->R_s_ohm * total(copper);
+    rate[INT_DEVICE] = total(device_W);
     rate[INT_MECH] = f->torque_Nm * omega;
 }
 
 /* How voltages of the legs move with the currents. */
-INLINE void tied_bends(const circuit_t *c, const tied_t *t, const double i_A_s[], shape_t shape, bool swings,
-                       start_t *s, double drop_V_s[], double v_V_s[])
+INLINE void tied_bends(const circuit_t *c, const pair_t i_A_s[], shape_t shape, bool swings, start_t *s,
+                       pair_t drop_V_s[], pair_t v_V_s[])
 {
     const bridge_t *b = &c->bridge;
     const winding_t *w = &c->machine.winding;
-    double swing_V_s[ACTIVE] = {0.0};
-    for (int a = 0; a < shape.active; a++) {
-        drop_V_s[a] = b->r_series_ohm * i_A_s[a];
+    pair_t swing_V_s[PAIRS] = {{0.0}};
+    for (int p = 0; p < pairs(shape); p++) {
+        drop_V_s[p] = both(b->r_series_ohm) * i_A_s[p];
     }
-    if (b->v_switch_V != 0.0) {
-        for (int k = 0; k < shape.legs; k++) {
-            double x = t->i_leg_A[k] * b->inv_zone_1_A[k];
-            if (x > -1.0 && x < 1.0) {
-                double slope = b->v_switch_V * 1.5 * (1.0 - x * x) * b->inv_zone_1_A[k];
-                spread(w, shape, k, slope * along(w, shape, k, i_A_s), drop_V_s);
-            }
+    for (int k = 0; k < shape.legs && b->v_switch_V != 0.0; k++) {
+        double x = s->tied.i_leg_A[k] * b->inv_zone_1_A[k];
+        if (x > -1.0 && x < 1.0) {
+            double slope = b->v_switch_V * 1.5 * (1.0 - x * x) * b->inv_zone_1_A[k];
+            spread(w, shape, k, slope * along(w, shape, k, i_A_s), drop_V_s);
         }
     }
-    if (swings) {
-        for (int k = 0; k < shape.legs; k++) {
-            s->bend[V_LEG(k)] = 0.0;
-            if (b->leg[k] == LEG_SWINGING) {
-                double moves_A_s = along(w, shape, k, i_A_s);
-                s->bend[V_LEG(k)] = -moves_A_s * b->inv_c_leg_1_F;
-                spread(w, shape, k, s->rate[V_LEG(k)], swing_V_s);
-                spread(w, shape, k, -b->r_on_ohm * moves_A_s, drop_V_s);
-            }
+    for (int k = 0; k < shape.legs && swings; k++) {
+        s->bend[V_LEG(k)] = 0.0;
+        if (b->leg[k] == LEG_SWINGING) {
+            double moves_A_s = along(w, shape, k, i_A_s);
+            s->bend[V_LEG(k)] = -moves_A_s * b->inv_c_leg_1_F;
+            spread(w, shape, k, s->rate[V_LEG(k)], swing_V_s);
+            spread(w, shape, k, -b->r_on_ohm * moves_A_s, drop_V_s);
         }
     }
-    for (int a = 0; a < shape.active; a++) {
-        v_V_s[a] = b->rail[a] * s->rate[V_DC] - drop_V_s[a] + (swings ? swing_V_s[a] : 0.0);
+    for (int p = 0; p < pairs(shape); p++) {
+        v_V_s[p] = pair_at(&b->rail[2 * p]) * both(s->rate[V_DC]) - drop_V_s[p];
+        v_V_s[p] = swings ? v_V_s[p] + swing_V_s[p] : v_V_s[p];
     }
 }
 
-/* Second derivatives of the flux linkages, and what of the others goes by coordinate. */
-INLINE void flux_bends(const circuit_t *c, const field_t *f, const tied_t *t, const double i_A_s[],
-                       shape_t shape, bool swings, start_t *s)
+/* Second derivatives of link and rotor, with those of torque and link current. */
+INLINE void other_bends(const circuit_t *c, double torque_Nm_s, double i_dc_A_s, start_t *s)
 {
+    const double *x = c->now.x;
+    double v_dc_s = s->rate[V_DC], omega_s = s->rate[OMEGA_MECH];
+    bool fed = c->link.connected && !(c->link.blocks && c->link.v_source_V < x[V_DC]);
+    double bend_V = (-(fed ? c->link.g_source_S * v_dc_s : 0.0) - i_dc_A_s) * c->link.inv_C_1_F;
+    s->bend[THETA_E] = c->machine.pole_pairs * omega_s;
+    s->bend[OMEGA_MECH] = c->mech.gain_1_kgm2 * (torque_Nm_s - c->mech.parameters.B_Nms * omega_s);
+    s->bend[V_DC] = x[V_DC] > 0.0 ? bend_V : 0.0;
+    s->bend[INT_IN] += v_dc_s * s->tied.i_dc_A + x[V_DC] * i_dc_A_s;
+    s->bend[INT_MECH] = torque_Nm_s * x[OMEGA_MECH] + c->field.torque_Nm * omega_s;
+    s->omega_jerk = c->machine.pole_pairs * s->bend[OMEGA_MECH];
+}
+
+/* Second derivatives from those of the currents. */
+INLINE void bends_at(const circuit_t *c, const pair_t i_A_s[], shape_t shape, bool swings, start_t *s)
+{
+    const field_t *f = &c->field;
     const machine_t *m = &c->machine;
     const bridge_t *b = &c->bridge;
-    double drop_V_s[ACTIVE], v_V_s[ACTIVE];
+    pair_t drop_V_s[PAIRS], v_V_s[PAIRS];
+    pair_t i_dc_A_s = {0.0}, source_W_s = {0.0}, copper = {0.0}, device_W_s = {0.0}, harmonic = {0.0};
     double omega_e = s->rate[THETA_E], omega_e_s = m->pole_pairs * s->rate[OMEGA_MECH];
-    double i_dc_A_s = 0.0, source_W_s = 0.0, copper = 0.0, device_W_s = 0.0, harmonic = 0.0;
-    tied_bends(c, t, i_A_s, shape, swings, s, drop_V_s, v_V_s);
-    for (int a = 0; a < shape.active; a++) {
-        double i = weight(shape, a) * f->i_A[a], moves = weight(shape, a) * i_A_s[a];
-        s->bend[U + a] =
-            v_V_s[a] - m->R_s_ohm * i_A_s[a] - omega_e_s * f->slope_Wb[a] - omega_e * omega_e * f->bend_Wb[a];
-        i_dc_A_s += b->rail[a] * moves;
-        source_W_s += b->sources ? b->source_V[a] * moves : 0.0;
-        copper += i * i_A_s[a];
-        device_W_s += i * drop_V_s[a] + moves * t->drop_V[a];
-        harmonic += moves * f->slope_Wb[a] + omega_e * i * f->bend_Wb[a];
+    double product = 0.0;
+    tied_bends(c, i_A_s, shape, swings, s, drop_V_s, v_V_s);
+    for (int p = 0; p < pairs(shape); p++) {
+        pair_t i = weights(shape, p) * f->i_A[p], moves = weights(shape, p) * i_A_s[p];
+        pair_t turning = both(omega_e) * f->bend_Wb[p];
+        s->flux_V_s[p] = of_state(m, shape, p,
+                                  v_V_s[p] - both(m->R_s_ohm) * i_A_s[p] - both(omega_e_s) * f->slope_Wb[p] -
+                                      both(omega_e) * turning);
+        i_dc_A_s += pair_at(&b->rail[2 * p]) * moves;
+        source_W_s = b->sources ? source_W_s + pair_at(&b->source_V[2 * p]) * moves : source_W_s;
+        copper += i * i_A_s[p];
+        device_W_s += i * drop_V_s[p] + moves * s->tied.drop_V[p];
+        harmonic += moves * f->slope_Wb[p] + i * turning;
     }
-    double cross = 0.0;
     for (int set = 0; set < shape.sets; set++) {
-        int a = 2 * set;
-        cross += s->rate[U + a] * f->i_A[a + 1] - s->rate[U + a + 1] * f->i_A[a];
-        cross += f->flux[a] * i_A_s[a + 1] - f->flux[a + 1] * i_A_s[a];
+        product += cross(s->flux_V[set], f->i_A[set]) + cross(f->flux[set], i_A_s[set]);
     }
-    if (shape.active > 2 * shape.sets) {
-        s->bend[U + 2 * shape.sets] *= m->loose_gamma_1_H[2 * shape.sets];
-    }
-    double torque_Nm_s = m->torque_gain * cross + m->pole_pairs * harmonic;
-    double omega_s = s->rate[OMEGA_MECH];
-    s->bend[THETA_E] = omega_e_s;
-    s->bend[OMEGA_MECH] = c->mech.gain_1_kgm2 * (torque_Nm_s - c->mech.parameters.B_Nms * omega_s);
-    s->bend[V_DC] = i_dc_A_s; /* for link_bends() */
-    s->bend[INT_V_ALPHA] = v_V_s[0];
-    s->bend[INT_V_BETA] = v_V_s[1];
-    s->bend[INT_IN] = source_W_s;
-    s->bend[INT_COPPER] = 2.0 * m->R_s_ohm * copper;
-    s->bend[INT_DEVICE] = device_W_s;
-    s->bend[INT_MECH] = torque_Nm_s * c->now.x[OMEGA_MECH] + f->torque_Nm * omega_s;
+    s->bend[INT_V_ALPHA] = v_V_s[0][0];
+    s->bend[INT_V_BETA] = v_V_s[0][1];
+    s->bend[INT_IN] = total(source_W_s);
+    s->bend[INT_COPPER] = 2.0 * m->R_s_ohm * total(copper);
+    s->bend[INT_DEVICE] = total(device_W_s);
+    other_bends(c, m->torque_gain * product + m->pole_pairs * total(harmonic), total(i_dc_A_s), s);
 }
 
-INLINE void link_bends(const circuit_t *c, double i_dc_A, start_t *s)
+/* Third derivatives that swinging terminals bring, without those of rotation. */
+INLINE void swing_bends(const circuit_t *c, shape_t shape, start_t *s)
 {
-    double v_dc = c->now.x[V_DC], i_dc_A_s = s->bend[V_DC], v_dc_s = s->rate[V_DC];
-    bool fed = c->link.connected && !(c->link.blocks && c->link.v_source_V < v_dc);
-    double bend = (-(fed ? c->link.g_source_S * v_dc_s : 0.0) - i_dc_A_s) * c->link.inv_C_1_F;
-    s->bend[V_DC] = v_dc > 0.0 ? bend : 0.0;
-    s->bend[INT_IN] += v_dc_s * i_dc_A + v_dc * i_dc_A_s;
+    const machine_t *m = &c->machine;
+    pair_t core_V_s[PLANT_SETS], i_A_s2[PAIRS];
+    field_rates(m, c->now.rotor, 0.0, shape, &c->field, s->flux_V_s, core_V_s, i_A_s2);
+    for (int p = 0; p < pairs(shape); p++) {
+        s->v_V_s2[p] = both(-c->bridge.r_series_ohm) * i_A_s2[p];
+    }
+    for (int k = 0; k < shape.legs; k++) {
+        s->v_leg_V_s3[k] = 0.0;
+        if (c->bridge.leg[k] == LEG_SWINGING) {
+            s->v_leg_V_s3[k] = -along(&m->winding, shape, k, i_A_s2) * c->bridge.inv_c_leg_1_F;
+            spread(&m->winding, shape, k, s->bend[V_LEG(k)], s->v_V_s2);
+        }
+    }
+    for (int p = 0; p < pairs(shape); p++) {
+        s->flux_V_s2[p] = of_state(m, shape, p, s->v_V_s2[p] - both(m->R_s_ohm) * i_A_s2[p]);
+    }
 }
 
 INLINE void begin(const circuit_t *c, shape_t shape, bool swings, start_t *s)
 {
-    const field_t *f = &c->field;
-    const machine_t *m = &c->machine;
-    double i_A_s[ACTIVE];
-    rates_at(c, f, c->now.x, shape, swings, &s->tied, s->rate);
-    field_rates(m, c->now.rotor, s->rate[THETA_E], shape, f, &s->rate[U], s->core_V, i_A_s);
-    flux_bends(c, f, &s->tied, i_A_s, shape, swings, s);
-    link_bends(c, s->tied.i_dc_A, s);
-    s->omega_jerk = m->pole_pairs * s->bend[OMEGA_MECH];
+    pair_t i_A_s[PAIRS];
+    rates_at(c, &c->field, c->now.x, shape, swings, &s->tied, s->rate, s->flux_V);
+    field_rates(&c->machine, c->now.rotor, s->rate[THETA_E], shape, &c->field, s->flux_V, s->core_V, i_A_s);
+    bends_at(c, i_A_s, shape, swings, s);
     if (swings) {
-        dq_t core_V_s[PLANT_SETS];
-        double i_A_s2[ACTIVE];
-        field_rates(m, c->now.rotor, 0.0, shape, f, &s->bend[U], core_V_s, i_A_s2);
-        for (int a = 0; a < shape.active; a++) {
-            s->v_V_s2[a] = -c->bridge.r_series_ohm * i_A_s2[a];
-        }
-        for (int k = 0; k < shape.legs; k++) {
-            bool swinging = c->bridge.leg[k] == LEG_SWINGING;
-            s->v_leg_V_s3[k] =
-                swinging ? -along(&m->winding, shape, k, i_A_s2) * c->bridge.inv_c_leg_1_F : 0.0;
-            spread(&m->winding, shape, k, s->bend[V_LEG(k)], s->v_V_s2);
-        }
-        for (int a = 0; a < shape.active; a++) {
-            s->flux_V_s2[a] = s->v_V_s2[a] - m->R_s_ohm * i_A_s2[a];
-        }
-        if (shape.active > 2 * shape.sets) {
-            s->flux_V_s2[2 * shape.sets] *= m->loose_gamma_1_H[2 * shape.sets];
-        }
+        swing_bends(c, shape, s);
     }
 }
 
@@ -263,86 +261,95 @@ INLINE bool turned_over(const bridge_t *b, const tied_t *from, const tied_t *to,
     return moved;
 }
 
-INLINE double error_norm(const circuit_t *c, const double miss[], shape_t shape, bool swings)
+INLINE double error_norm(const circuit_t *c, const double miss[], const pair_t by[], shape_t shape,
+                         bool swings)
 {
-    double worst = miss[OMEGA_MECH] / (fabs(c->now.x[OMEGA_MECH]) + 1.0);
-    double u = 0.0, v = miss[V_DC];
-    for (int a = 0; a < 2 * shape.sets; a++) {
-        u = larger(u, miss[U + a]);
+    double worst = fabs(miss[OMEGA_MECH]) / (fabs(c->now.x[OMEGA_MECH]) + 1.0);
+    double u = 0.0, v = fabs(miss[V_DC]);
+    for (int set = 0; set < shape.sets; set++) {
+        u = larger(u, larger(fabs(by[set][0]), fabs(by[set][1])));
     }
     for (int k = 0; k < shape.legs && swings; k++) {
-        v = larger(v, miss[V_LEG(k)]);
+        v = larger(v, fabs(miss[V_LEG(k)]));
     }
-    if (shape.active > 2 * shape.sets) {
-        worst = larger(worst, miss[U + 2 * shape.sets] * c->inv_i_scale_1_A);
+    if (pairs(shape) > shape.sets) {
+        worst = larger(worst, fabs(by[shape.sets][0]) * c->inv_i_scale_1_A);
     }
     worst = larger(worst, larger(u * c->inv_u_scale, v * c->inv_v_scale_1_V));
     return worst * c->inv_tolerance;
+}
+
+INLINE int first_of(shape_t shape, bool swings)
+{
+    return swings ? V_LEG(shape.legs - 1) : THETA_E;
+}
+
+/* The Taylor series, without the angle. */
+INLINE void predict(const circuit_t *c, const start_t *s, double h, shape_t shape, bool swings, double x[],
+                    field_t *f)
+{
+    const double half = 0.5 * h, third = h / 3.0;
+    for (int e = first_of(shape, swings); e < U; e++) {
+        x[e] = c->now.x[e] + h * (s->rate[e] + half * s->bend[e]);
+    }
+    for (int k = 0; k < shape.legs && swings; k++) {
+        x[V_LEG(k)] += third * half * h * s->v_leg_V_s3[k];
+    }
+    for (int p = 0; p < pairs(shape); p++) {
+        pair_t bend = swings ? s->flux_V_s[p] + both(third) * s->flux_V_s2[p] : s->flux_V_s[p];
+        f->flux[p] = c->field.flux[p] + both(h) * (s->flux_V[p] + both(half) * bend);
+    }
+    for (int set = 0; set < shape.sets && shape.sets > 1; set++) {
+        f->core_Wb[set] = c->field.core_Wb[set] + both(h) * s->core_V[set];
+    }
+}
+
+/* d from the rates at the end; where third derivatives are in the series already, what is missing of it. */
+INLINE void find_miss(const start_t *s, double h, const double end[], const pair_t end_V[], shape_t shape,
+                      bool swings, double miss[], pair_t by[])
+{
+    const double third = h / 3.0, cube = third * 0.5 * h * h;
+    for (int e = first_of(shape, swings); e < U; e++) {
+        miss[e] = third * (end[e] - s->rate[e] - h * s->bend[e]);
+    }
+    for (int p = 0; p < pairs(shape); p++) {
+        by[p] = both(third) * (end_V[p] - s->flux_V[p] - both(h) * s->flux_V_s[p]);
+        by[p] = swings ? both(0.75) * (by[p] - both(cube) * s->flux_V_s2[p]) : by[p];
+    }
+    for (int k = 0; k < shape.legs && swings; k++) {
+        miss[V_LEG(k)] = 0.75 * (miss[V_LEG(k)] - cube * s->v_leg_V_s3[k]);
+    }
+    for (int a = 0; a < 2 && swings; a++) {
+        miss[INT_V_ALPHA + a] -= 0.25 * (miss[INT_V_ALPHA + a] - cube * s->v_V_s2[0][a]);
+    }
 }
 
 /* One step of length h; its error in units of the tolerance. */
 INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape, bool swings, point_t *to,
                    field_t *f)
 {
-    const int first = swings ? V_LEG(shape.legs - 1) : THETA_E;
-    const machine_t *m = &c->machine;
-    const point_t *from = &c->now;
-    double end[ELEMENTS], miss[ELEMENTS], by[ACTIVE];
-    double half = 0.5 * h, third = h / 3.0, cube = third * half * h;
+    double end[ELEMENTS], miss[ELEMENTS];
+    pair_t end_V[PAIRS], by[PAIRS];
     tied_t tied;
-    double turn = h * (s->rate[THETA_E] + half * (s->bend[THETA_E] + third * s->omega_jerk));
-    to->rotor = frame_turn(from->rotor, turn);
-    for (int e = first; e < U; e++) {
-        to->x[e] = from->x[e] + h * (s->rate[e] + half * s->bend[e]);
-    }
-    for (int k = 0; k < shape.legs && swings; k++) {
-        to->x[V_LEG(k)] += cube * s->v_leg_V_s3[k];
-    }
-    for (int a = 0; a < shape.active; a++) {
-        double bend = s->bend[U + a] + (swings ? third * s->flux_V_s2[a] : 0.0);
-        f->flux[a] = c->field.flux[a] + h * (s->rate[U + a] + half * bend);
-    }
-    for (int set = 0; set < shape.sets; set++) {
-        f->core_Wb[set].d = c->field.core_Wb[set].d + h * s->core_V[set].d;
-        f->core_Wb[set].q = c->field.core_Wb[set].q + h * s->core_V[set].q;
-    }
-    field_at(m, to->rotor, shape, f);
-    rates_at(c, f, to->x, shape, swings, &tied, end);
-    for (int e = first; e < U + shape.active; e++) {
-        miss[e] = third * (end[e] - s->rate[e] - h * s->bend[e]);
-    }
-    for (int k = 0; k < shape.legs && swings; k++) {
-        double known = cube * s->v_leg_V_s3[k];
-        double more = 0.75 * (miss[V_LEG(k)] - known);
-        to->x[V_LEG(k)] += more;
-        miss[V_LEG(k)] = fabs(more);
-    }
-    for (int a = 0; a < 2 && swings; a++) {
-        miss[INT_V_ALPHA + a] -= 0.25 * (miss[INT_V_ALPHA + a] - cube * s->v_V_s2[a]);
-    }
-    for (int e = THETA_E; e < U; e++) {
+    double turn = h * (s->rate[THETA_E] + 0.5 * h * (s->bend[THETA_E] + h / 3.0 * s->omega_jerk));
+    to->rotor = frame_turn(c->now.rotor, turn);
+    predict(c, s, h, shape, swings, to->x, f);
+    field_at(&c->machine, to->rotor, shape, f);
+    rates_at(c, f, to->x, shape, swings, &tied, end, end_V);
+    find_miss(s, h, end, end_V, shape, swings, miss, by);
+    for (int e = first_of(shape, swings); e < U; e++) {
         to->x[e] += miss[e];
-        miss[e] = fabs(miss[e]);
     }
-    for (int a = 0; a < shape.active; a++) {
-        double known = swings ? cube * s->flux_V_s2[a] : 0.0;
-        by[a] = (swings ? 0.75 : 1.0) * (miss[U + a] - known);
-        miss[U + a] = fabs(by[a]);
-    }
-    to->x[THETA_E] = from->x[THETA_E] + turn;
-    field_shift(m, to->rotor, shape, by, f);
-    for (int a = 0; a < shape.active; a++) {
-        to->x[U + a] = f->flux[a];
-        to->i_A[a] = f->i_A[a];
-    }
-    for (int set = 0; set < shape.sets && shape.sets > 1; set++) {
-        ab_t core = frame_to_ab(f->core_Wb[set], to->rotor);
-        to->x[U + 2 * set] = core.alpha;
-        to->x[U + 2 * set + 1] = core.beta;
+    to->x[THETA_E] = c->now.x[THETA_E] + turn;
+    field_shift(&c->machine, to->rotor, shape, by, f);
+    for (int p = 0; p < pairs(shape); p++) {
+        bool linked = shape.sets > 1;
+        pair_put(&to->x[U + 2 * p], linked ? from_rotor(f->core_Wb[p], to->rotor) : f->flux[p]);
+        pair_put(&to->i_A[2 * p], f->i_A[p]);
     }
     to->torque_Nm = f->torque_Nm;
     bool smooth = !swings && !turned_over(&c->bridge, &s->tied, &tied, shape);
-    return (smooth ? PART : 1.0) * error_norm(c, miss, shape, swings);
+    return (smooth ? PART : 1.0) * error_norm(c, miss, by, shape, swings);
 }
 
 static void retake(const circuit_t *c, const void *start, double h, point_t *to)

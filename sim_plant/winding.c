@@ -95,7 +95,7 @@ static void sum_sides(winding_t *w)
 {
     for (int side = 0; side < w->legs / 3; side++) {
         for (unsigned mask = 0; mask < 8; mask++) {
-            for (int a = 0; a < w->active; a++) {
+            for (int a = 0; a < ACTIVE; a++) {
                 double sum = 0.0;
                 for (int n = 0; n < 3; n++) {
                     sum += (mask >> n & 1u) != 0u ? w->share[3 * side + n][a] : 0.0;
@@ -109,6 +109,12 @@ static void sum_sides(winding_t *w)
 /* Takes the active part of everything. */
 static void pack(winding_t *w)
 {
+    for (int leg = 0; leg < w->legs; leg++) { /* what is not active has no part: the branch may have gone */
+        for (int a = w->active; a < ACTIVE; a++) {
+            w->axis[leg][a] = 0.0;
+            w->share[leg][a] = 0.0;
+        }
+    }
     for (int a = 0; a < w->active; a++) {
         int c = w->coordinate[a];
         w->weight[a] = weight(c);
@@ -316,6 +322,7 @@ void winding_branch(winding_t *w, const double axis[PLANT_LEGS], double R_ohm)
     if (w->branch >= 0) {
         w->active--;
         w->branch = -1;
+        pack(w);
     }
     if (R_ohm < 0.0) {
         return;
