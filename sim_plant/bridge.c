@@ -49,24 +49,28 @@ static const facts_t facts[] = {
 
 /* Voltages that the legs have whatever the currents, by coordinate; only where all are tied or swing. Of a
  * single star the other side adds nothing. */
-static void sum_rails(bridge_t *b, const winding_t *w, const unsigned masks[PLANT_SETS])
+static void sum_rails(bridge_t *b, const winding_t *w)
 {
-    const double *upper = w->side[0][masks[0] & 7u];
-    const double *other = w->side[1][masks[1] & 7u];
+    const double *upper = w->side[0][b->masks[0] & 7u];
+    const double *other = w->side[1][b->masks[1] & 7u];
     double rail[ACTIVE];
     for (int a = 0; a < ACTIVE; a++) {
         rail[a] = upper[a] + other[a];
     }
     memcpy(b->rail, rail, sizeof rail);
-    for (int side = 0; side < PLANT_SETS && b->v_diode_V != 0.0; side++) {
-        const double *high = w->side[side][masks[side] >> 8 & 7u];
-        const double *low = w->side[side][masks[side] >> 16 & 7u];
-        double diode_V[ACTIVE];
+}
+
+static void sum_diodes(bridge_t *b, const winding_t *w)
+{
+    double diode_V[ACTIVE] = {0.0};
+    for (int side = 0; side < b->legs / 3; side++) {
+        const double *high = w->side[side][b->masks[side] >> 8 & 7u];
+        const double *low = w->side[side][b->masks[side] >> 16 & 7u];
         for (int a = 0; a < ACTIVE; a++) {
-            diode_V[a] = (side > 0 ? b->diode_V[a] : 0.0) + b->v_diode_V * (high[a] - low[a]);
+            diode_V[a] += b->v_diode_V * (high[a] - low[a]);
         }
-        memcpy(b->diode_V, diode_V, sizeof diode_V);
     }
+    memcpy(b->diode_V, diode_V, sizeof diode_V);
 }
 
 static void sum_sources(bridge_t *b, const winding_t *w)
@@ -98,8 +102,10 @@ void bridge_summarise(bridge_t *b, const winding_t *w)
     bool sources = counts >> 16 > 0u;
     b->g_through_S = b->both > 0 ? 0.5 * b->both / fmax(b->r_on_ohm, R_THROUGH_OHM) : 0.0;
     b->r_series_ohm = sources ? 0.0 : (w->legs > w->phases ? 2.0 : 1.0) * b->r_on_ohm;
-    if (b->floating == 0) {
-        sum_rails(b, w, masks);
+    memcpy(b->masks, masks, sizeof masks);
+    sum_rails(b, w);
+    if (b->v_diode_V != 0.0) {
+        sum_diodes(b, w);
     }
     if (sources || b->sources) {
         sum_sources(b, w);

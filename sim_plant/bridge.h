@@ -40,11 +40,12 @@ typedef struct {
     /* what follows from leg[] */
     int floating, swinging, diodes, both;
     bool sources;
-    double rail[ACTIVE];             /* by active coordinate: share of the upper rail, */
-    double source_V[ACTIVE];         /* of given sources */
-    double diode_V[ACTIVE];          /* and of diode drops, with their sign */
-    double r_series_ohm;             /* of every phase: r_on of its legs, or none with sources */
-    double upper[PLANT_LEGS];        /* 1: tied to the upper rail */
+    unsigned masks[PLANT_SETS]; /* of three legs each: tied to the upper rail, and by diodes; see bridge.c */
+    double rail[ACTIVE];        /* by active coordinate: share of the upper rail, */
+    double source_V[ACTIVE];    /* of given sources */
+    double diode_V[ACTIVE];     /* and of diode drops, with their sign */
+    double r_series_ohm;        /* of every phase: r_on of its legs, or none with sources */
+    double upper[PLANT_LEGS];   /* 1: tied to the upper rail */
     double inv_zone_1_A[PLANT_LEGS]; /* 0: no switch closed */
     double g_through_S;              /* of legs with both switches closed */
 } bridge_t;

@@ -31,25 +31,18 @@ static void plain_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *n
     nodes->v_neutral_V[0] = (legs.v_leg_V[0] + legs.v_leg_V[1] + legs.v_leg_V[2]) / 3.0;
 }
 
-void circuit_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *nodes)
+static void all_nodes(const circuit_t *c, const point_t *p, const machine_state_t *state,
+                      const machine_point_t *point, circuit_nodes_t *nodes)
 {
-    const winding_t *w = &c->machine.winding;
-    if (circuit_symmetrical(c) && c->machine.plain && w->flux_terms == 0 && w->inductance_terms == 0) {
-        plain_nodes(c, p, nodes);
-        return;
-    }
     const machine_t *m = &c->machine;
-    machine_state_t state = circuit_machine_state(p);
-    machine_point_t point;
     machine_rate_t moved = {0};
     circuit_legs_t legs;
     double omega_e = m->pole_pairs * p->x[OMEGA_MECH];
-    machine_evaluate(m, &state, &point);
     circuit_legs(c, p, &legs);
     if (c->bridge.floating > 0) {
-        floating_voltages(&c->bridge, m, &state, &point, omega_e, p->x[V_DC], legs.v_V, legs.v_leg_V, &moved);
+        floating_voltages(&c->bridge, m, state, point, omega_e, p->x[V_DC], legs.v_V, legs.v_leg_V, &moved);
     } else {
-        machine_rates(m, &state, &point, omega_e, legs.v_V, &moved);
+        machine_rates(m, state, point, omega_e, legs.v_V, &moved);
     }
     *nodes = (circuit_nodes_t){.i_dc_A = legs.i_dc_A};
     memcpy(nodes->v_leg_V, legs.v_leg_V, sizeof nodes->v_leg_V);
@@ -59,8 +52,38 @@ void circuit_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *nodes)
             nodes->v_zero_V[set] = legs.v_V[m->winding.zero];
             continue;
         }
-        nodes->v_zero_V[set] = winding_zero_V(&m->winding, state.rotor, omega_e, point.i_A, moved.i_A_s, set);
+        nodes->v_zero_V[set] =
+            winding_zero_V(&m->winding, state->rotor, omega_e, point->i_A, moved.i_A_s, set);
         nodes->v_neutral_V[set] = (v[0] + v[1] + v[2]) / 3.0 - nodes->v_zero_V[set];
+    }
+}
+
+/* Whether no star network sees anything */
+static bool has_plain_nodes(const circuit_t *c)
+{
+    const winding_t *w = &c->machine.winding;
+    return circuit_symmetrical(c) && c->machine.plain && w->flux_terms == 0 && w->inductance_terms == 0;
+}
+
+void circuit_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *nodes)
+{
+    if (has_plain_nodes(c)) {
+        plain_nodes(c, p, nodes);
+        return;
+    }
+    machine_state_t state = circuit_machine_state(p);
+    machine_point_t point;
+    machine_evaluate(&c->machine, &state, &point);
+    all_nodes(c, p, &state, &point, nodes);
+}
+
+void circuit_nodes_of(const circuit_t *c, const machine_state_t *state, const machine_point_t *machine,
+                      circuit_nodes_t *nodes)
+{
+    if (has_plain_nodes(c)) {
+        plain_nodes(c, &c->now, nodes);
+    } else {
+        all_nodes(c, &c->now, state, machine, nodes);
     }
 }
 
@@ -82,16 +105,21 @@ static double output_V(const circuit_t *c, int k)
     return b->upper[k] * v_dc_V + diode_V;
 }
 
+double circuit_field_of_J(const circuit_t *c, const machine_state_t *state, const machine_point_t *machine)
+{
+    double energy_J = machine_energy_J(&c->machine, state, machine);
+    for (int k = 0; k < c->bridge.legs && c->bridge.c_leg_F > 0.0; k++) {
+        energy_J += capacitor_J(c, output_V(c, k));
+    }
+    return energy_J;
+}
+
 double circuit_field_J(const circuit_t *c)
 {
     machine_state_t state = circuit_machine_state(&c->now);
     machine_point_t point;
     machine_evaluate(&c->machine, &state, &point);
-    double energy_J = machine_energy_J(&c->machine, &state, &point);
-    for (int k = 0; k < c->bridge.legs && c->bridge.c_leg_F > 0.0; k++) {
-        energy_J += capacitor_J(c, output_V(c, k));
-    }
-    return energy_J;
+    return circuit_field_of_J(c, &state, &point);
 }
 
 /* Leg k becomes another kind. What its capacitance holds more or less afterwards has come from the link if

@@ -64,6 +64,7 @@ typedef struct {
     mechanics_t mech;
     probe_t probe;
     point_t now;
+    point_t next;  /* the end of a step, until that is taken */
     field_t field; /* of the present point, when a symmetrical machine knows it */
     bool field_known;
     int events; /* since the end of a segment */
@@ -128,6 +129,12 @@ void circuit_nodes(const circuit_t *circuit, const point_t *point, circuit_nodes
 
 /* Magnetic energy, and that of the output capacitances. */
 double circuit_field_J(const circuit_t *circuit);
+
+/* Both at the present point, whose machine has been evaluated. */
+void circuit_nodes_of(const circuit_t *circuit, const machine_state_t *state, const machine_point_t *machine,
+                      circuit_nodes_t *nodes);
+double circuit_field_of_J(const circuit_t *circuit, const machine_state_t *state,
+                          const machine_point_t *machine);
 
 static inline machine_state_t circuit_machine_state(const point_t *p)
 {

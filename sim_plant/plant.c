@@ -352,7 +352,7 @@ void plant_truth(const plant_t *plant, plant_truth_t *truth)
     machine_point_t point;
     circuit_nodes_t nodes;
     machine_evaluate(&circuit->machine, &state, &point);
-    circuit_nodes(circuit, &circuit->now, &nodes);
+    circuit_nodes_of(circuit, &state, &point, &nodes);
     dq_t i = frame_to_dq((ab_t){point.i_A[0], point.i_A[1]}, state.rotor);
     dq_t psi = machine_flux_Wb(&circuit->machine, &state, &point);
     *truth = (plant_truth_t){
@@ -374,7 +374,7 @@ void plant_truth(const plant_t *plant, plant_truth_t *truth)
         .e_copper_J = x[INT_COPPER],
         .e_device_J = x[INT_DEVICE] + circuit->jump_device_J,
         .e_mech_J = x[INT_MECH] + plant->slip_J,
-        .e_field_J = circuit_field_J(circuit) - plant->field_base_J,
+        .e_field_J = circuit_field_of_J(circuit, &state, &point) - plant->field_base_J,
     };
     memcpy(truth->v_leg_V, nodes.v_leg_V, sizeof truth->v_leg_V);
     memcpy(truth->v_neutral_V, nodes.v_neutral_V, sizeof truth->v_neutral_V);

@@ -129,7 +129,7 @@ INLINE void rates_at(const circuit_t *c, const field_t *f, const double x[], sha
     }
     rate[THETA_E] = omega_e;
     rate[OMEGA_MECH] = mechanics_rate(&c->mech, omega, f->torque_Nm);
-    rate[V_DC] = dclink_rate(&c->link, v_dc, t->i_dc_A, 0.0);
+    rate[V_DC] = dclink_plain_rate(&c->link, v_dc, t->i_dc_A);
     rate[INT_V_ALPHA] = t->v_V[0][0];
     rate[INT_V_BETA] = t->v_V[0][1];
     rate[INT_IN] = v_dc * t->i_dc_A + total(in_W);
@@ -422,12 +422,13 @@ INLINE void know_field(circuit_t *c, shape_t shape)
         field_from_cores(&c->machine, c->now.rotor, shape, &c->now.x[U], c->now.x[U + 2 * shape.sets],
                          &c->field);
         c->field_known = true;
+        c->next = c->now; /* what does not move in these steps */
     }
 }
 
 INLINE double take_steps(circuit_t *c, double left_s, shape_t shape, bool swings, bool *event)
 {
-    point_t to = c->now;
+    point_t *to = &c->next;
     field_t field;
     start_t start;
     know_field(c, shape);
@@ -437,27 +438,34 @@ INLINE double take_steps(circuit_t *c, double left_s, shape_t shape, bool swings
         h = steps_turn_s(c, start.rate[THETA_E], h);
         h = swings ? swing_s(c, &start, shape, h) : h;
         h = h > 0.999 * left_s ? left_s : h; /* no sliver at the end */
-        double error = step(c, &start, h, shape, swings, &to, &field);
+        double error = step(c, &start, h, shape, swings, to, &field);
         while (!(error <= 1.0) && h > 1e-9 * left_s) {
             h = steps_shorter_s(h, error);
             c->step_s = swings ? c->step_s : h;
-            error = step(c, &start, h, shape, swings, &to, &field);
+            error = step(c, &start, h, shape, swings, to, &field);
         }
         if (!swings) {
             control(c, h, error);
         }
         if (steps_watching(c)) {
-            excess_t excess = steps_excess(c, &to);
+            excess_t excess = steps_excess(c, to);
             *event = steps_event(excess);
             if (*event && !steps_landed(excess)) {
-                h = steps_locate(c, h, retake, &start, &to);
-                step(c, &start, h, shape, swings, &to, &field);
+                h = steps_locate(c, h, retake, &start, to);
+                step(c, &start, h, shape, swings, to, &field);
             }
         }
         if (probe_active(&c->probe)) {
-            steps_probe(c, &to, h);
+            steps_probe(c, to, h);
         }
-        c->now = to;
+        for (int e = first_of(shape, swings); e < U + 2 * pairs(shape); e++) {
+            c->now.x[e] = to->x[e];
+        }
+        for (int a = 0; a < 2 * pairs(shape); a++) {
+            c->now.i_A[a] = to->i_A[a];
+        }
+        c->now.rotor = to->rotor;
+        c->now.torque_Nm = to->torque_Nm;
         c->field = field;
         c->t_s += h;
         left_s -= h;
