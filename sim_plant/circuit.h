@@ -1,15 +1,15 @@
 /* Machine, bridge, link and rotor as one system of differential equations between two gate changes.
  *
- * State: the windings' (machine.h; for a plain machine the stator flux in the stationary frame, into which
- * the terminal voltage integrates straight), rotor angle and speed, link voltage, voltages of swinging
+ * State: the windings' (machine.h), rotor angle and speed, link voltage, voltages of swinging
  * terminals, second mass. Currents and torque follow from it algebraically. Integrals for the mean voltage
  * and the energy balance ride along.
  *
- * circuit_advance() uses the Bogacki-Shampine 3(2) pair with error control, or Heun's method where that is
- * exact enough; a step is as long as the segment if the error allows it and the rotor turns by less than
- * FRAME_TURN_MAX_RAD. Inside a segment it finds the instants at which a diode stops or starts, friction
- * sticks or breaks away, or the chopper acts, to the margins stated in bridge.c, and goes on from there; it
- * asserts that this does not turn into chatter.
+ * circuit_advance() takes Taylor series of third order with error control where all phases are alike and
+ * every leg is tied or swings (symmetrical.c), which is most of the time. The rest (steps_general.c) is for
+ * the Bogacki-Shampine 3(2) pair, or Heun's method where that is exact enough. A step is as long as the
+ * segment if the error allows it and the rotor turns by less than FRAME_TURN_MAX_RAD. Inside a segment it
+ * finds the instants at which a diode stops or starts, friction sticks or breaks away, or the chopper acts,
+ * to the margins stated in bridge.c, and goes on from there; it asserts that this does not turn into chatter.
  *
  * The windings of floating legs are projected onto zero leg current after every step, so that the error of
  * integration does not leak into a current that cannot flow.
@@ -27,7 +27,7 @@
 #include <string.h>
 
 /* Elements of the state vector. The INT_ do not act back: integrals since the start. What a plain machine has
- * lies in one piece; with swinging terminals it has three more before; the others have all. */
+ * lies in one piece; swinging terminals come before. */
 enum {
     V_LEG_LAST,           /* swinging terminals, V, the first leg last */
     THETA_E = PLANT_LEGS, /* rad, unwrapped */

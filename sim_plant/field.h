@@ -12,7 +12,8 @@
  * Quantities of a set, alpha and beta or d and q, are one vector of two for the processor. Of a zero sequence
  * the second is nothing.
  *
- * Inline, for a caller that knows the shape of the windings. Tests: field_test.cpp. */
+ * Inline, for a caller that knows the shape of the windings. Tests: plant_test.cpp, against the general way.
+ */
 #ifndef PLANT_FIELD_H
 #define PLANT_FIELD_H
 

@@ -126,11 +126,6 @@ void machine_evaluate(const machine_t *m, const machine_state_t *s, machine_poin
     machine_evaluate_n(m, s, machine_shape(m), true, p);
 }
 
-void machine_drop_V(const machine_t *m, const double i_A[ACTIVE], double v_V[ACTIVE])
-{
-    machine_drop_n(m, i_A, v_V, m->winding.active);
-}
-
 void machine_admittance(const machine_t *m, const machine_state_t *s, const machine_point_t *p,
                         double admittance_1_H[ACTIVE][ACTIVE])
 {

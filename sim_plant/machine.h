@@ -11,8 +11,8 @@
  *
  * State of a coordinate: core flux with the energy form, core current with a table, and the current itself
  * for a zero sequence or the fault branch. A plain machine, one star set of the energy form with
- * harmonics of the magnet at most, has dpsi_core/dt = v - R i - omega psi_x' and is computed inline;
- * machine_rates() does every other.
+ * harmonics of the magnet at most, has dpsi_core/dt = v - R i - omega psi_x'. machine_rates() does every
+ * machine; those whose phases are alike have a shorter way, field.h.
  *
  * E19: a shorted circuit (L_eddy, R_eddy) on each rotor axis carries L_eddy di_e/dt = dpsi_core/dt - R_eddy
  * i_e beside the core current.
@@ -109,9 +109,6 @@ void machine_idle(const machine_t *machine, machine_state_t *state, int set);
 dq_t machine_flux_Wb(const machine_t *machine, const machine_state_t *state, const machine_point_t *point);
 
 double machine_energy_J(const machine_t *machine, const machine_state_t *state, const machine_point_t *point);
-
-/* The voltage drop of the windings' resistance. */
-void machine_drop_V(const machine_t *machine, const double i_A[ACTIVE], double v_V[ACTIVE]);
 
 static inline dq_t machine_current_A(const machine_t *m, dq_t psi_Wb)
 {
