@@ -32,11 +32,11 @@ void circuit_general(const circuit_t *circuit, double t_s, point_t *point, doubl
 void circuit_currents(const circuit_t *circuit, point_t *point);
 
 /* The windings' state, and what follows from it, into the present point. */
-void circuit_take_state(circuit_t *circuit, const machine_state_t *state, const machine_point_t *point);
+void circuit_take_state(circuit_t *circuit, const machine_state_t *state, const machine_point_t *machine);
 
 /* Energy of a leg's output capacitance at a voltage, and the voltage that it has. */
 double circuit_capacitor_J(const circuit_t *circuit, double v_V);
-double circuit_output_V(const circuit_t *circuit, int leg);
+double circuit_output_V(const circuit_t *circuit, int k);
 
 /* What follows from the legs; moves the windings onto zero current of the floating ones; after a jump of the
  * currents: the diodes that they now flow through. */

@@ -50,7 +50,7 @@ typedef void steps_retake_t(const circuit_t *circuit, const void *start, double 
 
 /* Shortens a step, whose end is past an event, to just behind the first one: false position with bisection
  * whenever that does not halve the bracket. Its length. */
-double steps_locate(const circuit_t *circuit, double h_s, steps_retake_t *retake, const void *start,
+double steps_locate(const circuit_t *circuit, double h_late, steps_retake_t *retake, const void *start,
                     point_t *to);
 
 /* The voltage channels and comparators over a step to that point. */
