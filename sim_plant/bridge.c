@@ -1,6 +1,7 @@
 #include "sim_plant/bridge.h"
 
 #include <math.h>
+#include <string.h>
 
 /* Margins against rounding: what counts as no current, and how far beyond a diode's threshold a floating
  * terminal must be, so that a diode never stops and starts for the same instant. */
@@ -28,62 +29,88 @@ void bridge_init(bridge_t *bridge, const plant_config_t *config, int legs)
 }
 
 /* What each kind of leg is */
-static const struct {
-    int floating, swinging, diode;
-    double upper;      /* tied to the upper rail */
-    double diode_drop; /* in units of v_diode, as it adds to the terminal's voltage */
-    double switched, both, source;
-} facts[] = {
-    [LEG_FLOATING] = {.floating = 1},
-    [LEG_SWINGING] = {.swinging = 1},
+typedef struct {
+    unsigned counts; /* 4 bits each: floating, swinging, diode, both, source */
+    unsigned masks;  /* a byte each: tied to the upper rail; by a diode to it, and to the lower one */
+    double upper;
+    double switched;
+} facts_t;
+
+static const facts_t facts[] = {
+    [LEG_FLOATING] = {.counts = 0x1},
+    [LEG_SWINGING] = {.counts = 0x10},
     [LEG_LOW] = {.switched = 1.0},
-    [LEG_HIGH] = {.switched = 1.0, .upper = 1.0},
-    [LEG_BOTH] = {.both = 1.0, .upper = 0.5},
-    [LEG_DIODE_LOW] = {.diode = 1, .diode_drop = -1.0},
-    [LEG_DIODE_HIGH] = {.diode = 1, .diode_drop = 1.0, .upper = 1.0},
-    [LEG_SOURCE] = {.source = 1.0},
+    [LEG_HIGH] = {.switched = 1.0, .masks = 0x1, .upper = 1.0},
+    [LEG_BOTH] = {.counts = 0x1000, .upper = 0.5},
+    [LEG_DIODE_LOW] = {.counts = 0x100, .masks = 0x10000},
+    [LEG_DIODE_HIGH] = {.counts = 0x100, .masks = 0x101, .upper = 1.0},
+    [LEG_SOURCE] = {.counts = 0x10000},
 };
 
-/* The usual three-phase star, which is all that many runs have */
-static void summarise_star(bridge_t *b)
+/* Voltages that the legs have whatever the currents, by coordinate; only where all are tied or swing. Of a
+ * single star the other side adds nothing. */
+static void sum_rails(bridge_t *b, const winding_t *w)
 {
-    abc_t upper, diode_V, source_V;
-    for (int k = 0; k < 3; k++) {
-        upper.x[k] = b->upper[k];
-        diode_V.x[k] = facts[b->leg[k]].diode_drop * b->v_diode_V;
-        source_V.x[k] = facts[b->leg[k]].source * b->v_source_V[k];
+    const double *upper = w->side[0][b->masks[0] & 7u];
+    const double *other = w->side[1][b->masks[1] & 7u];
+    double rail[ACTIVE];
+    for (int a = 0; a < ACTIVE; a++) {
+        rail[a] = upper[a] + other[a];
     }
-    ab_t rail = frame_from_abc(upper);
-    ab_t diode = frame_from_abc(diode_V);
-    ab_t source = frame_from_abc(source_V);
-    b->rail[0] = rail.alpha;
-    b->rail[1] = rail.beta;
-    b->diode_V[0] = diode.alpha;
-    b->diode_V[1] = diode.beta;
-    b->source_V[0] = source.alpha;
-    b->source_V[1] = source.beta;
+    memcpy(b->rail, rail, sizeof rail);
 }
 
-void bridge_summarise(bridge_t *b, const winding_t *winding)
+static void sum_diodes(bridge_t *b, const winding_t *w)
 {
-    double both = 0.0;
-    b->floating = 0;
-    b->swinging = 0;
-    b->diodes = 0;
-    b->r_series_ohm = b->leg[0] == LEG_SOURCE ? 0.0 : b->r_on_ohm;
-    for (int k = 0; k < b->legs; k++) {
-        leg_t leg = b->leg[k];
-        b->floating += facts[leg].floating;
-        b->swinging += facts[leg].swinging;
-        b->diodes += facts[leg].diode;
-        b->inv_zone_1_A[k] = facts[leg].switched * b->switched_1_A;
-        b->upper[k] = facts[leg].upper;
-        both += facts[leg].both;
+    double diode_V[ACTIVE] = {0.0};
+    for (int side = 0; side < b->legs / 3; side++) {
+        const double *high = w->side[side][b->masks[side] >> 8 & 7u];
+        const double *low = w->side[side][b->masks[side] >> 16 & 7u];
+        for (int a = 0; a < ACTIVE; a++) {
+            diode_V[a] += b->v_diode_V * (high[a] - low[a]);
+        }
     }
-    b->g_through_S = both > 0.0 ? 0.5 * both / fmax(b->r_on_ohm, R_THROUGH_OHM) : 0.0;
-    if (winding->active == 2) {
-        summarise_star(b);
+    memcpy(b->diode_V, diode_V, sizeof diode_V);
+}
+
+static void sum_sources(bridge_t *b, const winding_t *w)
+{
+    for (int a = 0; a < w->active; a++) {
+        b->source_V[a] = 0.0;
+        for (int k = 0; k < b->legs; k++) {
+            b->source_V[a] += b->leg[k] == LEG_SOURCE ? w->share[k][a] * b->v_source_V[k] : 0.0;
+        }
     }
+}
+
+void bridge_summarise(bridge_t *b, const winding_t *w)
+{
+    unsigned counts = 0u, masks[PLANT_SETS] = {0u};
+    for (int side = 0; side < b->legs / 3; side++) {
+        for (int n = 0; n < 3; n++) {
+            const facts_t *is = &facts[b->leg[3 * side + n]];
+            counts += is->counts;
+            masks[side] |= is->masks << n;
+            b->inv_zone_1_A[3 * side + n] = is->switched * b->switched_1_A;
+            b->upper[3 * side + n] = is->upper;
+        }
+    }
+    b->floating = (int)(counts & 15u);
+    b->swinging = (int)(counts >> 4 & 15u);
+    b->diodes = (int)(counts >> 8 & 15u);
+    b->both = (int)(counts >> 12 & 15u);
+    bool sources = counts >> 16 > 0u;
+    b->g_through_S = b->both > 0 ? 0.5 * b->both / fmax(b->r_on_ohm, R_THROUGH_OHM) : 0.0;
+    b->r_series_ohm = sources ? 0.0 : (w->legs > w->phases ? 2.0 : 1.0) * b->r_on_ohm;
+    memcpy(b->masks, masks, sizeof masks);
+    sum_rails(b, w);
+    if (b->v_diode_V != 0.0) {
+        sum_diodes(b, w);
+    }
+    if (sources || b->sources) {
+        sum_sources(b, w);
+    }
+    b->sources = sources;
 }
 
 static double no_current_A(const bridge_t *bridge)

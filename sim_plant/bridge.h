@@ -38,12 +38,14 @@ typedef struct {
     bool off_wire[PLANT_LEGS];
     double v_source_V[PLANT_LEGS];
     /* what follows from leg[] */
-    int floating, swinging, diodes;
-    double rail[2];                  /* of a three-phase star: share of the upper rail, */
-    double source_V[2];              /* of given sources */
-    double diode_V[2];               /* and of diode drops, with their sign */
-    double r_series_ohm;             /* of every leg: r_on, or none with sources */
-    double upper[PLANT_LEGS];        /* 1: tied to the upper rail */
+    int floating, swinging, diodes, both;
+    bool sources;
+    unsigned masks[PLANT_SETS]; /* of three legs each: tied to the upper rail, and by diodes; see bridge.c */
+    double rail[ACTIVE];        /* by active coordinate: share of the upper rail, */
+    double source_V[ACTIVE];    /* of given sources */
+    double diode_V[ACTIVE];     /* and of diode drops, with their sign */
+    double r_series_ohm;        /* of every phase: r_on of its legs, or none with sources */
+    double upper[PLANT_LEGS];   /* 1: tied to the upper rail */
     double inv_zone_1_A[PLANT_LEGS]; /* 0: no switch closed */
     double g_through_S;              /* of legs with both switches closed */
 } bridge_t;
@@ -84,7 +86,8 @@ static inline double bridge_tied_V(const bridge_t *b, int k, double i_A, double 
     if (b->leg[k] == LEG_SOURCE) {
         return b->v_source_V[k];
     }
-    double drop_V = b->r_on_ohm * i_A + b->v_switch_V * bridge_switch_share(i_A * b->inv_zone_1_A[k]);
+    double r_ohm = b->leg[k] == LEG_BOTH ? 0.5 * b->r_on_ohm : b->r_on_ohm;
+    double drop_V = r_ohm * i_A + b->v_switch_V * bridge_switch_share(i_A * b->inv_zone_1_A[k]);
     if (bridge_is_diode(b, k)) {
         drop_V += b->leg[k] == LEG_DIODE_LOW ? b->v_diode_V : -b->v_diode_V;
     }

@@ -1,15 +1,15 @@
 /* Machine, bridge, link and rotor as one system of differential equations between two gate changes.
  *
- * State: the windings' (machine.h; for a plain machine the stator flux in the stationary frame, into which
- * the terminal voltage integrates straight), rotor angle and speed, link voltage, voltages of swinging
+ * State: the windings' (machine.h), rotor angle and speed, link voltage, voltages of swinging
  * terminals, second mass. Currents and torque follow from it algebraically. Integrals for the mean voltage
  * and the energy balance ride along.
  *
- * circuit_advance() uses the Bogacki-Shampine 3(2) pair with error control, or Heun's method where that is
- * exact enough; a step is as long as the segment if the error allows it and the rotor turns by less than
- * FRAME_TURN_MAX_RAD. Inside a segment it finds the instants at which a diode stops or starts, friction
- * sticks or breaks away, or the chopper acts, to the margins stated in bridge.c, and goes on from there; it
- * asserts that this does not turn into chatter.
+ * circuit_advance() takes Taylor series of third order with error control where all phases are alike and
+ * every leg is tied or swings (symmetrical.c), which is most of the time. The rest (steps_general.c) is for
+ * the Bogacki-Shampine 3(2) pair, or Heun's method where that is exact enough. A step is as long as the
+ * segment if the error allows it and the rotor turns by less than FRAME_TURN_MAX_RAD. Inside a segment it
+ * finds the instants at which a diode stops or starts, friction sticks or breaks away, or the chopper acts,
+ * to the margins stated in bridge.c, and goes on from there; it asserts that this does not turn into chatter.
  *
  * The windings of floating legs are projected onto zero leg current after every step, so that the error of
  * integration does not leak into a current that cannot flow.
@@ -20,14 +20,14 @@
 
 #include "sim_plant/bridge.h"
 #include "sim_plant/dclink.h"
-#include "sim_plant/machine.h"
+#include "sim_plant/field.h"
 #include "sim_plant/mechanics.h"
 #include "sim_plant/probe.h"
 
 #include <string.h>
 
 /* Elements of the state vector. The INT_ do not act back: integrals since the start. What a plain machine has
- * lies in one piece; with swinging terminals it has three more before; the others have all. */
+ * lies in one piece; swinging terminals come before. */
 enum {
     V_LEG_LAST,           /* swinging terminals, V, the first leg last */
     THETA_E = PLANT_LEGS, /* rad, unwrapped */
@@ -54,7 +54,6 @@ typedef struct {
     double x[ELEMENTS];
     rotor_t rotor;
     double i_A[ACTIVE];
-    double psi_theta_Wb[2]; /* of the magnet's harmonics in a plain machine */
     double torque_Nm;
 } point_t;
 
@@ -65,6 +64,10 @@ typedef struct {
     mechanics_t mech;
     probe_t probe;
     point_t now;
+    point_t next;  /* the end of a step, until that is taken */
+    field_t field; /* of the present point, when a symmetrical machine knows it */
+    bool field_known;
+    int events; /* since the end of a segment */
     double t_s;
     double period_start_s;
     double low_since_s[PLANT_LEGS];  /* when switch or diode of the negative rail began to conduct */
@@ -101,7 +104,8 @@ bool circuit_ignores(const circuit_t *circuit, const gates_t *gates, unsigned le
 void circuit_wire(circuit_t *circuit, int leg, bool off);
 void circuit_short(circuit_t *circuit, int leg_a, int leg_b, double R_ohm);
 void circuit_sources(circuit_t *circuit, const double v_leg_V[]);
-void circuit_advance(circuit_t *circuit, double duration_s);
+/* Advances until the first event at most; returns the time left. */
+double circuit_advance(circuit_t *circuit, double duration_s);
 
 static inline double circuit_leg_A(const circuit_t *c, const point_t *p, int k)
 {
@@ -125,6 +129,12 @@ void circuit_nodes(const circuit_t *circuit, const point_t *point, circuit_nodes
 
 /* Magnetic energy, and that of the output capacitances. */
 double circuit_field_J(const circuit_t *circuit);
+
+/* Both at the present point, whose machine has been evaluated. */
+void circuit_nodes_of(const circuit_t *circuit, const machine_state_t *state, const machine_point_t *machine,
+                      circuit_nodes_t *nodes);
+double circuit_field_of_J(const circuit_t *circuit, const machine_state_t *state,
+                          const machine_point_t *machine);
 
 static inline machine_state_t circuit_machine_state(const point_t *p)
 {

@@ -25,7 +25,7 @@ static void give_back(const circuit_t *kept, circuit_t *circuit)
            MOVING);
 }
 
-static double inverse(double level_A)
+static double per_ampere(double level_A)
 {
     return level_A > 0.0 ? 1.0 / level_A : 0.0;
 }
@@ -34,8 +34,8 @@ void comparator_init(comparator_t *comparator, const plant_break_t *levels, bool
 {
     *comparator = (comparator_t){.delay_s = levels->delay_s, .in_line = in_line};
     for (int k = 0; k < PLANT_LEGS; k++) {
-        comparator->inv_above_1_A[k] = inverse(levels->above_A[k]);
-        comparator->inv_below_1_A[k] = -inverse(levels->below_A[k]);
+        comparator->inv_above_1_A[k] = per_ampere(levels->above_A[k]);
+        comparator->inv_below_1_A[k] = -per_ampere(levels->below_A[k]);
     }
 }
 
@@ -54,6 +54,13 @@ double comparator_sees(const comparator_t *comparator, const circuit_t *circuit)
     return most;
 }
 
+static void advance(circuit_t *circuit, double duration_s)
+{
+    for (double left_s = duration_s; left_s > 0.0;) {
+        left_s = circuit_advance(circuit, left_s);
+    }
+}
+
 /* The level is passed between `from` and length h after it: moves the circuit just beyond. */
 static double find(const comparator_t *comparator, const circuit_t *from, double h, circuit_t *circuit)
 {
@@ -62,25 +69,25 @@ static double find(const comparator_t *comparator, const circuit_t *from, double
     while (beyond - below > FOUND_S) {
         double middle = 0.5 * (below + beyond);
         give_back(from, circuit);
-        circuit_advance(circuit, middle);
+        advance(circuit, middle);
         *(comparator_sees(comparator, circuit) > 1.0 ? &beyond : &below) = middle;
     }
     give_back(from, circuit);
-    circuit_advance(circuit, beyond);
+    advance(circuit, beyond);
     return beyond;
 }
 
-bool comparator_advance(const comparator_t *comparator, circuit_t *circuit, double *duration_s)
+bool comparator_advance(const comparator_t *comparator, circuit_t *circuit, double *left_s)
 {
     circuit_t before;
     double sees = comparator_sees(comparator, circuit);
-    double taken = 0.0;
     bool watch = sees > NEAR;
-    while (sees <= 1.0 && taken < *duration_s) {
-        double left = *duration_s - taken;
-        double h = watch ? fmin(left, WATCH_S) : left;
+    bool event = false;
+    while (sees <= 1.0 && *left_s > 0.0 && !event) {
+        double wanted = watch ? fmin(*left_s, WATCH_S) : *left_s;
         keep(circuit, &before);
-        circuit_advance(circuit, h);
+        double missing = circuit_advance(circuit, wanted);
+        double h = wanted - missing;
         sees = comparator_sees(comparator, circuit);
         if (sees > NEAR && !watch && h > WATCH_S) {
             give_back(&before, circuit); /* it may have passed the level and come back: again, closer */
@@ -88,9 +95,10 @@ bool comparator_advance(const comparator_t *comparator, circuit_t *circuit, doub
             sees = 0.0;
             continue;
         }
-        taken += sees > 1.0 ? find(comparator, &before, h, circuit) : h;
+        double taken = sees > 1.0 ? find(comparator, &before, h, circuit) : h;
+        event = missing > 0.0;
+        *left_s = taken < *left_s ? *left_s - taken : 0.0;
         watch = sees > NEAR;
     }
-    *duration_s = taken;
     return sees > 1.0;
 }

@@ -19,7 +19,8 @@ void comparator_init(comparator_t *comparator, const plant_break_t *levels, bool
 /* What they see, the nearest one in units of its level: beyond 1 it acts. */
 double comparator_sees(const comparator_t *comparator, const circuit_t *circuit);
 
-/* By *duration_s, or less when a comparator acts: then *duration_s is what was taken, and true. */
-bool comparator_advance(const comparator_t *comparator, circuit_t *circuit, double *duration_s);
+/* By *left_s, or less: to where a comparator acts, then true, or to an event. *left_s becomes what is left.
+ */
+bool comparator_advance(const comparator_t *comparator, circuit_t *circuit, double *left_s);
 
 #endif

@@ -38,6 +38,12 @@ static inline bool dclink_plain(const dclink_t *link)
 /* Ripple at t_s since the start. */
 double dclink_ripple_V(const dclink_t *link, double t_s);
 
+static inline double dclink_fed_A(const dclink_t *link, double v_source_V, double v_dc_V)
+{
+    double i_source_A = (v_source_V - v_dc_V) * link->g_source_S;
+    return !link->connected || (link->blocks && i_source_A < 0.0) ? 0.0 : i_source_A;
+}
+
 /* Current of the source; 0 for a stiff link, whose source gives just what the legs draw. */
 static inline double dclink_source_A(const dclink_t *link, double v_dc_V, double t_s)
 {
@@ -45,8 +51,7 @@ static inline double dclink_source_A(const dclink_t *link, double v_dc_V, double
     if (link->ripple_V != 0.0) {
         v_source_V += dclink_ripple_V(link, t_s);
     }
-    double i_source_A = (v_source_V - v_dc_V) * link->g_source_S;
-    return !link->connected || (link->blocks && i_source_A < 0.0) ? 0.0 : i_source_A;
+    return dclink_fed_A(link, v_source_V, v_dc_V);
 }
 
 static inline double dclink_chopper_A(const dclink_t *link, double v_dc_V)
@@ -58,6 +63,13 @@ static inline double dclink_rate(const dclink_t *link, double v_dc_V, double i_d
 {
     double i_C_A = dclink_source_A(link, v_dc_V, t_s) - i_dc_A - dclink_chopper_A(link, v_dc_V);
     double rate_V_s = i_C_A * link->inv_C_1_F;
+    return v_dc_V <= 0.0 && rate_V_s < 0.0 ? 0.0 : rate_V_s;
+}
+
+/* The same of a plain link. */
+static inline double dclink_plain_rate(const dclink_t *link, double v_dc_V, double i_dc_A)
+{
+    double rate_V_s = (dclink_fed_A(link, link->v_source_V, v_dc_V) - i_dc_A) * link->inv_C_1_F;
     return v_dc_V <= 0.0 && rate_V_s < 0.0 ? 0.0 : rate_V_s;
 }
 

@@ -1,5 +1,7 @@
 #include "sim_plant/gates.h"
 
+#include <math.h>
+
 void gates_init(gates_t *gates, const plant_inverter_t *inverter, int legs)
 {
     *gates = (gates_t){
@@ -26,6 +28,7 @@ void gates_load(gates_t *gates, const plant_pwm_t *pwm)
         gates->leg[k].fall_s = (1.0 + duty(gates, pwm->compare[k][1])) * half_s;
         gates->leg[k].on_s -= gates->period_s;
         gates->leg[k].off_s -= gates->period_s;
+        gates->leg[k].next_s = -1.0;
     }
     gates_drive(gates, pwm->driven, pwm->driven_after_s);
 }
@@ -46,6 +49,7 @@ void gates_off(gates_t *gates)
         gates->leg[k].command = GATE_OFF;
         gates->leg[k].gate = GATE_OFF;
         gates->leg[k].opening = false;
+        gates->leg[k].next_s = -1.0;
     }
 }
 
@@ -55,6 +59,27 @@ static gate_t command_at(const gates_t *gates, int k, double late_s)
         return GATE_OFF;
     }
     return late_s >= gates->leg[k].rise_s && late_s < gates->leg[k].fall_s ? GATE_HIGH : GATE_LOW;
+}
+
+/* The next instant after that one at which something happens to a leg. */
+static double leg_next_s(const gates_t *gates, int k, double after_s)
+{
+    double next_s = HUGE_VAL;
+    double rise_s = gates->leg[k].rise_s;
+    double fall_s = gates->leg[k].fall_s;
+    if (gates->leg[k].driven && rise_s > after_s) {
+        next_s = rise_s;
+    }
+    if (gates->leg[k].driven && fall_s > after_s && fall_s < next_s) {
+        next_s = fall_s;
+    }
+    if (gates->leg[k].opening && gates->leg[k].off_s < next_s) {
+        next_s = gates->leg[k].off_s;
+    }
+    if (gates->leg[k].gate != gates->leg[k].command && gates->leg[k].on_s < next_s) {
+        next_s = gates->leg[k].on_s;
+    }
+    return next_s;
 }
 
 static bool update_leg(gates_t *gates, int k, double t_s)
@@ -80,6 +105,7 @@ static bool update_leg(gates_t *gates, int k, double t_s)
     if (!gates->leg[k].opening && gates->leg[k].gate != command && late_s >= gates->leg[k].on_s) {
         gates->leg[k].gate = command;
     }
+    gates->leg[k].next_s = leg_next_s(gates, k, late_s);
     return gates->leg[k].gate != before;
 }
 
@@ -87,7 +113,9 @@ unsigned gates_update(gates_t *gates, double t_s)
 {
     unsigned changed = 0u;
     for (int k = 0; k < gates->legs; k++) {
-        changed |= update_leg(gates, k, t_s) ? 1u << k : 0u;
+        if (gates->leg[k].next_s <= t_s + gates->coincident_s) {
+            changed |= update_leg(gates, k, t_s) ? 1u << k : 0u;
+        }
     }
     if (changed != 0u) {
         gates->edge_s = t_s;
@@ -95,7 +123,7 @@ unsigned gates_update(gates_t *gates, double t_s)
     return changed;
 }
 
-gate_t gates_conducting(const gates_t *gates, int k)
+gate_t gates_faulty(const gates_t *gates, int k)
 {
     gate_t gate = gates->leg[k].gate;
     bool upper = gate == GATE_HIGH;
@@ -128,20 +156,9 @@ double gates_next_s(const gates_t *gates, double t_s)
         next_s = gates->drive_s;
     }
     for (int k = 0; k < gates->legs; k++) {
-        double rise_s = gates->leg[k].rise_s;
-        double fall_s = gates->leg[k].fall_s;
-        if (gates->leg[k].driven && rise_s > after_s && rise_s < next_s) {
-            next_s = rise_s;
-        }
-        if (gates->leg[k].driven && fall_s > after_s && fall_s < next_s) {
-            next_s = fall_s;
-        }
-        if (gates->leg[k].opening && gates->leg[k].off_s < next_s) {
-            next_s = gates->leg[k].off_s;
-        }
-        if (gates->leg[k].gate != gates->leg[k].command && gates->leg[k].on_s < next_s) {
-            next_s = gates->leg[k].on_s;
-        }
+        double leg_s = gates->leg[k].next_s;
+        leg_s = leg_s > after_s ? leg_s : leg_next_s(gates, k, after_s);
+        next_s = leg_s < next_s ? leg_s : next_s;
     }
     return next_s;
 }

@@ -35,7 +35,8 @@ typedef struct {
         gate_t gate;           /* of healthy switches */
         bool opening;          /* the conducting switch opens at off_s */
         double off_s;
-        double on_s; /* the commanded one closes, when gate != command */
+        double on_s;   /* the commanded one closes, when gate != command */
+        double next_s; /* nothing happens to the leg before */
         plant_leg_fault_t fault;
     } leg[PLANT_LEGS];
 } gates_t;
@@ -55,7 +56,11 @@ void gates_drive(gates_t *gates, const bool driven[], double t_s);
 unsigned gates_update(gates_t *gates, double t_s);
 
 /* What conducts in leg k, with its fault. */
-gate_t gates_conducting(const gates_t *gates, int k);
+gate_t gates_faulty(const gates_t *gates, int k);
+static inline gate_t gates_conducting(const gates_t *gates, int k)
+{
+    return gates->leg[k].fault == PLANT_HEALTHY ? gates->leg[k].gate : gates_faulty(gates, k);
+}
 
 /* The next instant after t at which gates_update() has something to do; T when nothing is left. */
 double gates_next_s(const gates_t *gates, double t_s);

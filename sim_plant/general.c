@@ -1,14 +1,9 @@
-/* The rates of any circuit: what circuit_rates.h has inline for the plain machine. */
+/* The rates of any circuit. */
 #include "sim_plant/circuit_rates.h"
 #include "sim_plant/floating.h"
 #include "sim_plant/machine_rates.h"
 
 #include <string.h>
-
-/* The common shapes, for which the functions are compiled with constants; the rest are rare. */
-#define STAR   ((shape_t){2, 1, 3})
-#define OPEN   ((shape_t){3, 1, 6})
-#define DOUBLE ((shape_t){4, 2, 6})
 
 /* Coordinates that leg k has a part in: of two stars without a fault branch only those of its own set. */
 INLINE int first_of_leg(shape_t shape, int k)

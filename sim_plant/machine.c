@@ -58,6 +58,16 @@ static void set_bounds(machine_t *m)
         R_ohm = fmax(R_ohm, m->R_eddy_ohm + m->winding.R_ohm[a][a]);
     }
     m->fastest_1_s = m->gamma_sum_1_H * R_ohm;
+    m->gamma_leg_1_H = 0.0;
+    for (int k = 0; k < m->winding.legs; k++) {
+        double gamma_1_H = 0.0;
+        for (int a = 0; a < m->winding.active; a++) {
+            for (int b = 0; b < m->winding.active; b++) {
+                gamma_1_H += m->winding.axis[k][a] * Y[a][b] * m->winding.share[k][b];
+            }
+        }
+        m->gamma_leg_1_H = fmax(m->gamma_leg_1_H, gamma_1_H);
+    }
 }
 
 void machine_set_branch(machine_t *machine, const double axis[PLANT_LEGS], double R_ohm)
@@ -104,6 +114,9 @@ void machine_set(machine_t *machine, const plant_config_t *config, double windin
     winding_init(&machine->winding, w, machine->R_s_ohm, psi_m_Wb, psi_core_Wb, magnet);
     machine->biased = machine->map != NULL || machine->gamma_eddy_d_1_H + machine->gamma_eddy_q_1_H > 0.0;
     machine->loose = is_loose(machine);
+    machine->symmetrical =
+        machine->winding.symmetrical && !machine->biased && machine->winding.cogging_terms == 0;
+    machine->scale_Wb = fmax(psi_m_Wb, 0.1 * p->L_d0_H * config->sensor.i_full_scale_A);
     machine->plain = machine->loose && machine->winding.active == 2 && machine->winding.even;
     set_bounds(machine);
 }
@@ -111,11 +124,6 @@ void machine_set(machine_t *machine, const plant_config_t *config, double windin
 void machine_evaluate(const machine_t *m, const machine_state_t *s, machine_point_t *p)
 {
     machine_evaluate_n(m, s, machine_shape(m), true, p);
-}
-
-void machine_drop_V(const machine_t *m, const double i_A[ACTIVE], double v_V[ACTIVE])
-{
-    machine_drop_n(m, i_A, v_V, m->winding.active);
 }
 
 void machine_admittance(const machine_t *m, const machine_state_t *s, const machine_point_t *p,

@@ -11,8 +11,8 @@
  *
  * State of a coordinate: core flux with the energy form, core current with a table, and the current itself
  * for a zero sequence or the fault branch. A plain machine, one star set of the energy form with
- * harmonics of the magnet at most, has dpsi_core/dt = v - R i - omega psi_x' and is computed inline;
- * machine_rates() does every other.
+ * harmonics of the magnet at most, has dpsi_core/dt = v - R i - omega psi_x'. machine_rates() does every
+ * machine; those whose phases are alike have a shorter way, field.h.
  *
  * E19: a shorted circuit (L_eddy, R_eddy) on each rotor axis carries L_eddy di_e/dt = dpsi_core/dt - R_eddy
  * i_e beside the core current.
@@ -33,12 +33,15 @@ typedef struct {
     double psi_m_Wb;
     double torque_gain; /* 1.5 P */
     double pole_pairs;
+    double scale_Wb; /* of its fluxes */
     bool plain;
-    bool loose;  /* nothing links the cores but the magnet: see machine_rates.h */
-    bool biased; /* has eddy circuits or a map */
+    bool symmetrical; /* see field.h */
+    bool loose;       /* nothing links the cores but the magnet: see machine_rates.h */
+    bool biased;      /* has eddy circuits or a map */
     double loose_gamma_1_H[ACTIVE];
     double gamma_sum_1_H; /* bounds, without current: of any current's response, */
-    double fastest_1_s;   /* and of the rate of decay of any */
+    double fastest_1_s;   /* and of the rate of decay of any; */
+    double gamma_leg_1_H; /* largest response of a leg's current to its own voltage */
     const map_table_t *map;
     double gamma_eddy_d_1_H, gamma_eddy_q_1_H, R_eddy_ohm; /* zero: no eddy circuits */
     winding_t winding;
@@ -106,9 +109,6 @@ void machine_idle(const machine_t *machine, machine_state_t *state, int set);
 dq_t machine_flux_Wb(const machine_t *machine, const machine_state_t *state, const machine_point_t *point);
 
 double machine_energy_J(const machine_t *machine, const machine_state_t *state, const machine_point_t *point);
-
-/* The voltage drop of the windings' resistance. */
-void machine_drop_V(const machine_t *machine, const double i_A[ACTIVE], double v_V[ACTIVE]);
 
 static inline dq_t machine_current_A(const machine_t *m, dq_t psi_Wb)
 {

@@ -91,21 +91,23 @@ static bool any_on(const gates_t *gates)
     return any;
 }
 
-/* To time t without a change of gates, or to where the comparators open the bridge. */
+/* Towards time t without a change of gates: to there, to an event on the way, or to where the comparators
+ * open the bridge. */
 static void advance_until(plant_t *plant, double t_s)
 {
-    bool watched = plant->has_break && !isfinite(plant->break_s) && any_on(&plant->gates);
-    double duration_s = t_s - plant->t_s;
-    if (watched && comparator_advance(&plant->comparator, &plant->circuit, &duration_s)) {
-        plant->t_s += duration_s;
+    if (plant->has_break && !isfinite(plant->break_s) && any_on(&plant->gates)) {
+        double left_s = t_s - plant->t_s;
+        bool passed = comparator_advance(&plant->comparator, &plant->circuit, &left_s);
+        plant->t_s = t_s - left_s;
+        if (!passed) {
+            return;
+        }
         plant->break_s = plant->t_s + plant->comparator.delay_s;
         t_s = fmin(t_s, plant->break_s);
-        watched = false;
     }
-    if (!watched && t_s > plant->t_s) {
-        circuit_advance(&plant->circuit, t_s - plant->t_s);
+    if (t_s > plant->t_s) {
+        plant->t_s = t_s - circuit_advance(&plant->circuit, t_s - plant->t_s);
     }
-    plant->t_s = t_s;
 }
 
 /* Advances to time t of the present period, or to where the bridge opens before. Half of all edges change
@@ -116,17 +118,18 @@ static void run_closed(plant_t *plant, double t_s)
     gates_t *gates = &plant->gates;
     circuit_t *circuit = &plant->circuit;
     circuit_settle(circuit);
-    unsigned changed = gates_update(gates, plant->t_s);
+    double next_s = plant->t_s; /* when the gates change next: they are those of then */
+    unsigned changed = gates_update(gates, next_s);
     while (plant->t_s < t_s) {
-        double next_s = plant->t_s;
-        do {
+        while (next_s < t_s &&
+               (next_s <= plant->t_s || circuit_ignores(circuit, gates, changed, next_s - plant->t_s))) {
             if (changed != 0u) {
                 circuit_switch(circuit, gates, changed);
             }
             next_s = gates_next_s(gates, next_s);
             changed = next_s < t_s ? gates_update(gates, next_s) : 0u;
-        } while (next_s < t_s && circuit_ignores(circuit, gates, changed, next_s - plant->t_s));
-        advance_until(plant, fmin(next_s, t_s));
+        }
+        advance_until(plant, next_s < t_s ? next_s : t_s);
         t_s = fmin(t_s, plant->break_s);
     }
 }
@@ -356,8 +359,7 @@ void plant_run_voltages(plant_t *plant, const double v_leg_V[], double rate_rad_
     for (double left_s = duration_s; left_s > 0.0;) {
         double part_s = fmin(left_s, longest_s);
         circuit_settle(circuit);
-        circuit_advance(circuit, part_s);
-        left_s -= part_s;
+        left_s -= part_s - circuit_advance(circuit, part_s);
         circuit_align(circuit);
     }
     circuit->mech.imposed_rate_rad_s2 = 0.0;
@@ -457,7 +459,7 @@ void plant_truth(const plant_t *plant, plant_truth_t *truth)
     machine_point_t point;
     circuit_nodes_t nodes;
     machine_evaluate(&circuit->machine, &state, &point);
-    circuit_nodes(circuit, &circuit->now, &nodes);
+    circuit_nodes_of(circuit, &state, &point, &nodes);
     dq_t i = frame_to_dq((ab_t){point.i_A[0], point.i_A[1]}, state.rotor);
     dq_t psi = machine_flux_Wb(&circuit->machine, &state, &point);
     *truth = (plant_truth_t){
@@ -479,7 +481,7 @@ void plant_truth(const plant_t *plant, plant_truth_t *truth)
         .e_copper_J = x[INT_COPPER],
         .e_device_J = x[INT_DEVICE] + circuit->jump_device_J,
         .e_mech_J = x[INT_MECH] + plant->slip_J,
-        .e_field_J = circuit_field_J(circuit) - plant->field_base_J,
+        .e_field_J = circuit_field_of_J(circuit, &state, &point) - plant->field_base_J,
     };
     memcpy(truth->v_leg_V, nodes.v_leg_V, sizeof truth->v_leg_V);
     memcpy(truth->v_neutral_V, nodes.v_neutral_V, sizeof truth->v_neutral_V);

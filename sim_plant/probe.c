@@ -40,11 +40,6 @@ void probe_init(probe_t *probe, const plant_sensor_t *sensor, int legs, int sets
     }
 }
 
-bool probe_active(const probe_t *probe)
-{
-    return probe->filter_s > 0.0 || probe->capture_s > 0.0;
-}
-
 void probe_start_period(probe_t *probe)
 {
     probe->edges = 0;

@@ -36,7 +36,10 @@ typedef struct {
 void probe_init(probe_t *probe, const plant_sensor_t *sensor, int legs, int sets);
 
 /* There is a filter or a timer. Without, a channel is its node's voltage and probe_advance() not needed. */
-bool probe_active(const probe_t *probe);
+static inline bool probe_active(const probe_t *probe)
+{
+    return probe->filter_s > 0.0 || probe->capture_s > 0.0;
+}
 
 /* Forgets the captured edges. */
 void probe_start_period(probe_t *probe);

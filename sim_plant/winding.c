@@ -91,9 +91,30 @@ static void pack_inductance(winding_t *w)
     w->turning = w->series_terms > 0;
 }
 
+static void sum_sides(winding_t *w)
+{
+    for (int side = 0; side < w->legs / 3; side++) {
+        for (unsigned mask = 0; mask < 8; mask++) {
+            for (int a = 0; a < ACTIVE; a++) {
+                double sum = 0.0;
+                for (int n = 0; n < 3; n++) {
+                    sum += (mask >> n & 1u) != 0u ? w->share[3 * side + n][a] : 0.0;
+                }
+                w->side[side][mask][a] = sum;
+            }
+        }
+    }
+}
+
 /* Takes the active part of everything. */
 static void pack(winding_t *w)
 {
+    for (int leg = 0; leg < w->legs; leg++) { /* what is not active has no part: the branch may have gone */
+        for (int a = w->active; a < ACTIVE; a++) {
+            w->axis[leg][a] = 0.0;
+            w->share[leg][a] = 0.0;
+        }
+    }
     for (int a = 0; a < w->active; a++) {
         int c = w->coordinate[a];
         w->weight[a] = weight(c);
@@ -107,6 +128,7 @@ static void pack(winding_t *w)
             w->R_ohm[a][b] = w->all_R_ohm[c][w->coordinate[b]];
         }
     }
+    sum_sides(w);
     pack_flux(w);
     pack_inductance(w);
 }
@@ -263,11 +285,26 @@ static void add_magnet(winding_t *w, const plant_winding_t *p, double psi_m_Wb, 
     }
 }
 
+static bool all_alike(const plant_winding_t *p)
+{
+    bool alike = p->connection == PLANT_STAR || (p->dL_0_H == 0.0 && p->L_c0_H == 0.0);
+    for (int k = 0; k < PLANT_LEGS; k++) {
+        alike = alike && p->dR_ohm[k] == 0.0 && p->dL_H[k] == 0.0 && p->dM_H[k / 3][k % 3] == 0.0;
+    }
+    for (int n = 0; n < PLANT_HARMONICS; n++) {
+        alike = alike && p->saliency[n].order == 0;
+    }
+    return alike;
+}
+
 void winding_init(winding_t *winding, const plant_winding_t *parameters, double R_s_ohm, double psi_m_Wb,
                   double psi_core_Wb, double magnet_scale)
 {
     *winding = (winding_t){0};
     connect(winding, parameters);
+    winding->symmetrical = all_alike(parameters);
+    winding->M_d_H = parameters->M_d_H;
+    winding->M_q_H = parameters->M_q_H;
     add_resistance(winding, parameters, R_s_ohm);
     add_constant(winding, parameters);
     add_turning(winding, parameters);
@@ -285,6 +322,7 @@ void winding_branch(winding_t *w, const double axis[PLANT_LEGS], double R_ohm)
     if (w->branch >= 0) {
         w->active--;
         w->branch = -1;
+        pack(w);
     }
     if (R_ohm < 0.0) {
         return;

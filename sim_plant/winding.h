@@ -53,7 +53,11 @@ typedef struct {
     double axis[PLANT_LEGS][ACTIVE];  /* i_leg = axis . i */
     double share[PLANT_LEGS][ACTIVE]; /* v = share' v_leg */
     double R_ohm[ACTIVE][ACTIVE];
-    bool even;    /* R is a multiple of one */
+    bool even;        /* R is a multiple of one */
+    bool symmetrical; /* all phases are alike but for their magnets, and sets linked by these alone: */
+    double M_d_H, M_q_H;
+    /* Sum of the shares of legs 3 g + n, n of a mask */
+    double side[PLANT_SETS][8][ACTIVE];
     bool turning; /* some inductance depends on the angle */
     int flux_terms, inductance_terms, cogging_terms;
     int flux_series_terms,

@@ -199,6 +199,19 @@ class Floating : public testing::TestWithParam<Case>
     double v_leg[PLANT_LEGS]{};
 };
 
+// Both switches closed: the divider of two r_on, seen from the terminal.
+TEST(Bridge, ShootThroughIsADivider)
+{
+    plant_config_t config{};
+    config.inverter.r_on_ohm = 0.1;
+    config.sensor.i_full_scale_A = 10.0;
+    bridge_t bridge;
+    bridge_init(&bridge, &config, 3);
+    bridge.leg[1] = LEG_BOTH;
+    bridge.upper[1] = 0.5;
+    EXPECT_NEAR(bridge_tied_V(&bridge, 1, 4.0, 20.0), (20.0 / 0.1 - 4.0) / (2.0 / 0.1), 1e-12);
+}
+
 TEST_P(Floating, VoltagesKeepTheCurrentAsItIs)
 {
     for (int n = 0; n < 20; n++) {

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <string>
 
 namespace
@@ -251,6 +253,106 @@ TEST(Plant, GeneralWayAgreesWithThePlainOne)
     EXPECT_NEAR(a.truth().torque_Nm, b.truth().torque_Nm, 4e-5);
     EXPECT_NEAR(a.truth().omega_mech_rad_s, b.truth().omega_mech_rad_s, 1e-3);
     EXPECT_NEAR(a.truth().e_in_J, b.truth().e_in_J, 1e-5 * a.truth().e_copper_J);
+}
+
+// The same for six legs, open loop: duties that turn with the rotor, enough for some amperes. The tolerance
+// is such that the equations are compared, not the steps.
+void expect_agreement(plant_config_t config, double amplitude)
+{
+    config.tolerance = 1e-8;
+    plant_config_t general = config;
+    general.winding.saliency[0] = {4, 1e-18, 0.0};
+    bool open = config.winding.connection == PLANT_OPEN;
+    rig::Plant a(config), b(general);
+    plant_set_speed(a, 20.0);
+    plant_set_speed(b, 20.0);
+    double worst_A = 0.0, largest_A = 0.0;
+    for (int k = 0; k < 500; k++) {
+        plant_pwm_t pwm{};
+        for (int leg = 0; leg < 6; leg++) {
+            double axis = 2.0 * rig::pi / 3.0 * (leg % 3) + (leg < 3 ? 0.0 : open ? rig::pi : rig::pi / 6.0);
+            double angle = 20.0 * config.machine.pole_pairs * (k + 1.5) * a.period_s();
+            double duty = 0.5 - amplitude * std::sin(angle - axis);
+            pwm.driven[leg] = true;
+            pwm.compare[leg][0] = pwm.compare[leg][1] =
+                static_cast<uint32_t>(std::lround(duty * config.inverter.timer_counts));
+        }
+        a.run(pwm);
+        b.run(pwm);
+        plant_truth_t s = a.truth(), g = b.truth();
+        for (int leg = 0; leg < 6; leg++) {
+            worst_A = std::max(worst_A, std::fabs(s.i_A[leg] - g.i_A[leg]));
+            largest_A = std::max(largest_A, std::fabs(s.i_A[leg]));
+        }
+    }
+    plant_truth_t s = a.truth(), g = b.truth();
+    EXPECT_GT(largest_A, 2.0);
+    EXPECT_LT(worst_A, 1e-5 * config.sensor.i_full_scale_A);
+    EXPECT_NEAR(s.torque_Nm, g.torque_Nm, 1e-4);
+    EXPECT_NEAR(s.v_dc_V, g.v_dc_V, 1e-5 * config.dclink.v_source_V);
+    EXPECT_NEAR(s.e_in_J, g.e_in_J, 1e-4 * g.e_copper_J);
+    EXPECT_NEAR(s.e_mech_J, g.e_mech_J, 1e-4 * g.e_copper_J);
+    EXPECT_NEAR(s.e_copper_J, g.e_copper_J, 1e-4 * g.e_copper_J);
+    EXPECT_NEAR(s.e_device_J, g.e_device_J, 1e-4 * g.e_copper_J);
+}
+
+plant_config_t six_legs()
+{
+    plant_config_t c = rig::spm_400_linear();
+    c.machine.c_A_Wb5 = 2.09e5;
+    c.inverter = rig::inverter(10e3, 1e-6, 0.0, 0.0, 0.01);
+    c.dclink = rig::dclink(36.0, 0.05, 2.2e-3);
+    c.winding.L_0_H = 2.25e-3;
+    c.winding.emf[0] = {3, 3.0e-3, 0.0};
+    c.winding.emf[1] = {5, 0.3e-3, 0.4};
+    return c;
+}
+
+TEST(Plant, GeneralWayAgreesForSixLegs)
+{
+    for (double c_leg_F : {0.0, 2e-9}) {
+        for (double v_switch_V : {0.0, 0.8}) {
+            SCOPED_TRACE(testing::Message() << c_leg_F << " F " << v_switch_V << " V");
+            plant_config_t open = six_legs(), linked = six_legs();
+            open.inverter.c_leg_F = linked.inverter.c_leg_F = c_leg_F;
+            open.inverter.v_switch_V = linked.inverter.v_switch_V = v_switch_V;
+            open.inverter.v_diode_V = linked.inverter.v_diode_V = 0.7 * v_switch_V;
+            open.winding.connection = PLANT_OPEN;
+            expect_agreement(open, 0.15);
+            linked.winding.sets = 2;
+            linked.winding.M_d_H = 0.9e-3;
+            linked.winding.M_q_H = 1.2e-3;
+            expect_agreement(linked, 0.3);
+        }
+    }
+}
+
+// A short that comes and goes leaves nothing behind in what the symmetrical way reads.
+TEST(Plant, ShortThatIsGoneLeavesTheSymmetricalWay)
+{
+    plant_config_t config = six_legs(), general = config;
+    config.winding.connection = general.winding.connection = PLANT_OPEN;
+    general.winding.saliency[0] = {4, 1e-18, 0.0};
+    rig::Plant a(config), b(general);
+    for (plant_t *plant : {static_cast<plant_t *>(a), static_cast<plant_t *>(b)}) {
+        plant_pwm_t pwm = rig::pwm(0.55, 0.48, 0.47);
+        for (int leg = 3; leg < 6; leg++) {
+            pwm.driven[leg] = true;
+            pwm.compare[leg][0] = pwm.compare[leg][1] = rig::counts / 2;
+        }
+        for (int k = 0; k < 300; k++) {
+            if (k == 100 || k == 200) {
+                plant_set_short(plant, 0, 1, k == 100 ? 5.0 : -1.0);
+            }
+            plant_set_pwm(plant, &pwm);
+            plant_run_period(plant);
+        }
+    }
+    for (int leg = 0; leg < 6; leg++) {
+        EXPECT_NEAR(a.truth().i_A[leg], b.truth().i_A[leg], 1e-4) << leg;
+    }
+    EXPECT_NEAR(a.truth().i_zero_A, b.truth().i_zero_A, 1e-4);
+    EXPECT_GT(std::fabs(a.truth().i_A[0]), 0.5);
 }
 
 TEST(Plant, SlipKeepsTheFluxAndCountsAsWork)

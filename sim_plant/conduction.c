@@ -1,0 +1,212 @@
+/* Which switch or diode of each leg conducts. */
+#include "sim_plant/circuit_rates.h"
+#include "sim_plant/floating.h"
+
+#include <math.h>
+
+#define SLOPE_MARGIN  4.0   /* of v_dc / L: EMF, saturation */
+#define SMALL_CURRENT 1e-12 /* of the converter's full scale: nothing, for a floating leg */
+
+/* Leg k becomes another kind. What its capacitance holds more or less afterwards has come from the link if
+ * the upper rail has it now, and the rest is lost in the switch. */
+static void set_leg(circuit_t *c, int k, leg_t leg)
+{
+    bridge_t *b = &c->bridge;
+    double before_V = circuit_output_V(c, k);
+    if ((leg == LEG_LOW || leg == LEG_DIODE_LOW) && b->leg[k] != LEG_LOW && b->leg[k] != LEG_DIODE_LOW) {
+        c->low_since_s[k] = c->t_s;
+    }
+    b->leg[k] = leg;
+    if (b->c_leg_F == 0.0) {
+        return;
+    }
+    if (leg == LEG_SWINGING) {
+        c->now.x[V_LEG(k)] = before_V;
+        return;
+    }
+    b->upper[k] = leg == LEG_HIGH || leg == LEG_DIODE_HIGH ? 1.0 : (leg == LEG_BOTH ? 0.5 : 0.0);
+    double after_V = circuit_output_V(c, k);
+    double charge_C = b->upper[k] == 1.0 ? b->c_leg_F * (after_V - before_V) : 0.0;
+    double in_J = charge_C * c->now.x[V_DC];
+    c->jump_in_J += in_J;
+    c->jump_device_J += in_J + circuit_capacitor_J(c, before_V) - circuit_capacitor_J(c, after_V);
+    c->now.x[V_DC] -= charge_C * c->link.inv_C_1_F;
+}
+
+/* Diodes of one rail alone, one or several, have no path back, so they carry nothing. Output capacitances are
+ * one. */
+static void drop_lone_diodes(circuit_t *c)
+{
+    bridge_t *b = &c->bridge;
+    const winding_t *w = &c->machine.winding;
+    if (b->diodes == 0 || b->floating == 0 || b->c_leg_F > 0.0 || w->branch >= 0) {
+        return;
+    }
+    int size = w->legs > w->phases ? 2 : 3;
+    int stride = w->legs > w->phases ? 3 : 1;
+    for (int group = 0; group < w->legs / size; group++) {
+        int first = w->legs > w->phases ? group : 3 * group;
+        int conducting = 0;
+        int low = 0;
+        int high = 0;
+        for (int n = 0; n < size; n++) {
+            leg_t leg = b->leg[first + n * stride];
+            conducting += leg != LEG_FLOATING;
+            low += leg == LEG_DIODE_LOW;
+            high += leg == LEG_DIODE_HIGH;
+        }
+        for (int n = 0; n < size && (conducting == low || conducting == high); n++) {
+            b->leg[first + n * stride] = LEG_FLOATING;
+        }
+    }
+    bridge_summarise(b, w);
+}
+
+void circuit_summarise(circuit_t *c)
+{
+    bridge_summarise(&c->bridge, &c->machine.winding);
+    drop_lone_diodes(c);
+}
+
+void circuit_switch(circuit_t *c, const gates_t *gates, unsigned legs)
+{
+    for (int k = 0; k < c->bridge.legs; k++) {
+        if ((legs >> k & 1u) == 0u) {
+            continue;
+        }
+        leg_t leg =
+            bridge_commutated(&c->bridge, k, gates_conducting(gates, k), circuit_leg_A(c, &c->now, k));
+        if (leg != c->bridge.leg[k]) {
+            set_leg(c, k, leg);
+        }
+    }
+    circuit_summarise(c);
+}
+
+static bool low_side(leg_t leg)
+{
+    return leg == LEG_LOW || leg == LEG_DIODE_LOW;
+}
+
+static bool high_side(leg_t leg)
+{
+    return leg == LEG_HIGH || leg == LEG_DIODE_HIGH;
+}
+
+bool circuit_ignores(const circuit_t *c, const gates_t *gates, unsigned legs, double within_s)
+{
+    const bridge_t *b = &c->bridge;
+    if (b->v_diode_V != b->v_switch_V || b->floating > 0 || b->swinging > 0) {
+        return false;
+    }
+    double slope_A_s = SLOPE_MARGIN * c->machine.gamma_sum_1_H * fabs(c->now.x[V_DC]);
+    for (int k = 0; k < b->legs; k++) {
+        if ((legs >> k & 1u) == 0u) {
+            continue;
+        }
+        double i_A = circuit_leg_A(c, &c->now, k);
+        leg_t leg = bridge_commutated(b, k, gates_conducting(gates, k), i_A);
+        bool same = (low_side(leg) && low_side(b->leg[k])) || (high_side(leg) && high_side(b->leg[k]));
+        if (!same || fabs(i_A) < 2.0 * b->zone_A + slope_A_s * within_s) {
+            return false;
+        }
+    }
+    return true;
+}
+
+void circuit_sources(circuit_t *c, const double v_leg_V[])
+{
+    for (int k = 0; k < c->bridge.legs; k++) {
+        c->bridge.leg[k] = LEG_SOURCE;
+        c->bridge.v_source_V[k] = v_leg_V[k];
+    }
+    circuit_summarise(c);
+}
+
+/* Moves the windings onto zero current of the floating legs. */
+void circuit_project(circuit_t *c)
+{
+    machine_state_t state = circuit_machine_state(&c->now);
+    machine_point_t point;
+    floating_project(&c->bridge, &c->machine, SMALL_CURRENT / c->inv_i_scale_1_A, &state, &point);
+    circuit_take_state(c, &state, &point);
+}
+
+static void stop_diodes(circuit_t *c)
+{
+    bool stopped = false;
+    for (int k = 0; k < c->bridge.legs && c->bridge.diodes > 0; k++) {
+        if (bridge_is_diode(&c->bridge, k) &&
+            bridge_reverse(&c->bridge, k, circuit_leg_A(c, &c->now, k)) > 0.0) {
+            set_leg(c, k, c->bridge.c_leg_F > 0.0 ? LEG_SWINGING : LEG_FLOATING);
+            stopped = true;
+        }
+    }
+    if (stopped) {
+        circuit_summarise(c);
+    }
+}
+
+/* Swinging terminals that have arrived at a diode. */
+static void catch_swinging(circuit_t *c)
+{
+    bool caught = false;
+    for (int k = 0; k < c->bridge.legs && c->bridge.swinging > 0; k++) {
+        if (c->bridge.leg[k] == LEG_SWINGING && circuit_swing_excess(c, &c->now, k) > 0.0) {
+            bool up = c->now.x[V_LEG(k)] > 0.5 * c->now.x[V_DC];
+            set_leg(c, k, up ? LEG_DIODE_HIGH : LEG_DIODE_LOW);
+            caught = true;
+        }
+    }
+    if (caught) {
+        circuit_summarise(c);
+    }
+}
+
+/* The floating leg furthest beyond a diode's threshold starts to conduct; true when there was one. */
+static bool start_diode(circuit_t *c)
+{
+    circuit_nodes_t nodes;
+    circuit_nodes(c, &c->now, &nodes);
+    int first = -1;
+    double most_V = 0.0;
+    for (int k = 0; k < c->bridge.legs; k++) {
+        if (c->bridge.leg[k] == LEG_FLOATING && !c->bridge.off_wire[k]) {
+            double beyond_V = bridge_beyond_V(&c->bridge, c->now.x[V_DC], nodes.v_leg_V[k]);
+            first = beyond_V > most_V ? k : first;
+            most_V = fmax(beyond_V, most_V);
+        }
+    }
+    if (first >= 0) {
+        set_leg(c, first, nodes.v_leg_V[first] > 0.5 * c->now.x[V_DC] ? LEG_DIODE_HIGH : LEG_DIODE_LOW);
+        bridge_summarise(&c->bridge, &c->machine.winding);
+    }
+    return first >= 0;
+}
+
+void circuit_settle_legs(circuit_t *c)
+{
+    if (c->bridge.diodes > 0) {
+        stop_diodes(c);
+    }
+    if (c->bridge.swinging > 0) {
+        catch_swinging(c);
+    }
+    if (c->bridge.floating > 0) {
+        circuit_project(c);
+        for (int n = 0; n < PLANT_LEGS && start_diode(c); n++) {
+        }
+    }
+}
+
+/* After a jump of the currents: the diodes that they now flow through. */
+void circuit_reassign_diodes(circuit_t *c)
+{
+    for (int k = 0; k < c->bridge.legs; k++) {
+        if (bridge_is_diode(&c->bridge, k)) {
+            set_leg(c, k, bridge_released(&c->bridge, circuit_leg_A(c, &c->now, k)));
+        }
+    }
+    circuit_summarise(c);
+    circuit_settle(c);
+}

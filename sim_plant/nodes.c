@@ -1,0 +1,106 @@
+/* Voltages of the nodes, and stored energy. */
+#include "sim_plant/circuit_rates.h"
+#include "sim_plant/floating.h"
+
+#include <string.h>
+
+/* A plain machine with every terminal tied or swinging */
+static void plain_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *nodes)
+{
+    circuit_legs_t legs;
+    circuit_legs(c, p, &legs);
+    *nodes = (circuit_nodes_t){.i_dc_A = legs.i_dc_A};
+    memcpy(nodes->v_leg_V, legs.v_leg_V, sizeof nodes->v_leg_V);
+    nodes->v_neutral_V[0] = (legs.v_leg_V[0] + legs.v_leg_V[1] + legs.v_leg_V[2]) / 3.0;
+}
+
+static void all_nodes(const circuit_t *c, const point_t *p, const machine_state_t *state,
+                      const machine_point_t *point, circuit_nodes_t *nodes)
+{
+    const machine_t *m = &c->machine;
+    machine_rate_t moved = {0};
+    circuit_legs_t legs;
+    double omega_e = m->pole_pairs * p->x[OMEGA_MECH];
+    circuit_legs(c, p, &legs);
+    if (c->bridge.floating > 0) {
+        floating_voltages(&c->bridge, m, state, point, omega_e, p->x[V_DC], legs.v_V, legs.v_leg_V, &moved);
+    } else {
+        machine_rates(m, state, point, omega_e, legs.v_V, &moved);
+    }
+    *nodes = (circuit_nodes_t){.i_dc_A = legs.i_dc_A};
+    memcpy(nodes->v_leg_V, legs.v_leg_V, sizeof nodes->v_leg_V);
+    for (int set = 0; set < m->winding.sets; set++) {
+        const double *v = &legs.v_leg_V[3 * set];
+        if (m->winding.zero >= 0) {
+            nodes->v_zero_V[set] = legs.v_V[m->winding.zero];
+            continue;
+        }
+        nodes->v_zero_V[set] =
+            winding_zero_V(&m->winding, state->rotor, omega_e, point->i_A, moved.i_A_s, set);
+        nodes->v_neutral_V[set] = (v[0] + v[1] + v[2]) / 3.0 - nodes->v_zero_V[set];
+    }
+}
+
+/* Whether no star network sees anything */
+static bool has_plain_nodes(const circuit_t *c)
+{
+    const winding_t *w = &c->machine.winding;
+    return circuit_symmetrical(c) && c->machine.plain && w->flux_terms == 0 && w->inductance_terms == 0;
+}
+
+void circuit_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *nodes)
+{
+    if (has_plain_nodes(c)) {
+        plain_nodes(c, p, nodes);
+        return;
+    }
+    machine_state_t state = circuit_machine_state(p);
+    machine_point_t point;
+    machine_evaluate(&c->machine, &state, &point);
+    all_nodes(c, p, &state, &point, nodes);
+}
+
+void circuit_nodes_of(const circuit_t *c, const machine_state_t *state, const machine_point_t *machine,
+                      circuit_nodes_t *nodes)
+{
+    if (has_plain_nodes(c)) {
+        plain_nodes(c, &c->now, nodes);
+    } else {
+        all_nodes(c, &c->now, state, machine, nodes);
+    }
+}
+
+double circuit_capacitor_J(const circuit_t *c, double v_V)
+{
+    return 0.5 * c->bridge.c_leg_F * v_V * v_V;
+}
+
+/* Voltage of an output capacitance */
+double circuit_output_V(const circuit_t *c, int k)
+{
+    const bridge_t *b = &c->bridge;
+    double v_dc_V = c->now.x[V_DC];
+    if (b->leg[k] == LEG_SWINGING) {
+        return c->now.x[V_LEG(k)];
+    }
+    double diode_V =
+        b->leg[k] == LEG_DIODE_HIGH ? b->v_diode_V : (b->leg[k] == LEG_DIODE_LOW ? -b->v_diode_V : 0.0);
+    return b->upper[k] * v_dc_V + diode_V;
+}
+
+double circuit_field_of_J(const circuit_t *c, const machine_state_t *state, const machine_point_t *machine)
+{
+    double energy_J = machine_energy_J(&c->machine, state, machine);
+    for (int k = 0; k < c->bridge.legs && c->bridge.c_leg_F > 0.0; k++) {
+        energy_J += circuit_capacitor_J(c, circuit_output_V(c, k));
+    }
+    return energy_J;
+}
+
+double circuit_field_J(const circuit_t *c)
+{
+    machine_state_t state = circuit_machine_state(&c->now);
+    machine_point_t point;
+    machine_evaluate(&c->machine, &state, &point);
+    return circuit_field_of_J(c, &state, &point);
+}
