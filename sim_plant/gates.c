@@ -28,7 +28,6 @@ void gates_load(gates_t *gates, const plant_pwm_t *pwm)
         gates->leg[k].fall_s = (1.0 + duty(gates, pwm->compare[k][1])) * half_s;
         gates->leg[k].on_s -= gates->period_s;
         gates->leg[k].off_s -= gates->period_s;
-        gates->leg[k].next_s = -1.0;
     }
     gates_drive(gates, pwm->driven, pwm->driven_after_s);
 }
@@ -38,6 +37,7 @@ void gates_drive(gates_t *gates, const bool driven[], double t_s)
     gates->drive_s = t_s;
     for (int k = 0; k < gates->legs; k++) {
         gates->leg[k].to_drive = driven[k];
+        gates->leg[k].next_s = -1.0;
     }
 }
 
@@ -72,6 +72,9 @@ static double leg_next_s(const gates_t *gates, int k, double after_s)
     }
     if (gates->leg[k].driven && fall_s > after_s && fall_s < next_s) {
         next_s = fall_s;
+    }
+    if (gates->leg[k].driven != gates->leg[k].to_drive && gates->drive_s < next_s) {
+        next_s = gates->drive_s;
     }
     if (gates->leg[k].opening && gates->leg[k].off_s < next_s) {
         next_s = gates->leg[k].off_s;
@@ -152,9 +155,6 @@ double gates_next_s(const gates_t *gates, double t_s)
 {
     double next_s = gates->period_s;
     double after_s = t_s + gates->coincident_s;
-    if (gates->drive_s > after_s && gates->drive_s < next_s) {
-        next_s = gates->drive_s;
-    }
     for (int k = 0; k < gates->legs; k++) {
         double leg_s = gates->leg[k].next_s;
         leg_s = leg_s > after_s ? leg_s : leg_next_s(gates, k, after_s);
