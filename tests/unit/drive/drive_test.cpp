@@ -143,6 +143,13 @@ TEST(Drive, ModeIsTakenWhenOffOnly)
     EXPECT_EQ(x.d.command.mode, DRIVE_MODE_TORQUE);
 }
 
+// 888 bytes. One base register reaches all of it: LDRD's offset ends at 1020, and state copied by a trace is
+// cheap.
+TEST(Drive, StateIsSmall)
+{
+    EXPECT_LE(sizeof(drive_t), 1020U);
+}
+
 TEST(Drive, StaysOffWithoutACommand)
 {
     Drive x;
