@@ -31,14 +31,14 @@ void bridge_init(bridge_t *bridge, const plant_config_t *config, int legs)
 /* What each kind of leg is */
 typedef struct {
     unsigned counts; /* 4 bits each: floating, swinging, diode, both, source */
-    unsigned masks;  /* a byte each: tied to the upper rail; by a diode to it, and to the lower one */
+    unsigned masks;  /* a byte each: tied to the upper rail; by a diode to it, and to the lower one; swings */
     double upper;
     double switched;
 } facts_t;
 
 static const facts_t facts[] = {
     [LEG_FLOATING] = {.counts = 0x1},
-    [LEG_SWINGING] = {.counts = 0x10},
+    [LEG_SWINGING] = {.counts = 0x10, .masks = 0x1000000},
     [LEG_LOW] = {.switched = 1.0},
     [LEG_HIGH] = {.switched = 1.0, .masks = 0x1, .upper = 1.0},
     [LEG_BOTH] = {.counts = 0x1000, .upper = 0.5},
@@ -103,6 +103,8 @@ void bridge_summarise(bridge_t *b, const winding_t *w)
     b->g_through_S = b->both > 0 ? 0.5 * b->both / fmax(b->r_on_ohm, R_THROUGH_OHM) : 0.0;
     b->r_series_ohm = sources ? 0.0 : (w->legs > w->phases ? 2.0 : 1.0) * b->r_on_ohm;
     memcpy(b->masks, masks, sizeof masks);
+    b->diode_legs = ((masks[0] >> 8 | masks[0] >> 16) & 7u) | ((masks[1] >> 8 | masks[1] >> 16) & 7u) << 3;
+    b->swinging_legs = (masks[0] >> 24) | (masks[1] >> 24) << 3;
     sum_rails(b, w);
     if (b->v_diode_V != 0.0) {
         sum_diodes(b, w);

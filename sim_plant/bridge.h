@@ -40,6 +40,7 @@ typedef struct {
     /* what follows from leg[] */
     int floating, swinging, diodes, both;
     bool sources;
+    unsigned diode_legs, swinging_legs; /* bit k for leg k */
     unsigned masks[PLANT_SETS]; /* of three legs each: tied to the upper rail, and by diodes; see bridge.c */
     double rail[ACTIVE];        /* by active coordinate: share of the upper rail, */
     double source_V[ACTIVE];    /* of given sources */
@@ -66,6 +67,12 @@ double bridge_reverse(const bridge_t *bridge, int k, double i_A);
 
 /* How far a terminal is beyond the nearer diode's threshold, V. */
 double bridge_beyond_V(const bridge_t *bridge, double v_dc_V, double v_leg_V);
+
+/* Of a set of legs, which is not empty, the first. */
+static inline int bridge_first(unsigned legs)
+{
+    return __builtin_ctz(legs);
+}
 
 static inline bool bridge_is_diode(const bridge_t *bridge, int k)
 {

@@ -70,10 +70,8 @@ void circuit_summarise(circuit_t *c)
 
 void circuit_switch(circuit_t *c, const gates_t *gates, unsigned legs)
 {
-    for (int k = 0; k < c->bridge.legs; k++) {
-        if ((legs >> k & 1u) == 0u) {
-            continue;
-        }
+    for (legs &= (1u << c->bridge.legs) - 1u; legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
         leg_t leg =
             bridge_commutated(&c->bridge, k, gates_conducting(gates, k), circuit_leg_A(c, &c->now, k));
         if (leg != c->bridge.leg[k]) {
@@ -100,10 +98,8 @@ bool circuit_ignores(const circuit_t *c, const gates_t *gates, unsigned legs, do
         return false;
     }
     double slope_A_s = SLOPE_MARGIN * c->machine.gamma_sum_1_H * fabs(c->now.x[V_DC]);
-    for (int k = 0; k < b->legs; k++) {
-        if ((legs >> k & 1u) == 0u) {
-            continue;
-        }
+    for (; legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
         double i_A = circuit_leg_A(c, &c->now, k);
         leg_t leg = bridge_commutated(b, k, gates_conducting(gates, k), i_A);
         bool same = (low_side(leg) && low_side(b->leg[k])) || (high_side(leg) && high_side(b->leg[k]));
@@ -135,9 +131,9 @@ void circuit_project(circuit_t *c)
 static void stop_diodes(circuit_t *c)
 {
     bool stopped = false;
-    for (int k = 0; k < c->bridge.legs && c->bridge.diodes > 0; k++) {
-        if (bridge_is_diode(&c->bridge, k) &&
-            bridge_reverse(&c->bridge, k, circuit_leg_A(c, &c->now, k)) > 0.0) {
+    for (unsigned legs = c->bridge.diode_legs; legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        if (bridge_reverse(&c->bridge, k, circuit_leg_A(c, &c->now, k)) > 0.0) {
             set_leg(c, k, c->bridge.c_leg_F > 0.0 ? LEG_SWINGING : LEG_FLOATING);
             stopped = true;
         }
@@ -151,8 +147,9 @@ static void stop_diodes(circuit_t *c)
 static void catch_swinging(circuit_t *c)
 {
     bool caught = false;
-    for (int k = 0; k < c->bridge.legs && c->bridge.swinging > 0; k++) {
-        if (c->bridge.leg[k] == LEG_SWINGING && circuit_swing_excess(c, &c->now, k) > 0.0) {
+    for (unsigned legs = c->bridge.swinging_legs; legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        if (circuit_swing_excess(c, &c->now, k) > 0.0) {
             bool up = c->now.x[V_LEG(k)] > 0.5 * c->now.x[V_DC];
             set_leg(c, k, up ? LEG_DIODE_HIGH : LEG_DIODE_LOW);
             caught = true;

@@ -7,10 +7,8 @@
 static double swing_excess(const circuit_t *c, const point_t *p)
 {
     double excess = -1.0;
-    for (int k = 0; k < c->bridge.legs && c->bridge.swinging > 0; k++) {
-        if (c->bridge.leg[k] == LEG_SWINGING) {
-            excess = larger(excess, circuit_swing_excess(c, p, k));
-        }
+    for (unsigned legs = c->bridge.swinging_legs; legs != 0u; legs &= legs - 1u) {
+        excess = larger(excess, circuit_swing_excess(c, p, bridge_first(legs)));
     }
     return excess;
 }
@@ -41,10 +39,9 @@ static double other_excess(const circuit_t *c, const point_t *p)
         mechanics_motion_t motion = circuit_motion(c, p);
         worst = larger(worst, mechanics_excess(&c->mech, &motion, p->torque_Nm));
     }
-    for (int k = 0; k < b->legs && b->diodes > 0; k++) {
-        if (bridge_is_diode(b, k)) {
-            worst = larger(worst, bridge_reverse(b, k, circuit_leg_A(c, p, k)));
-        }
+    for (unsigned legs = b->diode_legs; legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        worst = larger(worst, bridge_reverse(b, k, circuit_leg_A(c, p, k)));
     }
     return b->floating > 0 ? larger(worst, floating_excess(c, p)) : worst;
 }
