@@ -132,21 +132,21 @@ bool cpu_on_bad_memory(uc_engine *uc, uc_mem_type type, uint64_t where, int size
     return true;
 }
 
-/* While alignment is enforced every access comes by. Taking the page's rights away ends a bad one cleanly. */
+/* While alignment is enforced every access comes by. Taking the memory's rights away ends a bad one cleanly.
+ */
 void cpu_on_any_memory(uc_engine *uc, uc_mem_type type, uint64_t where, int size, int64_t value, void *user)
 {
+    (void)uc;
     (void)value;
     cpu_t *cpu = user;
     const uint32_t address = (uint32_t)where;
     if (address % (uint32_t)size == 0 || cpu->fault.pending) {
         return;
     }
-    cpu_region_t *region = cpu_region_of(cpu, address);
-    if (region != NULL) {
+    if (cpu_region_of(cpu, address) != NULL) {
         give_fault(cpu, address, type == UC_MEM_WRITE, false);
         cpu->fault.unaligned = true;
-        cpu->remap = true;
-        (void)uc_mem_protect(uc, address & ~(uint64_t)(CPU_PAGE - 1), CPU_PAGE, UC_PROT_NONE);
+        cpu_forbid(cpu, address, true);
     }
 }
 
@@ -179,6 +179,7 @@ static void data_fault(cpu_t *cpu)
     cpu_set(cpu, UC_ARM_REG_PC, pc | 1U);
     if (cpu->fault.unaligned) {
         cpu->fault.unaligned = false;
+        cpu_forbid(cpu, cpu->fault.address, false);
         exceptions_raise_usage(cpu, CFSR_UNALIGNED);
     } else if (cpu->fault.protection) {
         cpu->system.cfsr |= CFSR_DACCVIOL | CFSR_MMARVALID;

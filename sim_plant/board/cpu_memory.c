@@ -124,6 +124,18 @@ void cpu_close_again(cpu_t *cpu)
     cpu->close_again = false;
 }
 
+/* Whole runs as they were mapped: for a part of one unicorn would make copies of its own. */
+void cpu_forbid(cpu_t *cpu, uint32_t address, bool forbidden)
+{
+    const cpu_region_t *region = cpu_region_of(cpu, address);
+    for (unsigned k = 0; region != NULL && k < region->runs; k++) {
+        if (address - region->run[k].base < region->run[k].size) {
+            (void)uc_mem_protect(cpu->uc, region->run[k].base, region->run[k].size,
+                                 forbidden ? UC_PROT_NONE : region->run[k].permissions);
+        }
+    }
+}
+
 void cpu_map_all(cpu_t *cpu)
 {
     for (unsigned i = 0; i < cpu->regions; i++) {

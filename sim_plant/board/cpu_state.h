@@ -150,6 +150,7 @@ bool cpu_store(cpu_t *cpu, uint32_t address, uint32_t value);
 void cpu_map(cpu_t *cpu, cpu_region_t *region); /* as the MPU and stalls have it */
 void cpu_map_all(cpu_t *cpu);
 void cpu_close_again(cpu_t *cpu);
+void cpu_forbid(cpu_t *cpu, uint32_t address, bool forbidden);
 void cpu_flush_flash_writes(cpu_t *cpu);
 void cpu_forget_blocks(cpu_t *cpu, uint32_t address, uint32_t size);
 void cpu_retranslate(cpu_t *cpu, uint32_t address, uint32_t size);
