@@ -7,6 +7,7 @@ void alarms_clear(alarms_t *alarms)
 {
     memset(alarms, 0, sizeof *alarms);
     alarms->next = UINT64_MAX;
+    alarms->serving = UINT64_MAX;
 }
 
 static void update(alarms_t *alarms)
@@ -59,6 +60,8 @@ bool alarms_serve(alarms_t *alarms, uint64_t now)
     alarms->count--;
     const alarm_entry_t due = alarms->entry[alarms->count];
     update(alarms);
+    alarms->serving = due.cycle;
     due.call(due.owner, due.cycle);
+    alarms->serving = UINT64_MAX;
     return true;
 }

@@ -23,7 +23,9 @@ typedef struct {
 typedef struct {
     alarm_entry_t entry[ALARMS_MOST]; /* the last one is the earliest */
     unsigned count;
-    uint64_t next; /* cycle of the earliest; UINT64_MAX: none */
+    uint64_t next;    /* cycle of the earliest; UINT64_MAX: none */
+    uint64_t serving; /* of the one whose call runs, which comes late by a block of instructions; else
+                         UINT64_MAX */
     uint64_t order;
 } alarms_t;
 

@@ -206,7 +206,9 @@ void cpu_set_register(cpu_t *cpu, int n, uint32_t value)
 
 void cpu_irq(cpu_t *cpu, int irq, bool level)
 {
-    nvic_set_level(&cpu->nvic, EXCEPTION_IRQ0 + irq, level, cpu->total.typical);
+    const uint64_t asked = cpu->alarms.serving;
+    nvic_set_level(&cpu->nvic, EXCEPTION_IRQ0 + irq, level,
+                   asked < cpu->total.typical ? asked : cpu->total.typical);
 }
 
 void cpu_alarm(cpu_t *cpu, void *owner, uint64_t cycle, cpu_alarm_t alarm)
