@@ -1,0 +1,95 @@
+#!/usr/bin/env python3
+"""Fills docs/performance.md, between `<!-- measured -->` and `<!-- end -->`, with what is measured now.
+
+The builds must be there: tools/performance_report makes them first.
+"""
+import json
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs/performance.md"
+PMSIM = ROOT / "out/build/host-release/tools/pmsim/pmsim"
+TARGET = ROOT / "out/build/stm32g431"
+IMAGE = TARGET / "pmdrive.elf"
+SCENARIOS = ROOT / "tests/scenario"
+
+
+def output(command):
+    return subprocess.run(command, check=True, cwd=ROOT, capture_output=True, text=True).stdout
+
+
+def count_step(folder):
+    """Mode -> {mean, max} of the instructions of drive_step() under QEMU."""
+    record = folder / "demo.rec"
+    output([PMSIM, "record", SCENARIOS / "demo.yaml", "--out", record])
+    elf = TARGET / "tests/target/drive/drive_replay.elf"
+    return json.loads(output([sys.executable, ROOT / "tests/target/count.py", elf, "--function", "step_*", "--json", "-",
+                              "--", record]))["functions"]
+
+
+def run_board(folder, *words):
+    """(figures, wall seconds) of a run on the emulated board."""
+    figures = folder / "figures.json"
+    began = time.monotonic()
+    output([PMSIM, "board", IMAGE, *words, "--jobs", "1", "--quiet", "--figures", figures])
+    return json.loads(figures.read_text()), time.monotonic() - began
+
+
+def limits():
+    """What -> (bytes, bound) of the image."""
+    text = output([sys.executable, ROOT / "tests/target/image/limits.py", IMAGE])
+    return re.findall(r"(?m)^ok\s+(.+?): (\d+) of (\d+) bytes", text)
+
+
+def table(head, rows):
+    lines = ["| " + " | ".join(head) + " |", "|---|" + "---:|" * (len(head) - 1)]
+    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
+
+
+def main():
+    with tempfile.TemporaryDirectory(prefix="pm_performance") as name:
+        folder = Path(name)
+        step = count_step(folder)
+        demo, _ = run_board(folder, SCENARIOS / "demo.yaml")
+        fast, wall_s = run_board(folder, SCENARIOS / "board/identity.yaml", "--set", "theta=0")
+
+    def mode(key):
+        return [f"{demo[f'control.{key}.mean']:.0f}", f"{demo[f'control.{key}.worst']:.0f}",
+                f"{demo[f'control.{key}.cycles']:.0f}", f"{demo[f'control.{key}.cycles_worst']:.0f}"]
+
+    parts = [
+        table(["`drive_step()`, executed instructions", "mean", "worst", "budget, mean"],
+              [["active flux, high speed", f"{step['step_flux']['mean']:.0f}", f"{step['step_flux']['max']}", "300"],
+               ["square-wave injection", f"{step['step_injection']['mean']:.0f}", f"{step['step_injection']['max']}", "380"],
+               ["off, calibration, pulses", f"{step['step_start']['mean']:.0f}", f"{step['step_start']['max']}", ""]]),
+        table(["whole control interrupt, with its register accesses", "mean", "worst", "cycles, mean", "cycles, worst"],
+              [["active flux, high speed", *mode("flux")], ["square-wave injection", *mode("injection")],
+               ["initial-position pulses", *mode("pulses")],
+               ["all of the demonstration; budget 420 and 480", f"{demo['control.mean']:.0f}",
+                f"{demo['control.worst']:.0f}", f"{demo['control.cycles']:.0f}", f"{demo['control.cycles_worst']:.0f}"],
+               ["1 kHz interrupt (speed, state machine)", f"{demo['slow.mean']:.0f}", f"{demo['slow.worst']:.0f}",
+                f"{demo['slow.cycles']:.0f}", f"{demo['slow.cycles_worst']:.0f}"]]),
+        table(["at 20 kHz, 170 MHz", "measured", "budget"],
+              [["worst control interrupt, share of the period", f"{fast['control.worst_percent']:.1f} %", "12 %"],
+               ["processor load", f"{fast['load_percent']:.1f} %", ""],
+               ["stack, measured", f"{max(demo['stack_bytes'], fast['stack_bytes']):.0f} bytes", "2048"],
+               ["interrupts after which the drive's memory was the host's, bit for bit",
+                f"{demo['identical'] + fast['identical']:.0f} of as many", "all"],
+               ["speed of the emulation with the plant, simulated s per wall s", f"{10.0 / wall_s:.1f}", "4"]]),
+        table(["image", "bytes", "budget"], [[what, size.strip(), bound.strip()] for what, size, bound in limits()]),
+    ]
+    text, found = re.subn(r"(?s)(<!-- measured -->\n).*?(<!-- end -->)",
+                          lambda m: m[1] + "\n" + "\n\n".join(parts) + "\n\n" + m[2], PAGE.read_text())
+    if found != 1:
+        sys.exit(f"{PAGE}: the markers are missing")
+    PAGE.write_text(text)
+    print("\n\n".join(parts))
+
+
+if __name__ == "__main__":
+    main()
