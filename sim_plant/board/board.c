@@ -211,7 +211,7 @@ cpu_t *board_cpu(board_t *board)
     return board->cpu;
 }
 
-board_chip_t *board_chip(board_t *board)
+board_chip_t *board_inside(board_t *board)
 {
     return &board->chip;
 }

@@ -5,6 +5,6 @@
 #include "sim_plant/board/board.h"
 #include "sim_plant/board/board_chip.h"
 
-board_chip_t *board_chip(board_t *board);
+board_chip_t *board_inside(board_t *board);
 
 #endif

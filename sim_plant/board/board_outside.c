@@ -28,13 +28,13 @@ bool board_can_send(board_t *board, const board_frame_t *frame)
 {
     fdcan_frame_t out = {.id = frame->id, .length = frame->length};
     memcpy(out.data, frame->data, sizeof out.data);
-    return fdcan_put(&board_chip(board)->fdcan, &out);
+    return fdcan_put(&board_inside(board)->fdcan, &out);
 }
 
 bool board_can_receive(board_t *board, board_frame_t *frame)
 {
     fdcan_frame_t in;
-    if (!fdcan_take(&board_chip(board)->fdcan, &in)) {
+    if (!fdcan_take(&board_inside(board)->fdcan, &in)) {
         return false;
     }
     *frame = (board_frame_t){.id = in.id, .length = in.length};
@@ -44,43 +44,43 @@ bool board_can_receive(board_t *board, board_frame_t *frame)
 
 void board_can_error(board_t *board, bool bus_off)
 {
-    fdcan_error(&board_chip(board)->fdcan, bus_off);
+    fdcan_error(&board_inside(board)->fdcan, bus_off);
 }
 
 const char *board_console(board_t *board)
 {
-    return board_chip(board)->usart.text;
+    return board_inside(board)->usart.text;
 }
 
 bool board_led(board_t *board)
 {
-    return gpio_drives_high(&board_chip(board)->gpio, PORT_C, 6);
+    return gpio_drives_high(&board_inside(board)->gpio, PORT_C, 6);
 }
 
 void board_set_temperature(board_t *board, double temperature_degC)
 {
-    board_chip(board)->wiring.temperature_degC = temperature_degC;
+    board_inside(board)->wiring.temperature_degC = temperature_degC;
 }
 
 void board_set_dial(board_t *board, double fraction)
 {
-    board_chip(board)->wiring.dial = fraction;
+    board_inside(board)->wiring.dial = fraction;
 }
 
 void board_press_button(board_t *board, bool pressed)
 {
-    board_chip(board)->wiring.button = pressed;
+    board_inside(board)->wiring.button = pressed;
 }
 
 void board_hold_break(board_t *board, bool held)
 {
-    board_chip(board)->wiring.break_held = held;
-    tim1_check_break(&board_chip(board)->tim1);
+    board_inside(board)->wiring.break_held = held;
+    tim1_check_break(&board_inside(board)->tim1);
 }
 
 void board_halt(board_t *board, bool halted)
 {
-    board_chip_t *chip = board_chip(board);
+    board_chip_t *chip = board_inside(board);
     cpu_halt(board_cpu(board), halted);
     if (board_misc_freezes_iwdg(&chip->misc)) {
         iwdg_freeze(&chip->iwdg, halted);
@@ -92,18 +92,18 @@ void board_halt(board_t *board, bool halted)
 
 void board_stick_converter(board_t *board, bool stuck)
 {
-    board_chip_t *chip = board_chip(board);
+    board_chip_t *chip = board_inside(board);
     chip->wiring.converter_stuck = stuck;
     adc_release(&chip->adc);
 }
 
 void board_stop_oscillator(board_t *board, bool stopped)
 {
-    board_chip(board)->wiring.oscillator_stopped = stopped;
-    rcc_oscillator(&board_chip(board)->rcc, stopped);
+    board_inside(board)->wiring.oscillator_stopped = stopped;
+    rcc_oscillator(&board_inside(board)->rcc, stopped);
 }
 
 void board_cut_flash(board_t *board, uint32_t after_words)
 {
-    board_chip(board)->flash.cut_after = after_words;
+    board_inside(board)->flash.cut_after = after_words;
 }

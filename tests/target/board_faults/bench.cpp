@@ -1,0 +1,152 @@
+#include "bench.h"
+
+#include <cstring>
+#include <stdexcept>
+
+namespace bench
+{
+
+const char *image = nullptr;
+const char *contract = nullptr;
+
+constexpr uint32_t store_address = 0x0801F000;
+
+plant_config_t plant_config()
+{
+    plant_config_t c = plants::ipm_1000();
+    c.sensor.shunt = PLANT_LOW_SIDE;
+    c.mech.locked = true;
+    return c;
+}
+
+drive_params_t params()
+{
+    drive_params_t p;
+    drive_params_default(&p);
+    return p;
+}
+
+Bench::Bench(const plant_config_t &config, const char *elf_path)
+{
+    const char *reason = nullptr;
+    char error[300] = "";
+    plant = plant_create(&config, 0.3, &reason);
+    board = plant != nullptr ? board_create(elf_path, plant, error, sizeof error) : nullptr;
+    if (board == nullptr) {
+        throw std::runtime_error(reason != nullptr ? reason : error);
+    }
+}
+
+Bench::~Bench()
+{
+    board_destroy(board);
+    plant_destroy(plant);
+}
+
+void Bench::store(int page, const drive_params_t &parameters, uint32_t sequence)
+{
+    uint32_t words[STORE_WORDS];
+    uint32_t used = app_page(&parameters, sequence, words);
+    board_program(board, store_address + 2048u * static_cast<uint32_t>(page), words, used * sizeof words[0]);
+}
+
+void Bench::boot()
+{
+    ASSERT_TRUE(board_boot(board, 0.2)) << board_error(board);
+}
+
+void Bench::run_ms(double ms)
+{
+    auto periods = static_cast<int>(ms * 10.0);
+    for (int n = 0; n < periods; n++) {
+        ASSERT_TRUE(board_run_period(board)) << board_error(board);
+    }
+}
+
+static void put_word(uint8_t *bytes, int32_t value)
+{
+    for (int n = 0; n < 4; n++) {
+        bytes[n] = static_cast<uint8_t>(static_cast<uint32_t>(value) >> (8 * n));
+    }
+}
+
+void Bench::command(bool enable, drive_mode_t mode, int32_t speed_mrad_s, int32_t current_mA, bool clear)
+{
+    board_frame_t setpoint = {0x300 + REMOTE_NODE, 8, {}};
+    put_word(&setpoint.data[4], current_mA);
+    board_frame_t command = {0x200 + REMOTE_NODE, 6, {}};
+    command.data[0] = static_cast<uint8_t>((enable ? 1 : 0) | (clear ? 0x80 : 0));
+    command.data[1] = static_cast<uint8_t>(mode);
+    put_word(&command.data[2], speed_mrad_s);
+    ASSERT_TRUE(board_can_send(board, &setpoint));
+    ASSERT_TRUE(board_can_send(board, &command));
+}
+
+void Bench::running()
+{
+    store(0, params(), 1);
+    boot();
+    run_ms(5);
+    for (int n = 0; n < 20 && watched()->drive.state != DRIVE_RUNNING; n++) {
+        command(true, DRIVE_MODE_CURRENT, 10000);
+        run_ms(100);
+    }
+    command(true, DRIVE_MODE_CURRENT, 10000);
+    run_ms(100);
+    ASSERT_EQ(watched()->drive.state, DRIVE_RUNNING) << console();
+    ASSERT_TRUE(bridge_on());
+}
+
+bool Bench::bridge_on() const
+{
+    return board_bridge_on(board);
+}
+
+std::string Bench::console() const
+{
+    return board_console(board);
+}
+
+plant_truth_t Bench::truth() const
+{
+    plant_truth_t t;
+    plant_truth(plant, &t);
+    return t;
+}
+
+const Watched *Bench::watched()
+{
+    return static_cast<const Watched *>(board_variable(board, "app_instance", sizeof(Watched)));
+}
+
+std::vector<uint16_t> Bench::patch(const std::vector<uint16_t> &code)
+{
+    for (int n = 0; n < 100 && !cpu_sleeping(board_cpu(board)); n++) {
+        run_ms(0.1);
+    }
+    EXPECT_TRUE(cpu_sleeping(board_cpu(board)));
+    patched_ = cpu_pc(board_cpu(board)) & ~1u;
+    std::vector<uint16_t> before(code.size());
+    board_read_flash(board, patched_, before.data(), 2 * before.size());
+    put_back(code);
+    return before;
+}
+
+void Bench::put_back(const std::vector<uint16_t> &code)
+{
+    board_program(board, patched_, code.data(), 2 * code.size());
+}
+
+} // namespace bench
+
+int main(int argc, char **argv)
+{
+    testing::InitGoogleMock(&argc, argv);
+    if (argc != 3) {
+        std::fprintf(stderr, "usage: %s pmdrive.elf hal_contract.elf [--gtest_...]\n", argv[0]);
+        return 2;
+    }
+    bench::image = argv[1];
+    bench::contract = argv[2];
+    return RUN_ALL_TESTS();
+}

@@ -1,0 +1,95 @@
+// Faults that the image has to survive with the bridge off, without a reset.
+#include "bench.h"
+
+#include <cmath>
+
+namespace
+{
+
+using bench::Bench;
+
+// The processor stands still: only comparators and timer are left. A short between two terminals, 0.5 ohm and
+// 1 uH, carries a steep current in every active vector.
+TEST(BoardFault, OverCurrentOpensTheBridgeWithoutTheProcessor)
+{
+    Bench b;
+    b.running();
+    cpu_halt(board_cpu(b.board), true);
+    plant_set_short(b.plant, 0, 1, 0.5);
+    b.run_ms(1);
+    EXPECT_FALSE(b.bridge_on());
+    EXPECT_NE(board_inside(b.board)->tim1.regs.value[0x10 / 4] & 0x80u, 0u);
+    EXPECT_EQ(board_resets(b.board), 0u);
+}
+
+TEST(BoardFault, TheSameWithoutComparatorsStaysOn)
+{
+    Bench b;
+    b.running();
+    cpu_halt(board_cpu(b.board), true);
+    plant_set_break(b.plant, nullptr);
+    plant_set_short(b.plant, 0, 1, 0.5);
+    b.run_ms(1);
+    EXPECT_TRUE(b.bridge_on());
+}
+
+TEST(BoardFault, BreakInputOpensAndBarsArming)
+{
+    Bench b;
+    b.running();
+    board_hold_break(b.board, true);
+    EXPECT_FALSE(b.bridge_on()); // at once
+    b.run_ms(5);
+    EXPECT_EQ(b.watched()->drive.fault, DRIVE_FAULT_HARDWARE);
+    b.command(false, DRIVE_MODE_CURRENT, 0, 0, true);
+    b.run_ms(5);
+    b.command(true);
+    b.run_ms(50);
+    EXPECT_FALSE(b.bridge_on());
+    board_hold_break(b.board, false);
+    b.run_ms(5);
+    b.command(false, DRIVE_MODE_CURRENT, 0, 0, false);
+    b.run_ms(5);
+    b.command(false, DRIVE_MODE_CURRENT, 0, 0, true);
+    b.run_ms(5);
+    b.command(true);
+    b.run_ms(300);
+    EXPECT_TRUE(b.bridge_on()) << b.console();
+    EXPECT_EQ(board_resets(b.board), 0u);
+}
+
+TEST(BoardFault, BusOffIsAFaultAndTheBusComesBack)
+{
+    Bench b;
+    b.running();
+    board_can_error(b.board, true);
+    b.run_ms(5);
+    EXPECT_FALSE(b.bridge_on());
+    EXPECT_EQ(b.watched()->drive.fault, DRIVE_FAULT_REMOTE_LOST);
+    b.run_ms(50);
+    board_frame_t frame = {0x7FF, 0, {}};
+    EXPECT_TRUE(board_can_send(b.board, &frame));
+}
+
+TEST(BoardFault, SilenceOfTheMasterIsAFault)
+{
+    Bench b;
+    b.running();
+    b.run_ms(390);
+    EXPECT_TRUE(b.bridge_on()); // 490 ms since the last command
+    b.run_ms(20);
+    EXPECT_FALSE(b.bridge_on());
+    EXPECT_EQ(b.watched()->drive.fault, DRIVE_FAULT_REMOTE_LOST);
+}
+
+TEST(BoardFault, ABrokenTemperatureSensorIsAFault)
+{
+    Bench b;
+    b.running();
+    board_set_temperature(b.board, -200.0);
+    b.run_ms(10);
+    EXPECT_FALSE(b.bridge_on());
+    EXPECT_EQ(b.watched()->drive.fault, DRIVE_FAULT_TEMPERATURE_SENSOR);
+}
+
+} // namespace

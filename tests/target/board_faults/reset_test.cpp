@@ -1,0 +1,157 @@
+// Faults that end in a reset: the bridge is off at once, and the image says afterwards what it was.
+#include "bench.h"
+
+namespace
+{
+
+using bench::Bench;
+using testing::HasSubstr;
+
+// Periods until that has come true, or -1
+template <typename Condition> int until(Bench *b, int most, Condition condition)
+{
+    for (int n = 0; n < most; n++) {
+        if (condition()) {
+            return n;
+        }
+        if (!board_run_period(b->board)) {
+            ADD_FAILURE() << board_error(b->board);
+            return -1;
+        }
+    }
+    return -1;
+}
+
+// 20 ms of a slow clock, and what is left of its last millisecond
+TEST(BoardReset, WatchdogEndsAProcessorThatHangs)
+{
+    Bench b;
+    b.running();
+    cpu_halt(board_cpu(b.board), true);
+    int periods = until(&b, 1000, [&] { return board_resets(b.board) == 1; });
+    EXPECT_GE(periods, 185);
+    EXPECT_LE(periods, 205);
+    EXPECT_FALSE(b.bridge_on());
+    b.run_ms(50);
+    EXPECT_THAT(b.console(), HasSubstr("reset: watchdog"));
+    EXPECT_FALSE(b.bridge_on());
+    EXPECT_EQ(board_resets(b.board), 1u);
+}
+
+// Interrupts go on, the main loop does not: b .
+TEST(BoardReset, WatchdogEndsAMainLoopThatHangs)
+{
+    Bench b;
+    b.running();
+    std::vector<uint16_t> before = b.patch({0xE7FE});
+    int periods = until(&b, 3000, [&] { return board_resets(b.board) == 1; });
+    EXPECT_GE(periods, 1100); // 100 ms of patience, then the watchdog's 20
+    EXPECT_LE(periods, 1250);
+    EXPECT_FALSE(b.bridge_on());
+    b.put_back(before);
+    b.run_ms(50);
+    EXPECT_THAT(b.console(), HasSubstr("reset: watchdog"));
+    EXPECT_FALSE(b.bridge_on());
+}
+
+TEST(BoardReset, AStuckConverterOpensTheBridgeWithinMilliseconds)
+{
+    Bench b;
+    b.running();
+    board_stick_converter(b.board, true);
+    int periods = until(&b, 100, [&] { return !b.bridge_on(); });
+    EXPECT_GE(periods, 1);
+    EXPECT_LE(periods, 30);
+    EXPECT_GE(until(&b, 1000, [&] { return board_resets(b.board) == 1; }), 0);
+    EXPECT_FALSE(b.bridge_on());
+}
+
+// Clock security breaks the timer in hardware; the handler leaves its last words: exception 2.
+TEST(BoardReset, ALostCrystalOpensTheBridgeAtOnceAndIsRefusedAfterwards)
+{
+    Bench b;
+    b.running();
+    board_stop_oscillator(b.board, true);
+    EXPECT_FALSE(b.bridge_on());
+    EXPECT_GE(until(&b, 100, [&] { return board_resets(b.board) == 1; }), 0);
+    b.run_ms(100);
+    EXPECT_THAT(b.console(), HasSubstr("reset: software"));
+    EXPECT_THAT(b.console(), HasSubstr("last run ended by exception 0x00000002"));
+    EXPECT_THAT(b.console(), HasSubstr("clock"));
+    EXPECT_EQ(board_clock_Hz(b.board), 170000000u); // from HSI
+    b.command(true);
+    b.run_ms(300);
+    EXPECT_FALSE(b.bridge_on());
+}
+
+// push {r0-r7} without end: the guard below the stack, 32 bytes at the bottom of the memory, stops it.
+TEST(BoardReset, AnOverflowOfTheStackHitsTheGuard)
+{
+    Bench b;
+    b.running();
+    std::vector<uint16_t> before = b.patch({0xB4FF, 0xE7FD});
+    EXPECT_GE(until(&b, 1000, [&] { return board_resets(b.board) == 1; }), 0);
+    EXPECT_FALSE(b.bridge_on());
+    b.put_back(before);
+    b.run_ms(50);
+    EXPECT_THAT(b.console(), HasSubstr("last run ended by exception 0x00000004"));
+    EXPECT_THAT(b.console(), HasSubstr("address 0x200000"));
+    EXPECT_FALSE(b.bridge_on());
+}
+
+TEST(BoardReset, ANullPointerIsAFaultWithItsAddress)
+{
+    Bench b;
+    b.running();
+    std::vector<uint16_t> before = b.patch({0x2000, 0x6840, 0xE7FE}); // movs r0, #0; ldr r0, [r0, #4]
+    EXPECT_GE(until(&b, 1000, [&] { return board_resets(b.board) == 1; }), 0);
+    EXPECT_FALSE(b.bridge_on());
+    b.put_back(before);
+    b.run_ms(50);
+    EXPECT_THAT(b.console(), HasSubstr("last run ended by exception 0x00000004"));
+    EXPECT_THAT(b.console(), HasSubstr("address 0x00000004"));
+}
+
+// Power lost while the newer page was written: the older one holds.
+TEST(BoardReset, APageCutShortFallsBackToTheOther)
+{
+    drive_params_t older = bench::params();
+    drive_params_t newer = bench::params();
+    newer.i_trip = 5000;
+    for (bool cut : {false, true}) {
+        Bench b;
+        b.store(0, older, 1);
+        b.store(1, newer, 2);
+        if (cut) {
+            const std::vector<uint8_t> erased(256, 0xFF);
+            board_program(b.board, 0x0801F800 + 128, erased.data(), erased.size());
+        }
+        b.boot();
+        b.run_ms(20);
+        drive_t expected;
+        drive_init(&expected, cut ? &older : &newer);
+        EXPECT_EQ(b.watched()->drive.config.protection.i_trip_squared,
+                  expected.config.protection.i_trip_squared);
+        EXPECT_THAT(b.console(), HasSubstr("parameters: stored"));
+    }
+}
+
+// The contract image writes its pages; the power goes in the midst of one double word, and it starts anew.
+TEST(BoardReset, PowerLostWhileAPageIsWritten)
+{
+    for (uint32_t after : {1u, 2u, 4u}) {
+        plant_config_t config = bench::plant_config();
+        config.inverter.f_pwm_Hz = 20e3; // as that image has them
+        config.inverter.timer_counts = 4250;
+        config.inverter.dead_time_s = 500e-9;
+        Bench b(config, bench::contract);
+        b.boot();
+        board_cut_flash(b.board, after);
+        ASSERT_GE(until(&b, 50000, [&] { return board_resets(b.board) == 1; }), 0);
+        EXPECT_FALSE(b.bridge_on());
+        EXPECT_GE(until(&b, 100000, [&] { return b.console().find("DONE 0 ") != std::string::npos; }), 0);
+        EXPECT_THAT(b.console(), HasSubstr("DONE 0 "));
+    }
+}
+
+} // namespace
