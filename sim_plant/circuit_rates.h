@@ -44,6 +44,9 @@ void circuit_summarise(circuit_t *circuit);
 void circuit_project(circuit_t *circuit);
 void circuit_reassign_diodes(circuit_t *circuit);
 
+/* Rates of the currents at the present point of a symmetrical circuit whose field is known. */
+void circuit_symmetrical_rates(const circuit_t *circuit, double i_A_s[ACTIVE]);
+
 /* Brings the conduction of the legs into the state that belongs to the present point. */
 void circuit_settle_legs(circuit_t *circuit);
 

@@ -14,6 +14,23 @@ static void plain_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *n
     nodes->v_neutral_V[0] = (legs.v_leg_V[0] + legs.v_leg_V[1] + legs.v_leg_V[2]) / 3.0;
 }
 
+static void set_nodes(const circuit_t *c, const circuit_legs_t *legs, rotor_t rotor, double omega_e,
+                      const double i_A[ACTIVE], const double i_A_s[ACTIVE], circuit_nodes_t *nodes)
+{
+    const winding_t *w = &c->machine.winding;
+    *nodes = (circuit_nodes_t){.i_dc_A = legs->i_dc_A};
+    memcpy(nodes->v_leg_V, legs->v_leg_V, sizeof nodes->v_leg_V);
+    for (int set = 0; set < w->sets; set++) {
+        const double *v = &legs->v_leg_V[3 * set];
+        if (w->zero >= 0) {
+            nodes->v_zero_V[set] = legs->v_V[w->zero];
+            continue;
+        }
+        nodes->v_zero_V[set] = winding_zero_V(w, rotor, omega_e, i_A, i_A_s, set);
+        nodes->v_neutral_V[set] = (v[0] + v[1] + v[2]) / 3.0 - nodes->v_zero_V[set];
+    }
+}
+
 static void all_nodes(const circuit_t *c, const point_t *p, const machine_state_t *state,
                       const machine_point_t *point, circuit_nodes_t *nodes)
 {
@@ -27,18 +44,17 @@ static void all_nodes(const circuit_t *c, const point_t *p, const machine_state_
     } else {
         machine_rates(m, state, point, omega_e, legs.v_V, &moved);
     }
-    *nodes = (circuit_nodes_t){.i_dc_A = legs.i_dc_A};
-    memcpy(nodes->v_leg_V, legs.v_leg_V, sizeof nodes->v_leg_V);
-    for (int set = 0; set < m->winding.sets; set++) {
-        const double *v = &legs.v_leg_V[3 * set];
-        if (m->winding.zero >= 0) {
-            nodes->v_zero_V[set] = legs.v_V[m->winding.zero];
-            continue;
-        }
-        nodes->v_zero_V[set] =
-            winding_zero_V(&m->winding, state->rotor, omega_e, point->i_A, moved.i_A_s, set);
-        nodes->v_neutral_V[set] = (v[0] + v[1] + v[2]) / 3.0 - nodes->v_zero_V[set];
-    }
+    set_nodes(c, &legs, state->rotor, omega_e, point->i_A, moved.i_A_s, nodes);
+}
+
+/* Where the field of the present point is known. */
+static void symmetrical_nodes(const circuit_t *c, circuit_nodes_t *nodes)
+{
+    double i_A_s[ACTIVE] = {0.0};
+    circuit_legs_t legs;
+    circuit_legs(c, &c->now, &legs);
+    circuit_symmetrical_rates(c, i_A_s);
+    set_nodes(c, &legs, c->now.rotor, c->machine.pole_pairs * c->now.x[OMEGA_MECH], c->now.i_A, i_A_s, nodes);
 }
 
 /* Whether no star network sees anything */
@@ -65,6 +81,8 @@ void circuit_nodes_of(const circuit_t *c, const machine_state_t *state, const ma
 {
     if (has_plain_nodes(c)) {
         plain_nodes(c, &c->now, nodes);
+    } else if (c->field_known && circuit_symmetrical(c)) {
+        symmetrical_nodes(c, nodes);
     } else {
         all_nodes(c, &c->now, state, machine, nodes);
     }

@@ -253,3 +253,30 @@ double steps_symmetrical(circuit_t *c, double left_s, bool *event)
                       : take_steps(c, left_s, DOUBLE, false, event);
     }
 }
+
+INLINE void current_rates(const circuit_t *c, shape_t shape, double i_A_s[ACTIVE])
+{
+    double rate[ELEMENTS];
+    pair_t flux_V[PAIRS], core_V[PLANT_SETS], moved_A_s[PAIRS];
+    tied_t tied;
+    rates_at(c, &c->field, c->now.x, shape, true, &tied, rate, flux_V);
+    field_rates(&c->machine, c->now.rotor, rate[THETA_E], shape, &c->field, flux_V, core_V, moved_A_s);
+    for (int p = 0; p < pairs(shape); p++) {
+        pair_put(&i_A_s[2 * p], moved_A_s[p]);
+    }
+}
+
+void circuit_symmetrical_rates(const circuit_t *c, double i_A_s[ACTIVE])
+{
+    switch (c->machine.winding.active) {
+    case 2:
+        current_rates(c, STAR, i_A_s);
+        break;
+    case 3:
+        current_rates(c, OPEN, i_A_s);
+        break;
+    default:
+        current_rates(c, DOUBLE, i_A_s);
+        break;
+    }
+}
