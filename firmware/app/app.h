@@ -52,6 +52,9 @@ bool app_save(hal_t *hal, const drive_params_t *params);
  * the hardware does, or `stored` is false, nothing can be armed. */
 drive_result_t app_configure(app_t *app, hal_t *hal, const drive_params_t *params, bool stored);
 
+/* The one of an image (main.c): by this name a debugger, and the emulated board, find it. */
+extern app_t app_instance;
+
 void app_boot(app_t *app, hal_t *hal);
 void app_turn(app_t *app);
 

@@ -1,7 +1,7 @@
 /* Entry of an image; a host program has its own. */
 #include "firmware/app/app.h"
 
-app_t app_instance; /* by this name a debugger, and the emulated board, find it */
+app_t app_instance;
 
 int main(void)
 {

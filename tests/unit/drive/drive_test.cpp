@@ -61,7 +61,8 @@ class Closed
                 states.push_back(s);
             }
             if (s == DRIVE_OFF || s == DRIVE_CALIBRATING || s == DRIVE_FAULT) {
-                driven_while_off += driven && loop.app.periods % 10 != 1 ? 1 : 0; // it changes after this step
+                driven_while_off +=
+                    driven && loop.app.periods % 10 != 1 ? 1 : 0; // it changes after this step
             }
         }
     }
