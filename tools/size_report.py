@@ -21,6 +21,7 @@ MODULES = {
     "pm_injection": "injection",
     "pm_bldc": "bldc",
     "pm_drive": "firmware/drive",
+    "pm_can": "firmware/can",
 }
 KINDS = {".text": "code", ".rodata": "rodata", ".data": "data", ".bss": "bss"}
 TYPEDEF = re.compile(r"^(?:\}|typedef struct \w+)\s*(\w+_t);", re.MULTILINE)

@@ -59,6 +59,14 @@ extern const od_entry_t od_table[];
 extern const uint16_t od_count;
 extern const uint32_t od_schema; /* CRC-32 over what a stored set depends on */
 
+/* Constant strings and domains, by slot */
+typedef struct {
+    const uint8_t *bytes;
+    uint32_t size;
+} od_bytes_t;
+
+extern const od_bytes_t od_bytes[];
+
 /* NULL: no such object, or with *has_index no such sub-index. Binary search. */
 const od_entry_t *od_find(uint16_t index, uint8_t sub, bool *has_index);
 uint8_t od_size(const od_entry_t *entry); /* bytes of a number; 0: string or domain */
