@@ -25,7 +25,7 @@ def _environment():
     return environment
 
 
-def _c_files(render, dictionary, stored_eds):
+def _c_files(render, dictionary, sheet):
     render("firmware/drive/parameters.def", "parameters.def.j2", objects=dictionary.objects)
     render("firmware/app/error_codes.def", "error_codes.def.j2", faults=dictionary.faults)
     render("firmware/can/dictionary_slots.h", "dictionary_slots.h.j2", node=dictionary.of("node"),
@@ -34,12 +34,11 @@ def _c_files(render, dictionary, stored_eds):
     render("firmware/can/dictionary_table.c", "dictionary_table.c.j2", entries=dictionary.entries,
            schema=emit_c.schema(dictionary))
     render(BYTES, "dictionary_bytes.c.j2",
-           constants=emit_c.constants(dictionary, stored_eds))
+           constants=emit_c.constants(dictionary, sheet))
 
 
-def _bytes_before(path):
-    """The electronic data sheet that a file holds, empty if there is none."""
-    text = path.read_text(encoding="ascii") if path.is_file() else ""
+def stored_eds(text):
+    """The electronic data sheet that the text of BYTES holds, empty if there is none."""
     match = re.search(r"stored_eds\[\] = \{([^}]*)\}", text)
     return bytes(int(x, 16) for x in re.findall(r"0x([0-9A-F]{2})", match[1])) if match else b""
 
@@ -65,7 +64,8 @@ def files(root=ROOT):
     lists = emit_eds.lists(dictionary)
     render(f"{PACKAGE}/pmdrive.eds", "eds.j2", stored=False, lists=lists, **names)
     short = environment.get_template("eds.j2").render(stored=True, lists=lists, **names)
-    _c_files(render, dictionary, emit_eds.compressed(short, _bytes_before(root / BYTES)))
+    before = (root / BYTES).read_text(encoding="ascii") if (root / BYTES).is_file() else ""
+    _c_files(render, dictionary, emit_eds.compressed(short, stored_eds(before)))
     return out
 
 
