@@ -7,8 +7,10 @@ some of them, and old ones. Nothing is installed outside the folder.
 """
 import hashlib
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 import venv
 from pathlib import Path
 
@@ -29,9 +31,11 @@ def make(folder, python, wanted):
         venv.create(folder, clear=True, with_pip=True)
     except (OSError, subprocess.CalledProcessError) as error:
         skip(f"no virtual environment (on Debian: package python3-venv): {error}")
-    command = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *PACKAGES,
-               "--editable", str(TOOL)]
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    with tempfile.TemporaryDirectory() as copy:  # installing writes beside the sources
+        shutil.copytree(TOOL, Path(copy) / "pmdrive", ignore=shutil.ignore_patterns("*.egg-info", "build"))
+        command = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *PACKAGES,
+                   str(Path(copy) / "pmdrive")]
+        result = subprocess.run(command, capture_output=True, text=True, check=False)
     if result.returncode != 0:
         lines = (result.stderr or result.stdout).strip().splitlines() or ["no message"]
         skip(lines[-1])
