@@ -6,6 +6,7 @@ VENDOR_ID = 0x00000000
 PRODUCT_CODE = 0x504D4452
 REVISION = 0x00010000
 DEFAULT_NODE_ID = 1
+EDS_FORMAT = 128  # of 1022h: a .lzma file
 
 # index, sub, name, record, type, access, unit, exp10, exp2, least, most, preset, node_id, stored, group, map, values, help, book
 ENTRIES = (
