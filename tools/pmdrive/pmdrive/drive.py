@@ -11,6 +11,7 @@ from .errors import BusError, FaultError, NoAnswer, NotDone, Refused, UsageError
 
 SAVE = int.from_bytes(b"save", "little")
 LOAD = int.from_bytes(b"load", "little")
+TOGETHER = 0x06040043  # abort code of the check of all parameters together
 GROUPS = ("all", "communication", "application", "machine")
 # Statusword: (mask, value): state of CiA 402
 STATES = (
@@ -80,7 +81,15 @@ class Drive:
         entry = self.entry(name)
         if not entry.writable or not entry.number:
             raise UsageError(f"{entry.label} cannot be set", entry.help)
-        self.download(entry.index, entry.sub, entry.encode(raw), entry.label)
+        try:
+            self.download(entry.index, entry.sub, entry.encode(raw), entry.label)
+        except Refused as error:
+            if error.code != TOGETHER:
+                raise
+            culprit = names.BY_PLACE.get(divmod(self.read("parameter_refused"), 256))
+            if culprit is None:
+                raise
+            raise Refused(f"{entry.label}, by {culprit.label}", error.code, entry.index, entry.sub) from None
 
     def get(self, name):
         """A Decimal in the unit of the dictionary, or text."""
@@ -128,23 +137,13 @@ class Drive:
                     progress(n, len(changes))
         finally:
             if together:
-                self._end_batch()
+                self.write("parameter_batch", 0)
         wrong = self.diff({entry: raw for entry, _, raw in changes})
         if wrong:
             lost = ", ".join(f"{entry.name} is {entry.text(here)}" for entry, here, _ in wrong[:5])
             raise NotDone(f"{len(wrong)} of {len(changes)} values were not taken: {lost}",
                           "the drive has refused them when it checked all together")
         return changes
-
-    def _end_batch(self):
-        try:
-            self.write("parameter_batch", 0)
-        except Refused as error:
-            place = self.read("parameter_refused")
-            culprit = names.BY_PLACE.get((place // 256, place % 256))
-            if culprit is None:
-                raise
-            raise Refused(f"{culprit.label}, checked with all others", error.code, culprit.index, culprit.sub) from None
 
     def save(self, group="all"):
         self._store(0x1010, group, SAVE)
