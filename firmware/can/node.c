@@ -89,7 +89,7 @@ void node_boot_up(node_t *node)
 
 void node_init(node_t *node, const node_host_t *host, void *context, uint32_t serial, uint32_t now_us)
 {
-    memset(node, 0, sizeof *node);
+    (void)memset(node, 0, sizeof *node);
     node->host = host;
     node->context = context;
     node->now_us = now_us;

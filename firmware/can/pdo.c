@@ -84,7 +84,7 @@ static void apply(node_t *node, const node_pdo_t *pdo)
     }
 }
 
-static void receive(node_t *node, node_pdo_t *pdo, uint32_t number, const node_frame_t *frame)
+static void receive_one(node_t *node, node_pdo_t *pdo, uint32_t number, const node_frame_t *frame)
 {
     if (frame->length < pdo->length) {
         node_error(node, NODE_ERROR_LENGTH, CODE_SHORT, number);
@@ -92,7 +92,7 @@ static void receive(node_t *node, node_pdo_t *pdo, uint32_t number, const node_f
     }
     node_error(node, NODE_ERROR_LENGTH, frame->length > pdo->length ? (uint16_t)CODE_LONG : 0U, number);
     node_error(node, NODE_ERROR_RPDO, 0, number);
-    memcpy(pdo->data, frame->data, sizeof pdo->data);
+    (void)memcpy(pdo->data, frame->data, sizeof pdo->data);
     pdo->last_us = node->now_us;
     pdo->timed = true;
     if (pdo->type < TYPE_EVENT) {
@@ -106,7 +106,7 @@ void pdo_receive(node_t *node, const node_frame_t *frame)
 {
     for (uint32_t n = 0; n < (uint32_t)NODE_PDOS; n++) {
         if (node->rpdo[n].id == frame->id && frame->id != 0U) {
-            receive(node, &node->rpdo[n], n + 1U, frame);
+            receive_one(node, &node->rpdo[n], n + 1U, frame);
         }
     }
 }

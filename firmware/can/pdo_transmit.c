@@ -9,7 +9,7 @@
 static void collect(node_t *node, const node_pdo_t *pdo, uint8_t data[8])
 {
     uint32_t at = 0;
-    memset(data, 0, 8);
+    (void)memset(data, 0, 8);
     for (uint32_t n = 0; n < pdo->count; n++) {
         const od_entry_t *entry = &od_table[pdo->row[n]];
         const uint32_t size = od_size(entry);
@@ -22,7 +22,7 @@ static void transmit(node_t *node, node_pdo_t *pdo)
 {
     node_frame_t frame = {.id = pdo->id, .length = pdo->length};
     collect(node, pdo, frame.data);
-    memcpy(pdo->data, frame.data, sizeof pdo->data);
+    (void)memcpy(pdo->data, frame.data, sizeof pdo->data);
     pdo->last_us = node->now_us;
     pdo->timed = true;
     pdo->waiting = false;

@@ -18,6 +18,7 @@ enum {
 #define TOGGLE     0x10U
 
 #define SERVER_UPLOAD           0x40U
+#define SERVER_EXPEDITED        0x43U /* upload, size told */
 #define SERVER_DOWNLOAD         0x60U
 #define SERVER_DOWNLOAD_SEGMENT 0x20U
 #define SERVER_ABORT            0x80U
@@ -27,7 +28,7 @@ enum {
 void sdo_reply(node_t *node, const uint8_t reply[8])
 {
     node_frame_t frame = {.id = (uint16_t)(ID_REPLY + node->id), .length = 8};
-    memcpy(frame.data, reply, sizeof frame.data);
+    (void)memcpy(frame.data, reply, sizeof frame.data);
     (void)node_send(node, &frame);
 }
 
@@ -54,7 +55,7 @@ static uint32_t begin(node_t *node, const uint8_t request[8])
 {
     node_sdo_t *sdo = &node->sdo;
     *sdo = (node_sdo_t){.state = SDO_IDLE, .last_us = node->now_us};
-    memcpy(sdo->object, &request[1], sizeof sdo->object);
+    (void)memcpy(sdo->object, &request[1], sizeof sdo->object);
     return object_find((uint16_t)le_get(&request[1], 2), request[3], &sdo->entry);
 }
 
@@ -84,9 +85,9 @@ void sdo_fetch(const node_t *node, uint32_t position, uint8_t bytes[], uint32_t 
 {
     const node_sdo_t *sdo = &node->sdo;
     if (is_number(sdo->entry)) {
-        memcpy(bytes, &sdo->number[position], count);
+        (void)memcpy(bytes, &sdo->number[position], count);
     } else if (sdo->entry->kind == (uint8_t)OD_CONSTANT) {
-        memcpy(bytes, &od_bytes[sdo->entry->slot].bytes[position], count);
+        (void)memcpy(bytes, &od_bytes[sdo->entry->slot].bytes[position], count);
     } else {
         node->host->read(node->context, sdo->entry, position, bytes, count);
     }
@@ -102,7 +103,8 @@ static void upload(node_t *node, const uint8_t request[8])
         uint8_t bytes[4] = {0};
         sdo_fetch(node, 0, bytes, sdo->size);
         const uint32_t unused = 4U - sdo->size;
-        reply_about(node, (uint8_t)(SERVER_UPLOAD | EXPEDITED | SIZED | (unused << 2)), le_get(bytes, 4));
+        const uint32_t command = SERVER_EXPEDITED | (unused << 2);
+        reply_about(node, (uint8_t)command, le_get(bytes, 4));
     } else {
         sdo->state = SDO_UPLOAD;
         reply_about(node, SERVER_UPLOAD | SIZED, sdo->size);
@@ -171,7 +173,7 @@ uint32_t sdo_deliver(node_t *node, const uint8_t bytes[], uint32_t count, bool l
     if (!is_number(sdo->entry)) {
         return node->host->write(node->context, sdo->entry, at, bytes, count, last);
     }
-    memcpy(&sdo->number[at], bytes, count);
+    (void)memcpy(&sdo->number[at], bytes, count);
     return last ? object_put(node, sdo->entry, object_from_bytes(sdo->entry, sdo->number)) : SDO_OK;
 }
 

@@ -56,7 +56,7 @@ static uint32_t begin_upload(node_t *node, const uint8_t request[8])
     sdo->with_crc = (request[0] & WITH_CRC) != 0U;
     sdo->state = SDO_BLOCK_UPLOAD_BEGIN;
     uint8_t reply[8] = {BEGIN_REPLY | WITH_CRC | WITH_SIZE};
-    memcpy(&reply[1], sdo->object, sizeof sdo->object);
+    (void)memcpy(&reply[1], sdo->object, sizeof sdo->object);
     le_put(&reply[4], 4, sdo->size);
     sdo_reply(node, reply);
     return SDO_OK;
@@ -161,7 +161,7 @@ static uint32_t begin_download(node_t *node, const uint8_t request[8])
     sdo->block = BLOCK_MOST;
     sdo->state = SDO_BLOCK_DOWNLOAD;
     uint8_t reply[8] = {0xA0U | WITH_CRC};
-    memcpy(&reply[1], sdo->object, sizeof sdo->object);
+    (void)memcpy(&reply[1], sdo->object, sizeof sdo->object);
     reply[4] = BLOCK_MOST;
     sdo_reply(node, reply);
     return SDO_OK;
@@ -187,7 +187,7 @@ static uint32_t receive_segment(node_t *node, const uint8_t segment[8])
         if (sdo->held_count > 0U) {
             code = deliver_held(node, sdo->held_count, false);
         }
-        memcpy(sdo->held, &segment[1], SEGMENT);
+        (void)memcpy(sdo->held, &segment[1], SEGMENT);
         sdo->held_count = SEGMENT;
         sdo->sequence = (uint8_t)sequence;
         sdo->complete = last;
