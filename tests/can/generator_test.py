@@ -9,6 +9,7 @@ import sys
 import tempfile
 import unittest
 from pathlib import Path
+from random import Random
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
@@ -125,6 +126,10 @@ class Refusals(unittest.TestCase):
     def test_help_of_two_lines(self):
         self.member("help: pole pairs", 'help: "pole\\npairs"', "help must be one line")
 
+    def test_text_that_is_not_ascii(self):
+        self.member("help: pole pairs", "help: pôle pairs", "only printable ASCII")
+        self.member('unit: "1"', 'unit: "\\\""', "only printable ASCII")
+
     def test_value_out_of_range(self):
         self.member("preset: 3", "preset: 3, values: {3: three, 51: many}", "value 51 is outside")
 
@@ -217,6 +222,42 @@ class Refusals(unittest.TestCase):
             (project.root / generate.SOURCE).unlink()
             with self.assertRaisesRegex(SourceError, "parameters.yaml: "):
                 generate.files(project.root)
+
+
+class Mutations(unittest.TestCase):
+    """Whatever is typed, the answer is files or a refusal that names the file; never another error."""
+
+    PIECES = ("{", "}", "[", "]", ": ", "- ", "#", '"', "0x", "-1", "~", "&a ", "*a ", "1e9", "\t", "é", "...", "---",
+              "$NODEID + ", "$x", "<<: ", "99999999999999999999", "? ", "\\")
+
+    def mutate(self, random, text):
+        at = random.randrange(len(text))
+        kind = random.randrange(4)
+        if kind == 0:
+            return text[:at] + random.choice(self.PIECES) + text[at:]
+        if kind == 1:
+            return text[:at] + text[at + random.randint(1, 30) :]
+        if kind == 2:
+            return text[:at] + chr(random.randrange(32, 127)) + text[at + 1 :]
+        lines = text.split("\n")
+        lines[random.randrange(len(lines))] = random.choice(lines)
+        return "\n".join(lines)
+
+    def test_mutations(self):
+        random = Random(402)
+        refused = 0
+        with Project() as project:
+            for _ in range(150):
+                text = GOOD
+                for _ in range(random.randint(1, 3)):
+                    text = self.mutate(random, text)
+                (project.root / generate.SOURCE).write_text(text, encoding="utf-8")
+                try:
+                    generate.files(project.root)
+                except SourceError as error:
+                    refused += 1
+                    self.assertRegex(str(error), r"(parameters\.yaml|allocations\.txt)(:\d+)?: ")
+        self.assertGreater(refused, 75)
 
 
 class Ledger(unittest.TestCase):

@@ -136,11 +136,17 @@ class Dictionary:
         return next((entry for entry in self.entries if entry.name == name), None)
 
 
+TEXT = re.compile(r"[ !#-\[\]-~]*")  # ASCII without quote and backslash: it goes into C, EDS, DBC and Python alike
+
+
 def check(entry):
     """The rules of a single entry."""
     _, bits, lowest, highest = TYPES[entry.type]
     if not entry.help or "\n" in entry.help:
         raise entry.error("help must be one line of text")
+    for text in (entry.help.replace('"', ""), entry.unit, entry.text, *entry.values.values()):
+        if not TEXT.fullmatch(text):
+            raise entry.error(f"only printable ASCII without backslash is possible in texts, quotes in help alone: {text}")
     if entry.book and not (BOOK.fullmatch(entry.book) and 1 <= int(BOOK.fullmatch(entry.book)[3]) <= ROWS):
         raise entry.error(f'book is section and row, as in "5.2.2.2 #51"; not `{entry.book}`')
     if not -9 <= entry.exp10 <= 9:
@@ -197,7 +203,7 @@ def link_alias(dictionary):
             target = dictionary.named(entry.alias)
             if target is None or target.lives != "parameter":
                 raise entry.error(f"no parameter `{entry.alias}` to be another name for")
-            if target.least < TYPES[entry.type][2]:
+            if target.least is None or target.least < TYPES[entry.type][2]:
                 raise entry.error(f"{entry.type} cannot hold all values of `{entry.alias}`")
             entry.unit, entry.exp10 = target.unit, target.exp10
             entry.least, entry.most, entry.preset = target.least, target.most, target.preset

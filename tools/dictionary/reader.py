@@ -123,7 +123,7 @@ def _device(root):
         raise table.error("default_node_id is 1 to 127", "default_node_id")
     device["eds_format"] = EDS_FORMAT
     device["version"] = f"{device['revision'] // 0x10000}.{device['revision'] % 0x10000}"
-    return {**device, "vendor": table.text("vendor"), "product": table.text("product")}
+    return {**device, "vendor": _plain(table, "vendor"), "product": _plain(table, "product")}
 
 
 def _faults(root, fault_file):
@@ -141,10 +141,17 @@ def _faults(root, fault_file):
         code, bit = table.integer("code"), table.integer("register")
         if not 0x1000 <= code <= 0xFFFF or not 0 <= bit <= 7:
             raise table.error("code is 1000h to FFFFh and register a bit, 0 to 7")
-        faults.append(model.Fault(name, known[len(faults)][1], code, bit, table.text("do")))
+        faults.append(model.Fault(name, known[len(faults)][1], code, bit, _plain(table, "do")))
     if len(faults) < len(known):
         raise root.error(f"fault.def has `{known[len(faults)][0]}`, which is not here", "faults")
     return faults
+
+
+def _plain(table, key):
+    text = table.text(key)
+    if not model.TEXT.fullmatch(text):
+        raise table.error(f"only printable ASCII without quotes and backslash is possible in `{key}`", key)
+    return text
 
 
 def _errors(root):
@@ -153,7 +160,7 @@ def _errors(root):
         table.only(("code", "text"))
         if table.integer("code") in errors:
             raise table.error("the code stands twice", "code")
-        errors[table.integer("code")] = table.text("text")
+        errors[table.integer("code")] = _plain(table, "text")
     return errors
 
 

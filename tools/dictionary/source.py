@@ -5,6 +5,9 @@ Scalars are read as what the reader asks for, not as YAML guesses: `access: off`
 import yaml
 
 
+LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same rules, ten times as fast, where it is there
+
+
 class SourceError(Exception):
     """Something in the source is wrong; the text begins with file:line."""
 
@@ -113,7 +116,7 @@ def load(path, shown=None):
     name = str(shown or path)
     try:
         with open(path, encoding="utf-8") as file:
-            root = yaml.compose(file, Loader=yaml.SafeLoader)
+            root = yaml.compose(file, Loader=LOADER)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = f":{mark.line + 1}" if mark else ""
