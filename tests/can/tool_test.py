@@ -362,7 +362,7 @@ class Trace(Bench):
         self.assertIn("cannot be recorded", self.command("trace", "R_s", code=2)[1])
         self.assertIn("not among the signals", self.command("trace", "i_d", "--trigger", "i_q", code=2)[1])
         self.assertIn("1 to 8", self.command("trace", *["i_d"] * 9, code=2)[1])
-        self.assertIn("neither .csv nor .png", self.command("trace", "i_d", "--out", "x.mat", code=2)[1])
+        self.assertIn("neither .csv, .png nor .mf4", self.command("trace", "i_d", "--out", "x.mat", code=2)[1])
 
     def test_never_triggered(self):
         self.node._trace = lambda command: None

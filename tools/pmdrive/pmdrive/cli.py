@@ -76,7 +76,7 @@ def parser():
     sub.add_argument("--level", help="with a unit if you like")
     sub.add_argument("--edge", default="rising", choices=("rising", "falling", "both"))
     sub.add_argument("--wait", type=float, default=10.0, help="seconds (%(default)s)")
-    sub.add_argument("--out", default="trace.csv", help=".csv or .png (%(default)s)")
+    sub.add_argument("--out", default="trace.csv", help=".csv, .png or .mf4 (%(default)s)")
     sub = add("eds", "the data sheet that the drive holds", commands.eds)
     sub.add_argument("--out", help="file (standard output)")
     add("shell", "commands without `pmdrive`, with completion, over one connection", commands.shell)

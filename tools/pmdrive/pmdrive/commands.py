@@ -232,13 +232,12 @@ def stop(_, drive, out):
 
 def trace(arguments, drive, out):
     path = arguments.out
-    if not path.endswith((".csv", ".png")):
-        raise UsageError(f"`{path}` is neither .csv nor .png")
+    scope.check_path(path)
     entries = scope.set_up(drive, arguments.signals, arguments.divider, arguments.pre, arguments.trigger,
                            arguments.level, arguments.edge)
     scope.record(drive, arguments.wait, out.progress)
     recording = scope.fetch(drive, entries)
-    (recording.write_csv if path.endswith(".csv") else recording.write_png)(path)
+    recording.write(path)
     out.data({"file": path, "samples": len(recording.time_s), "signals": [e.name for e in entries]})
     out.line(f"wrote {path}: {len(recording.time_s)} samples of {', '.join(e.name for e in entries)}")
 

@@ -50,6 +50,32 @@ class Recording:
         pyplot.close(figure)
 
 
+    def write_mf4(self, path):
+        try:
+            import numpy
+            from asammdf import MDF, Signal
+        except ImportError:
+            raise UsageError("an MDF4 file needs asammdf", "pip install 'pmdrive[mdf]'") from None
+        with MDF(version="4.10") as file:
+            time_s = numpy.array(self.time_s)
+            file.append([Signal(numpy.array(column), time_s, name=entry.name, unit=entry.unit, comment=entry.help)
+                         for entry, column in zip(self.entries, self.columns)])
+            file.save(path, overwrite=True)
+
+    def write(self, path):
+        """In the format that the name ends with."""
+        writers = {".csv": self.write_csv, ".png": self.write_png, ".mf4": self.write_mf4}
+        writers[check_path(path)](path)
+
+
+def check_path(path):
+    """The end of a file's name, if it can be written."""
+    for end in (".csv", ".png", ".mf4"):
+        if str(path).endswith(end):
+            return end
+    raise UsageError(f"`{path}` is neither .csv, .png nor .mf4")
+
+
 def set_up(drive: Drive, signals, divider=1, pre=0.1, trigger=None, level=None, edge="rising"):
     """The signals by name; a trigger by the name of one of them and its level, as users write it."""
     entries = [names.find(name) for name in signals]
