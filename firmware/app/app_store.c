@@ -94,10 +94,12 @@ static void put_words(sink_t *sink, const uint32_t words[], uint32_t count)
 {
     if (sink->hal != NULL) {
         sink->good = sink->good && hal_store_write(sink->hal, sink->page, 4U * sink->at, words, 4U * count);
-    } else {
+    } else if (sink->memory != NULL) {
         for (uint32_t n = 0; n < count; n++) {
             sink->memory[sink->at + n] = words[n];
         }
+    } else {
+        sink->good = false;
     }
     sink->at += count;
 }
@@ -194,7 +196,8 @@ static bool write_page(hal_t *hal, selection_t *selection)
 uint32_t app_page(const drive_params_t *params, uint32_t sequence, uint32_t words[])
 {
     const selection_t selection = {.params = params, .group = NODE_GROUP_ALL, .keep = true};
-    sink_t sink = {.memory = words, .good = true};
+    sink_t sink = {.good = true};
+    sink.memory = words;
     make_page(&selection, sequence, &sink);
     return sink.at;
 }

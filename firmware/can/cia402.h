@@ -45,7 +45,7 @@ typedef struct {
     bool enable;
     bool coast; /* when not enabled: the bridge opens at once; else the drive stops first */
     bool clear_fault;
-    int8_t mode;
+    int16_t mode;
     int32_t velocity; /* mrad/s */
     int32_t torque;   /* permille of the rated torque */
     int32_t current;  /* mA */
@@ -56,7 +56,7 @@ typedef struct {
     uint16_t controlword, seen; /* as given, and as at the last step */
     bool clearing;              /* the fault may go */
     bool coast;
-    int8_t mode, active_mode;
+    int16_t mode, active_mode;
     int16_t quick_stop_option, shutdown_option, disable_option;
     uint16_t window, threshold; /* mrad/s */
     int32_t target_velocity, target_torque, target_current;

@@ -67,7 +67,7 @@ static uint32_t put_mode(cia402_t *self, int32_t value)
         value != CIA402_MODE_TORQUE) {
         return INVALID;
     }
-    self->mode = (int8_t)value;
+    self->mode = (int16_t)value;
     return OK;
 }
 

@@ -124,6 +124,22 @@ static void configure(node_t *node, const uint8_t data[8])
     reply(node, command, result);
 }
 
+/* For the one that is being configured */
+static void receive_configuring(node_t *node, const uint8_t data[8])
+{
+    const uint8_t command = data[0];
+    if (command >= (uint8_t)LSS_INQUIRE_FIRST && command <= (uint8_t)LSS_INQUIRE_LAST) {
+        reply(node, command, identity(node, (uint32_t)command - (uint32_t)LSS_INQUIRE_FIRST));
+    } else if (command == (uint8_t)LSS_INQUIRE_ID) {
+        reply(node, command, node->id);
+    } else if (command == (uint8_t)LSS_CONFIGURE_ID || command == (uint8_t)LSS_CONFIGURE_RATE ||
+               command == (uint8_t)LSS_STORE) {
+        configure(node, data);
+    } else {
+        /* nothing that it knows */
+    }
+}
+
 void lss_receive(node_t *node, const node_frame_t *frame)
 {
     const uint8_t command = frame->data[0];
@@ -140,16 +156,9 @@ void lss_receive(node_t *node, const node_frame_t *frame)
         if (node->id == NODE_NO_ID) {
             reply(node, LSS_IS_UNCONFIGURED, 0);
         }
-    } else if (!node->lss.configuring) {
-        /* for another */
-    } else if (command >= (uint8_t)LSS_INQUIRE_FIRST && command <= (uint8_t)LSS_INQUIRE_LAST) {
-        reply(node, command, identity(node, (uint32_t)command - (uint32_t)LSS_INQUIRE_FIRST));
-    } else if (command == (uint8_t)LSS_INQUIRE_ID) {
-        reply(node, command, node->id);
-    } else if (command == (uint8_t)LSS_CONFIGURE_ID || command == (uint8_t)LSS_CONFIGURE_RATE ||
-               command == (uint8_t)LSS_STORE) {
-        configure(node, frame->data);
+    } else if (node->lss.configuring) {
+        receive_configuring(node, frame->data);
     } else {
-        /* nothing that it knows */
+        /* for another */
     }
 }

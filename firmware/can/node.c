@@ -149,6 +149,18 @@ static void nmt_receive(node_t *node, const node_frame_t *frame)
     }
 }
 
+static void process_data(node_t *node, const node_frame_t *frame)
+{
+    if (node->nmt != NODE_OPERATIONAL) {
+        return;
+    }
+    if (frame->id == node->sync_id) {
+        pdo_sync(node);
+    } else {
+        pdo_receive(node, frame);
+    }
+}
+
 void node_receive(node_t *node, const node_frame_t *frame, uint32_t now_us)
 {
     node->now_us = now_us;
@@ -157,9 +169,12 @@ void node_receive(node_t *node, const node_frame_t *frame, uint32_t now_us)
     }
     if (frame->id == ID_LSS) {
         lss_receive(node, frame);
-    } else if (node->nmt == NODE_INITIALISING) {
-        /* no node id, so nothing is for it */
-    } else if (frame->id == ID_NMT) {
+        return;
+    }
+    if (node->nmt == NODE_INITIALISING) {
+        return; /* no node id, so nothing is for it */
+    }
+    if (frame->id == ID_NMT) {
         nmt_receive(node, frame);
     } else if (frame->id == ID_SDO + node->id) {
         if (frame->length == 8U && node->nmt != NODE_STOPPED) {
@@ -167,12 +182,8 @@ void node_receive(node_t *node, const node_frame_t *frame, uint32_t now_us)
         }
     } else if (frame->id > ID_HEARTBEAT && frame->id <= ID_HEARTBEAT + 127U) {
         heartbeat_receive(node, frame);
-    } else if (node->nmt != NODE_OPERATIONAL) {
-        /* no process data */
-    } else if (frame->id == node->sync_id) {
-        pdo_sync(node);
     } else {
-        pdo_receive(node, frame);
+        process_data(node, frame);
     }
 }
 

@@ -80,8 +80,15 @@ int32_t object_from_bytes(const od_entry_t *entry, const uint8_t bytes[])
 {
     const uint32_t size = od_size(entry);
     const uint32_t value = le_get(bytes, size);
-    const uint32_t sign = 1UL << (8U * size - 1U);
-    return (int32_t)((is_signed(entry) && size < 4U) ? (value ^ sign) - sign : value);
+    uint32_t sign = 0;
+    if (entry->type == (uint8_t)OD_I8) {
+        sign = 0x80;
+    } else if (entry->type == (uint8_t)OD_I16) {
+        sign = 0x8000;
+    } else {
+        /* 32 bits, or no sign */
+    }
+    return (int32_t)((value ^ sign) - sign);
 }
 
 static uint32_t check_range(const od_entry_t *entry, int32_t value)

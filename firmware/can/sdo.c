@@ -124,12 +124,13 @@ static void upload_segment(node_t *node, const uint8_t request[8])
     }
     const uint32_t left = sdo->size - sdo->position;
     const uint32_t count = left < 7U ? left : 7U;
-    const uint32_t last = left <= 7U ? 1U : 0U;
-    uint8_t reply[8] = {(uint8_t)(sdo->toggle | ((7U - count) << 1) | last)};
+    const bool last = left <= 7U;
+    const uint32_t unused = 7U - count;
+    uint8_t reply[8] = {(uint8_t)(sdo->toggle | (unused << 1) | (last ? 1U : 0U))};
     sdo_fetch(node, sdo->position, &reply[1], count);
     sdo->position += count;
     sdo->toggle ^= TOGGLE;
-    if (last != 0U) {
+    if (last) {
         sdo->state = SDO_IDLE;
     }
     sdo_reply(node, reply);

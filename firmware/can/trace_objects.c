@@ -15,13 +15,13 @@ void trace_init(trace_t *trace, int16_t ring[], uint32_t length, trace_find_t fi
 {
     *trace = (trace_t){
         .state = TRACE_OFF,
-        .ring = ring,
         .size = length,
         .find = find,
         .context = context,
         .set_divider = 1,
         .pretrigger = 100,
     };
+    trace->ring = ring;
 }
 
 static uint32_t length_of(const trace_t *trace)

@@ -320,6 +320,51 @@ TEST(Bus, LoadOfOthersLeavesTheNodeAlone)
     EXPECT_EQ(node_nmt(&x.node), NODE_OPERATIONAL);
 }
 
+// Frames of no sense to every service, in any order; afterwards it is a node like any other.
+TEST(Bus, GarbageDoesNoHarm)
+{
+    Bench x(5);
+    uint32_t state = 1;
+    const auto random = [&] {
+        state = state * 1664525U + 1013904223U;
+        return state >> 8;
+    };
+    const uint16_t indices[] = {0x1003, 0x1005, 0x1008, 0x1010, 0x1014, 0x1016, 0x1017,
+                                0x1021, 0x1400, 0x1600, 0x1800, 0x1A00, 0x1A03, 0x2100,
+                                0x3100, 0x3103, 0x6040, 0x6060, 0x60FF};
+    const uint16_t ids[] = {0x605, 0x605, 0x605, 0x605, 0x205, 0x305, 0x080, 0x77F, 0x705};
+    for (int n = 0; n < 1000000; ++n) {
+        node_frame_t frame = {uint16_t(n % 50 == 0 ? random() % 0x800 : ids[random() % 9]), 8, {}};
+        frame.length = uint8_t(random() % 5 == 0 ? random() % 16 : 8);
+        for (uint8_t &byte : frame.data) {
+            byte = uint8_t(random());
+        }
+        if (random() % 3 != 0) { // something that exists
+            const uint16_t index = indices[random() % 19];
+            frame.data[1] = uint8_t(index & 0xFF);
+            frame.data[2] = uint8_t(index >> 8);
+            frame.data[3] = uint8_t(random() % 9);
+        }
+        if (frame.id == 0x7E5 || (frame.id == 0 && frame.data[0] > 2)) {
+            continue; // these would take it away rightly
+        }
+        x.domain.resize(random() % 50);
+        node_receive(&x.node, &frame, x.now);
+        if (n % 20 == 0) {
+            x.run_ms(1);
+            x.sent.clear();
+            x.taken.clear();
+            x.received.clear();
+        }
+    }
+    x.on = false;
+    x.stored = {{{0x2080, 1}, 5}};
+    x.sent.clear();
+    x.nmt(130, 0);
+    EXPECT_EQ(x.value(0x1000), 0x00020192U);
+    EXPECT_EQ(x.value(0x1017), 500U);
+}
+
 // --- LSS
 
 class Lss : public Bench

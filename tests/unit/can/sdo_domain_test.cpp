@@ -85,7 +85,7 @@ uint32_t block(Bench &x, const Bytes &data, uint32_t told, int lost, uint16_t cr
 
 TEST(SdoDomain, SegmentedDownload)
 {
-    for (const size_t size : {1, 6, 7, 8, 14, 500}) {
+    for (const size_t size : std::vector<size_t>{1, 6, 7, 8, 14, 500}) {
         Bench x(5);
         const Bytes data = pattern(size);
         EXPECT_EQ(segmented(x, data, true, uint32_t(size)), 0U);
@@ -113,7 +113,7 @@ TEST(SdoDomain, ExpeditedDownload)
 
 TEST(SdoDomain, BlockDownloadOfEveryLength)
 {
-    for (const size_t size : {1, 6, 7, 8, 14, 15, 888, 889, 890, 896, 5000}) {
+    for (const size_t size : std::vector<size_t>{1, 6, 7, 8, 14, 15, 888, 889, 890, 896, 5000}) {
         Bench x(5);
         const Bytes data = pattern(size);
         EXPECT_EQ(block(x, data, uint32_t(size), -1), 0U) << size;

@@ -342,11 +342,11 @@ TEST(SdoBlock, CrcIsTheCommonOne)
 TEST(SdoBlock, UploadsEveryLength)
 {
     Bench x;
-    for (const size_t size : {1, 2, 6, 7, 8, 13, 14, 15, 100, 888, 889, 890, 896, 8000}) {
-        for (const int block : {1, 2, 4, 127}) {
+    for (const size_t size : std::vector<size_t>{1, 2, 6, 7, 8, 13, 14, 15, 100, 888, 889, 890, 896, 8000}) {
+        for (const size_t block : std::vector<size_t>{1, 2, 4, 127}) {
             x.domain = some_bytes(size);
             const BlockUpload got = block_upload(x, 0x1009, uint8_t(block), [](int) { return false; });
-            EXPECT_EQ(got.data, x.domain) << size << " " << int(block);
+            EXPECT_EQ(got.data, x.domain) << size << " " << block;
             EXPECT_EQ(got.blocks, int((size + 7 * block - 1) / (7 * block)));
         }
     }
