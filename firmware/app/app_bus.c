@@ -272,7 +272,8 @@ void app_bus_init(app_t *app)
     cia402_init(&app->cia402);
     app_recall(app, OD_LIVE);
     trace_init(&app->trace, app->trace_ring, APP_TRACE_NUMBERS, app_traceable, app);
-    app->given = (cia402_out_t){.mode = CIA402_MODE_NONE};
+    const cia402_in_t facts = app_drive_facts(app);
+    app->given = cia402_step(&app->cia402, &facts); /* nothing that the drive does not do already */
     node_init(&app->node, &host, app, id[0] ^ id[1] ^ id[2], hal_time_us(app->hal));
 }
 

@@ -1,5 +1,6 @@
 // Frames of any kind to node, drive profile and trace, with time, loads of the bus and faults in between.
 // Input: records of one operation byte and what it needs; the first byte of all chooses the node id.
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 
@@ -47,6 +48,18 @@ class Input
     const uint8_t *data_;
     size_t left_;
 };
+
+// Says at the end of a run how much it was.
+struct Frames {
+    unsigned long long count = 0;
+
+    ~Frames()
+    {
+        std::fprintf(stderr, "stat::frames:                   %llu\n", count);
+    }
+};
+
+Frames frames;
 
 void demand(bool holds)
 {
@@ -194,6 +207,7 @@ void give(Device &d, uint16_t id, uint8_t length, Input &input)
         frame.data[n] = input.byte();
     }
     node_receive(&d.node, &frame, d.now_us);
+    ++frames.count;
 }
 
 void step(Device &d)

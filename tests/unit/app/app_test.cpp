@@ -166,6 +166,19 @@ TEST(App, BreakInputAndItsClearing)
     EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
 }
 
+// A rig that commands the drive itself is not overruled by a bus on which nobody speaks.
+TEST(App, WithoutAMasterTheDriveIsLeftAlone)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    const drive_command_t command = {true, DRIVE_MODE_SPEED, 30000, 0, 0, false};
+    drive_command(&x.loop.app.drive, &command);
+    x.run_ms(700);
+    EXPECT_EQ(std::memcmp(&x.loop.app.drive.command, &command, sizeof command), 0);
+    EXPECT_EQ(x.loop.app.drive.state, DRIVE_RUNNING);
+}
+
 TEST(App, MissingTemperatureSensorIsAFault)
 {
     Bench x;
