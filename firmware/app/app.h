@@ -57,7 +57,7 @@ struct app {
     bool hardware;             /* configured: control interrupts come */
 
     /* parameters */
-    hal_config_t hal_config;     /* that the hardware runs with */
+    hal_config_t hal_config; /* that the hardware runs with */
     int32_t f_pwm;
     drive_params_t params;       /* the shadow set */
     drive_params_t before_batch; /* while one is open */
