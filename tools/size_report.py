@@ -25,6 +25,7 @@ MODULES = {
     "pm_drive": "firmware/drive",
     "pm_params": "firmware/params",
     "pm_app": "firmware/app",
+    "pm_can": "firmware/can",
 }
 KINDS = ("code", "rodata", "data", "bss")
 # RISC-V keeps what is small apart, in sections of their own.

@@ -1,6 +1,9 @@
 #include "firmware/app/app.h"
 
 #include <stddef.h>
+#include <string.h>
+
+#include "firmware/app/app_parts.h"
 
 /* The main loop is dead when a round takes longer. */
 #define TURN_MS 100U
@@ -17,14 +20,23 @@ static uint16_t break_level(const drive_params_t *params)
     return (level > 0 && level < 32768) ? (uint16_t)level : 0U;
 }
 
-static hal_config_t hal_config_of(const drive_params_t *params)
+hal_config_t app_hal_config(const drive_params_t *params, uint16_t can_kbit_s)
 {
     return (hal_config_t){
         .timer_counts = (uint16_t)params->timer_counts,
         .dead_time_ns = (uint16_t)params->dead_time,
         .break_level = break_level(params),
-        .can_kbit_s = 500,
+        .can_kbit_s = can_kbit_s,
     };
+}
+
+static uint16_t bit_rate(const hal_t *hal)
+{
+    bool has_index;
+    const od_entry_t *entry = od_find(0x2080, 2, &has_index);
+    int32_t kbit_s = entry->preset;
+    (void)app_stored_value(hal, entry->index, entry->sub, &kbit_s);
+    return (uint16_t)kbit_s;
 }
 
 /* The carrier's frequency is what the timer makes of its counts. */
@@ -35,20 +47,41 @@ static bool carrier_agrees(const hal_t *hal, const drive_params_t *params)
     return (off < 0 ? -off : off) <= (int64_t)2 * params->f_pwm;
 }
 
+app_ready_t app_ready(const app_t *app)
+{
+    if (app->batch) {
+        return APP_BATCH;
+    }
+    if (app->refused || !app->hardware) {
+        return APP_REFUSED;
+    }
+    if (app->restart) {
+        return APP_RESTART;
+    }
+    return app->stored ? APP_READY : APP_NOT_STORED;
+}
+
 drive_result_t app_configure(app_t *app, hal_t *hal, const drive_params_t *params, bool stored)
 {
-    *app = (app_t){.hal = hal, .slow_divider = 1, .slow_countdown = 1};
+    (void)memset(app, 0, sizeof *app);
+    app->hal = hal;
+    app->slow_divider = 1;
+    app->slow_countdown = 1;
+    app->params = *params;
+    app->f_pwm = params->f_pwm;
+    app->stored = stored;
     const drive_result_t result = drive_init(&app->drive, params);
-    const hal_config_t config = hal_config_of(params);
-    app->hardware = hal_init(hal, &config) == HAL_OK;
-    app->ready = stored && app->hardware;
+    app->refused_param = result.param;
+    app->hal_config = app_hal_config(params, bit_rate(hal));
+    app->hardware = hal_init(hal, &app->hal_config) == HAL_OK;
+    app->refused = !result.ok || (app->hardware && !carrier_agrees(hal, params));
     if (result.ok) {
         app->slow_divider = app->drive.config.slow_divider;
-        if (!app->ready || !carrier_agrees(hal, params)) {
-            app->ready = false;
+        if (app_ready(app) != APP_READY) {
             drive_trip(&app->drive, DRIVE_FAULT_PARAMETERS);
         }
     }
+    app_bus_init(app);
     return result;
 }
 
@@ -60,6 +93,7 @@ void app_control(app_t *app)
     }
     drive_step(&app->drive, &app->in, &app->out);
     hal_bridge_write(app->hal, &app->out);
+    trace_sample(&app->trace);
     app->periods++;
     app->slow_countdown--;
     if (app->slow_countdown == 0U) {
@@ -71,6 +105,7 @@ void app_control(app_t *app)
 
 void app_slow(app_t *app)
 {
+    app_take_parameters(app);
     hal_measure_slow(app->hal, &app->slow);
     if (app->slow.temperature_missing) {
         drive_trip(&app->drive, DRIVE_FAULT_TEMPERATURE_SENSOR);
@@ -97,42 +132,11 @@ void app_monitor(app_t *app)
     }
 }
 
-static void take_frames(app_t *app)
-{
-    hal_can_frame_t frame;
-    while (hal_can_receive(app->hal, &frame)) {
-        const remote_event_t event = remote_take(&app->remote, &frame, hal_time_us(app->hal));
-        if (event == REMOTE_NOTHING) {
-            continue;
-        }
-        hal_lock(app->hal);
-        drive_command(&app->drive, &app->remote.command);
-        if (event == REMOTE_CLEAR) {
-            (void)drive_clear_fault(&app->drive);
-        }
-        hal_unlock(app->hal);
-    }
-}
-
-static void trip(app_t *app, drive_fault_t fault)
+void app_trip(app_t *app, drive_fault_t fault)
 {
     hal_lock(app->hal);
     drive_trip(&app->drive, fault);
     hal_unlock(app->hal);
-}
-
-static void watch(app_t *app)
-{
-    const uint32_t now_us = hal_time_us(app->hal);
-    if (remote_lost(&app->remote, now_us) || hal_can_state(app->hal) == HAL_CAN_BUS_OFF) {
-        if (app->remote.command.enable) {
-            app->remote.command.enable = false;
-            trip(app, DRIVE_FAULT_REMOTE_LOST);
-        }
-    }
-    if (app->stalled) {
-        trip(app, DRIVE_FAULT_OVERRUN);
-    }
 }
 
 /* The bridge follows the state; a fault leaves it off. */
@@ -140,10 +144,10 @@ static void follow_state(app_t *app)
 {
     const drive_state_t state = app->drive.state;
     const bool wanted = state != DRIVE_OFF && state != DRIVE_FAULT && app->drive.fault == DRIVE_FAULT_NONE;
-    if (!wanted || !app->ready) {
+    if (!wanted || app_ready(app) != APP_READY) {
         hal_bridge_off(app->hal);
     } else if (!hal_bridge_armed(app->hal) && !hal_bridge_arm(app->hal)) {
-        trip(app, DRIVE_FAULT_HARDWARE);
+        app_trip(app, DRIVE_FAULT_HARDWARE);
     } else {
         /* on, as wanted */
     }
@@ -151,15 +155,11 @@ static void follow_state(app_t *app)
 
 static void tell(app_t *app)
 {
-    const drive_status_t *status = drive_status(&app->drive);
-    hal_can_frame_t frame;
-    if (remote_status(&app->remote, status, hal_time_us(app->hal), &frame)) {
-        (void)hal_can_send(app->hal, &frame); /* the next says the same, later */
-    }
-    if (status->fault != app->shown_fault) {
-        app->shown_fault = status->fault;
+    const drive_fault_t fault = app->drive.fault;
+    if (fault != app->shown_fault) {
+        app->shown_fault = fault;
         (void)hal_console(app->hal, "fault: ");
-        (void)hal_console(app->hal, drive_fault_text(status->fault));
+        (void)hal_console(app->hal, drive_fault_text(fault));
         (void)hal_console(app->hal, "\r\n");
     }
     hal_led(app->hal, hal_bridge_armed(app->hal));
@@ -168,8 +168,10 @@ static void tell(app_t *app)
 void app_turn(app_t *app)
 {
     app->turn_age_ms = 0;
-    take_frames(app);
-    watch(app);
+    app_bus_run(app);
+    if (app->stalled) {
+        app_trip(app, DRIVE_FAULT_OVERRUN);
+    }
     follow_state(app);
     tell(app);
 }

@@ -1,20 +1,41 @@
-/* The application: brings drive and hardware together. Everything that is neither motor nor register.
+/* The application: brings drive, hardware and CANopen node together. Everything that is neither motor nor
+ * register.
  *
  * The bridge is on only while the drive wants it, no fault is latched, the control interrupt comes, and the
  * parameters are those that were stored: an image without stored parameters says so and stays off.
  *
  *   app_boot(a, hal)   parameters from the store, hardware, drive; then interrupts run
- *   app_turn(a)        one round of the main loop; never blocks
+ *   app_turn(a)        one round of the main loop; never blocks, but for a store that was asked for
  *   app_control(), app_slow(), app_monitor(): called up by the port (hal.h)
  *
  * drive_slow() runs in app_slow() between two control interrupts and is never interrupted by one: were it
- * still running when the next comes, that is the fault OVERRUN. Tests: tests/unit/app, tests/contract/hal. */
+ * still running when the next comes, that is the fault OVERRUN. There too the drive takes a new set of
+ * parameters, whole.
+ *
+ * Parameters are written to a shadow set, which is what is read back. A write that the drive's configuration
+ * refuses is undone (0604 0043h); of what decides the meaning of the drive's state nothing changes while it
+ * is on (0800 0022h). What the hardware was set up with waits for a restart. Tests: tests/unit/app,
+ * tests/contract/hal. */
 #ifndef APP_APP_H
 #define APP_APP_H
 
-#include "firmware/app/remote.h"
+#include "firmware/can/cia402.h"
+#include "firmware/can/node_state.h"
+#include "firmware/can/trace.h"
 #include "firmware/drive/drive_state.h"
 #include "hal/hal.h"
+
+/* 8 kB: four signals, 20 kHz, 51 ms */
+#define APP_TRACE_NUMBERS 4096U
+
+/* Whether the drive may be switched on: object parameters_ready */
+typedef enum {
+    APP_READY,
+    APP_NOT_STORED,
+    APP_REFUSED, /* by the drive, or the hardware */
+    APP_RESTART, /* the hardware is set up with other values */
+    APP_BATCH,   /* parameters are being written together */
+} app_ready_t;
 
 struct app {
     /* first what an observer of the memory wants to see, without anything whose size differs by machine */
@@ -32,23 +53,41 @@ struct app {
     uint32_t seen_periods;         /* by the monitor */
     volatile uint32_t turn_age_ms; /* since the main loop's last round */
 
-    remote_t remote;
-    drive_fault_t shown_fault; /* on the console */
+    drive_fault_t shown_fault; /* on the console and the bus */
     bool hardware;             /* configured: control interrupts come */
-    bool ready;                /* and the parameters are the user's */
+
+    /* parameters */
+    hal_config_t hal_config; /* that the hardware runs with */
+    int32_t f_pwm;
+    drive_params_t params;       /* the shadow set */
+    drive_params_t before_batch; /* while one is open */
+    drive_config_t next;         /* made from it, for app_slow() to take */
+    volatile bool next_ready;
+    bool stored, refused, restart, batch;
+    drive_param_id_t refused_param; /* that the last check named */
+    uint16_t dropped;               /* stored pairs that this version does not know */
+
+    /* bus */
+    node_t node;
+    cia402_t cia402;
+    cia402_out_t given; /* to the drive */
+    uint16_t alarm;     /* code of the alarm that tripped the drive */
+    uint32_t can_lost, can_lost_us;
+    trace_t trace;
+    int16_t trace_ring[APP_TRACE_NUMBERS];
 };
 
-/* Parameters of the newest valid page over the defaults; false: no page is valid. `unknown` counts the stored
- * names that this version does not have. */
+/* Parameters of the newest valid page over the defaults; false: there are none. `unknown` counts the stored
+ * values that this version does not have. */
 bool app_load(const hal_t *hal, drive_params_t *params, uint32_t *unknown);
 
-/* The page of all parameters, STORE_WORDS; returns the words that are used. */
+/* A page of all parameters, STORE_WORDS; returns the words that are used. */
 uint32_t app_page(const drive_params_t *params, uint32_t sequence, uint32_t words[]);
 
-/* Writes all of them to the older page, with the bridge off; false: not done, the other page still holds. */
+/* The same to the page that is not the newest. False: not done, the old ones remain. */
 bool app_save(hal_t *hal, const drive_params_t *params);
 
-/* Configures drive and hardware, bridge off. When the drive refuses a parameter it is in DRIVE_FAULT; when
+/* Hardware and drive, bridge off. When the drive refuses a parameter it is in DRIVE_FAULT; when
  * the hardware does, or `stored` is false, nothing can be armed. */
 drive_result_t app_configure(app_t *app, hal_t *hal, const drive_params_t *params, bool stored);
 
@@ -57,5 +96,7 @@ extern app_t app_instance;
 
 void app_boot(app_t *app, hal_t *hal);
 void app_turn(app_t *app);
+
+app_ready_t app_ready(const app_t *app);
 
 #endif

@@ -1,23 +1,34 @@
-#include "firmware/app/app.h"
+/* What is kept in flash: all objects that the dictionary marks as stored, by group. */
+#include <stddef.h>
+
+#include "firmware/app/app_parts.h"
 #include "firmware/params/store.h"
 
 _Static_assert(STORE_WORDS * sizeof(uint32_t) <= HAL_STORE_PAGE_SIZE, "a page holds the store");
-_Static_assert((uint32_t)DRIVE_PARAM_COUNT <= STORE_PAIRS_MAX, "the store holds all parameters");
 
 static int32_t newest(const hal_t *hal)
 {
     return store_newest(hal_store_page(hal, 0), hal_store_page(hal, 1));
 }
 
-static bool take(drive_params_t *params, store_pair_t pair)
+static uint32_t id_of(const od_entry_t *entry)
 {
-    for (int32_t id = 0; id < (int32_t)DRIVE_PARAM_COUNT; id++) {
-        if (store_id(drive_param_table[id].name) == pair.id) {
-            drive_param_set(params, (drive_param_id_t)id, pair.value);
-            return true;
-        }
-    }
-    return false;
+    return (uint32_t)entry->index * 256U + entry->sub;
+}
+
+/* NULL: this version does not store it */
+static const od_entry_t *entry_of(uint32_t id)
+{
+    bool has_index;
+    const od_entry_t *entry = od_find((uint16_t)(id >> 8), (uint8_t)(id & 0xFFU), &has_index);
+    const bool stored = id <= 0xFFFFFFU && entry != NULL && (entry->flags & (uint32_t)OD_STORED) != 0U;
+    return stored ? entry : NULL;
+}
+
+bool app_stored_value(const hal_t *hal, uint16_t index, uint8_t sub, int32_t *value)
+{
+    const int32_t page = newest(hal);
+    return page >= 0 && store_find(hal_store_page(hal, (uint32_t)page), (uint32_t)index * 256U + sub, value);
 }
 
 bool app_load(const hal_t *hal, drive_params_t *params, uint32_t *unknown)
@@ -30,35 +41,175 @@ bool app_load(const hal_t *hal, drive_params_t *params, uint32_t *unknown)
     }
     const uint32_t *words = hal_store_page(hal, (uint32_t)page);
     const int32_t count = store_check(words);
+    bool any = false;
     for (int32_t n = 0; n < count; n++) {
-        if (!take(params, store_pair(words, (uint32_t)n))) {
+        const store_pair_t pair = store_pair(words, (uint32_t)n);
+        const od_entry_t *entry = entry_of(pair.id);
+        if (entry == NULL) {
             ++*unknown;
+        } else if (entry->kind == (uint8_t)OD_PARAMETER) {
+            drive_param_set(params, (drive_param_id_t)entry->slot, pair.value);
+            any = true;
+        } else {
+            /* the node's, or the profile's: app_recall() */
         }
     }
-    return true;
+    return any;
+}
+
+void app_recall(app_t *app, od_kind_t kind)
+{
+    const int32_t page = newest(app->hal);
+    if (page < 0) {
+        return;
+    }
+    const uint32_t *words = hal_store_page(app->hal, (uint32_t)page);
+    const int32_t count = store_check(words);
+    for (int32_t n = 0; n < count; n++) {
+        const store_pair_t pair = store_pair(words, (uint32_t)n);
+        const od_entry_t *entry = entry_of(pair.id);
+        uint32_t code;
+        if (entry == NULL || entry->kind != (uint8_t)kind) {
+            continue;
+        }
+        if (kind == OD_NODE) {
+            node_recall(&app->node, entry, pair.value);
+        } else {
+            (void)cia402_put(&app->cia402, entry->slot, pair.value, &code);
+        }
+    }
+}
+
+/* --- writing ----------------------------------------------------------------------------------------- */
+
+/* Where words go: to flash, or with hal NULL to memory. */
+typedef struct {
+    hal_t *hal;
+    uint32_t *memory;
+    uint32_t page, at; /* words written */
+    bool good;
+} sink_t;
+
+static void put_words(sink_t *sink, const uint32_t words[], uint32_t count)
+{
+    if (sink->hal != NULL) {
+        sink->good = sink->good && hal_store_write(sink->hal, sink->page, 4U * sink->at, words, 4U * count);
+    } else if (sink->memory != NULL) {
+        for (uint32_t n = 0; n < count; n++) {
+            sink->memory[sink->at + n] = words[n];
+        }
+    } else {
+        sink->good = false;
+    }
+    sink->at += count;
+}
+
+/* What is to be in the new page: the present values of the groups wanted, and of the others what the old page
+ * has. */
+typedef struct {
+    const app_t *app; /* NULL: parameters alone */
+    const drive_params_t *params;
+    const uint32_t *old; /* NULL: none */
+    uint32_t group;
+    bool keep;
+} selection_t;
+
+static bool in_group(const od_entry_t *entry, uint32_t group)
+{
+    const bool lss = entry->kind == (uint8_t)OD_NODE && (entry->slot == (uint16_t)OD_NODE_CAN_NODE_ID ||
+                                                         entry->slot == (uint16_t)OD_NODE_CAN_BIT_RATE);
+    if (group == NODE_GROUP_LSS) {
+        return lss;
+    }
+    return group == NODE_GROUP_ALL || (uint32_t)entry->group == group;
+}
+
+static int32_t present(const selection_t *selection, const od_entry_t *entry)
+{
+    int32_t value = 0;
+    switch ((od_kind_t)entry->kind) {
+    case OD_PARAMETER:
+        return drive_param_get(selection->params, (drive_param_id_t)entry->slot);
+    case OD_NODE:
+        return node_stored(&selection->app->node, entry);
+    case OD_LIVE:
+    case OD_CONSTANT:
+    default:
+        (void)cia402_get(&selection->app->cia402, entry->slot, &value);
+        return value;
+    }
+}
+
+static bool select_value(const selection_t *selection, const od_entry_t *entry, int32_t *value)
+{
+    const bool known = selection->app != NULL || entry->kind == (uint8_t)OD_PARAMETER;
+    if ((entry->flags & (uint32_t)OD_STORED) == 0U) {
+        return false;
+    }
+    if (!known || !in_group(entry, selection->group)) {
+        return selection->old != NULL && store_find(selection->old, id_of(entry), value);
+    }
+    if (selection->keep) {
+        *value = present(selection, entry);
+    }
+    return selection->keep;
+}
+
+static void make_page(const selection_t *selection, uint32_t sequence, sink_t *sink)
+{
+    store_writer_t writer;
+    uint32_t words[STORE_HEADER];
+    int32_t value;
+    uint32_t count = 0;
+    for (uint32_t row = 0; row < od_count; row++) {
+        count += select_value(selection, &od_table[row], &value) ? 1U : 0U;
+    }
+    store_begin(&writer, sequence, od_schema, count, words);
+    put_words(sink, words, STORE_HEADER);
+    for (uint32_t row = 0; row < od_count && sink->good; row++) {
+        if (select_value(selection, &od_table[row], &value)) {
+            store_put(&writer, (store_pair_t){.id = id_of(&od_table[row]), .value = value}, words);
+            put_words(sink, words, 2);
+        }
+    }
+    store_end(&writer, words);
+    put_words(sink, words, 2);
+}
+
+static bool write_page(hal_t *hal, selection_t *selection)
+{
+    const int32_t old = newest(hal);
+    uint32_t sequence = 1;
+    sink_t sink = {.hal = hal, .good = true};
+    if (old >= 0) {
+        sink.page = 1U - (uint32_t)old;
+        selection->old = hal_store_page(hal, (uint32_t)old);
+        sequence += store_sequence(selection->old);
+    }
+    if (!hal_store_erase(hal, sink.page)) {
+        return false;
+    }
+    make_page(selection, sequence, &sink);
+    return sink.good && newest(hal) == (int32_t)sink.page;
 }
 
 uint32_t app_page(const drive_params_t *params, uint32_t sequence, uint32_t words[])
 {
-    store_pair_t pairs[DRIVE_PARAM_COUNT];
-    for (int32_t id = 0; id < (int32_t)DRIVE_PARAM_COUNT; id++) {
-        pairs[id] = (store_pair_t){.id = store_id(drive_param_table[id].name),
-                                   .value = drive_param_get(params, (drive_param_id_t)id)};
-    }
-    return store_make(words, sequence, pairs, (uint32_t)DRIVE_PARAM_COUNT);
+    const selection_t selection = {.params = params, .group = NODE_GROUP_ALL, .keep = true};
+    sink_t sink = {.good = true};
+    sink.memory = words;
+    make_page(&selection, sequence, &sink);
+    return sink.at;
 }
 
 bool app_save(hal_t *hal, const drive_params_t *params)
 {
-    static uint32_t words[STORE_WORDS]; /* too large for the stack */
-    const int32_t old = newest(hal);
-    uint32_t page = 0;
-    uint32_t sequence = 1;
-    if (old >= 0) {
-        page = 1U - (uint32_t)old;
-        sequence += store_sequence(hal_store_page(hal, (uint32_t)old));
-    }
-    const uint32_t bytes = 4U * app_page(params, sequence, words);
-    return bytes > 0U && hal_store_erase(hal, page) && hal_store_write(hal, page, 0, words, bytes) &&
-           newest(hal) == (int32_t)page;
+    selection_t selection = {.params = params, .group = NODE_GROUP_ALL, .keep = true};
+    return write_page(hal, &selection);
+}
+
+bool app_store_group(app_t *app, uint32_t group, bool keep)
+{
+    selection_t selection = {.app = app, .params = &app->params, .group = group, .keep = keep};
+    return write_page(app->hal, &selection);
 }

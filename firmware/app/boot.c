@@ -56,6 +56,7 @@ void app_boot(app_t *app, hal_t *hal)
     uint32_t unknown;
     const bool stored = app_load(hal, &params, &unknown);
     const drive_result_t result = app_configure(app, hal, &params, stored);
+    app->dropped = (uint16_t)unknown;
     say(hal, "pmdrive on ", hal_board_name(hal));
     say(hal, "reset: ", reset_text(hal_reset_cause(hal)));
     say_last_words(hal);
@@ -66,7 +67,7 @@ void app_boot(app_t *app, hal_t *hal)
     if (!result.ok) {
         say(hal, "  refused: ", drive_param_table[result.param].name);
         say(hal, "  ", result.reason);
-    } else if (!app->ready && stored) {
+    } else if (stored && app_ready(app) != APP_READY) {
         say(hal, "  ", "timer, dead time or clock are not what this board can do");
     } else {
         /* nothing more to say */

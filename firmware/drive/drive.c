@@ -23,6 +23,30 @@ drive_result_t drive_init(drive_t *drive, const drive_params_t *params)
     return result;
 }
 
+static bool same(pm_num_t a, pm_num_t b)
+{
+    return a.m == b.m && a.e == b.e;
+}
+
+bool drive_same_frame(const drive_config_t *a, const drive_config_t *b)
+{
+    const drive_base_t *x = &a->base;
+    const drive_base_t *y = &b->base;
+    return same(x->v, y->v) && same(x->i, y->i) && same(x->omega, y->omega) && same(x->t_s, y->t_s) &&
+           same(a->pole_pairs, b->pole_pairs) && a->modulator.counts == b->modulator.counts &&
+           a->injection == b->injection && a->align_first == b->align_first;
+}
+
+void drive_reconfigure(drive_t *drive, const drive_config_t *config)
+{
+    drive->config = *config;
+    if (drive->fault == DRIVE_FAULT_PARAMETERS) {
+        drive->fault = DRIVE_FAULT_NONE;
+        drive->state = DRIVE_OFF;
+        drive->stage = STAGE_OFF;
+    }
+}
+
 void drive_command(drive_t *drive, const drive_command_t *command)
 {
     const drive_mode_t mode = drive->state == DRIVE_OFF ? command->mode : drive->command.mode;

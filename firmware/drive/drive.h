@@ -63,6 +63,7 @@ typedef struct {
     int32_t speed_mrad_s; /* mechanical, signed */
     int32_t torque_uNm;
     int32_t current_mA; /* current mode */
+    bool coast;         /* when not enabled: off at once, without a stop */
 } drive_command_t;
 
 /* Limits at work: information, not faults. */
@@ -93,6 +94,14 @@ typedef struct drive drive_t; /* caller-owned: the struct stands in drive_state.
 
 /* On refusal the drive is in DRIVE_FAULT with DRIVE_FAULT_PARAMETERS and stays off. */
 drive_result_t drive_init(drive_t *drive, const drive_params_t *params);
+
+/* Takes a new configuration, whole; ends the fault PARAMETERS. Between two steps: in the slow interrupt.
+ * While the drive is not off, nothing that drive_same_frame() compares may differ. */
+void drive_reconfigure(drive_t *drive, const drive_config_t *config);
+
+/* Bases, timing and start are the same, so that the present state keeps its meaning. */
+bool drive_same_frame(const drive_config_t *a, const drive_config_t *b);
+
 void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out);
 void drive_slow(drive_t *drive, const drive_slow_in_t *in);
 void drive_command(drive_t *drive, const drive_command_t *command);

@@ -137,6 +137,10 @@ static void stop(drive_t *drive)
 static void move(drive_t *drive)
 {
     const bool enable = drive->command.enable;
+    if (!enable && drive->command.coast) {
+        switch_off(drive);
+        return;
+    }
     switch (drive->state) {
     case DRIVE_OFF:
         if (enable) {

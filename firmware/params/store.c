@@ -1,21 +1,9 @@
 #include "firmware/params/store.h"
 
-#define MAGIC      0x31504D50U /* "PMP1" */
-#define HEADER     4U
-#define FNV_OFFSET 2166136261U
-#define FNV_PRIME  16777619U
-#define CRC_POLY   0xEDB88320U /* CRC-32 of IEEE 802.3, reflected */
+#define MAGIC    0x32504D50U /* "PMP2" */
+#define CRC_POLY 0xEDB88320U /* CRC-32 of IEEE 802.3, reflected */
 
-enum { WORD_MAGIC, WORD_SEQUENCE, WORD_COUNT, WORD_CRC };
-
-uint32_t store_id(const char *name)
-{
-    uint32_t hash = FNV_OFFSET;
-    for (const char *c = name; *c != '\0'; c++) {
-        hash = (hash ^ (uint8_t)*c) * FNV_PRIME;
-    }
-    return hash;
-}
+enum { WORD_MAGIC, WORD_SEQUENCE, WORD_SCHEMA, WORD_COUNT };
 
 static uint32_t crc_word(uint32_t crc, uint32_t word)
 {
@@ -26,22 +14,18 @@ static uint32_t crc_word(uint32_t crc, uint32_t word)
     return rest;
 }
 
-/* Over sequence, count and pairs */
-static uint32_t crc_of(const uint32_t page[STORE_WORDS], uint32_t count)
-{
-    uint32_t crc = crc_word(crc_word(UINT32_MAX, page[WORD_SEQUENCE]), count);
-    for (uint32_t n = 0; n < 2U * count; n++) {
-        crc = crc_word(crc, page[HEADER + n]);
-    }
-    return ~crc;
-}
-
 int32_t store_check(const uint32_t page[STORE_WORDS])
 {
     const uint32_t count = page[WORD_COUNT];
-    const bool valid =
-        page[WORD_MAGIC] == MAGIC && count <= STORE_PAIRS_MAX && page[WORD_CRC] == crc_of(page, count);
-    return valid ? (int32_t)count : -1;
+    if (page[WORD_MAGIC] != MAGIC || count > STORE_PAIRS_MAX) {
+        return -1;
+    }
+    const uint32_t end = STORE_HEADER + 2U * count;
+    uint32_t crc = UINT32_MAX;
+    for (uint32_t n = 0; n < end; n++) {
+        crc = crc_word(crc, page[n]);
+    }
+    return (page[end] == ~crc && page[end + 1U] == crc) ? (int32_t)count : -1;
 }
 
 int32_t store_newest(const uint32_t first[STORE_WORDS], const uint32_t second[STORE_WORDS])
@@ -62,23 +46,51 @@ uint32_t store_sequence(const uint32_t page[STORE_WORDS])
     return page[WORD_SEQUENCE];
 }
 
-store_pair_t store_pair(const uint32_t page[STORE_WORDS], uint32_t index)
+uint32_t store_schema(const uint32_t page[STORE_WORDS])
 {
-    return (store_pair_t){.id = page[HEADER + 2U * index], .value = (int32_t)page[HEADER + 2U * index + 1U]};
+    return page[WORD_SCHEMA];
 }
 
-uint32_t store_make(uint32_t page[STORE_WORDS], uint32_t sequence, const store_pair_t pairs[], uint32_t count)
+store_pair_t store_pair(const uint32_t page[STORE_WORDS], uint32_t index)
 {
-    if (count > STORE_PAIRS_MAX) {
-        return 0;
+    const uint32_t at = STORE_HEADER + 2U * index;
+    return (store_pair_t){.id = page[at], .value = (int32_t)page[at + 1U]};
+}
+
+bool store_find(const uint32_t page[STORE_WORDS], uint32_t id, int32_t *value)
+{
+    for (uint32_t n = 0; n < page[WORD_COUNT]; n++) {
+        const store_pair_t pair = store_pair(page, n);
+        if (pair.id == id) {
+            *value = pair.value;
+            return true;
+        }
     }
-    for (uint32_t n = 0; n < count; n++) {
-        page[HEADER + 2U * n] = pairs[n].id;
-        page[HEADER + 2U * n + 1U] = (uint32_t)pairs[n].value;
+    return false;
+}
+
+void store_begin(store_writer_t *writer, uint32_t sequence, uint32_t schema, uint32_t count,
+                 uint32_t words[STORE_HEADER])
+{
+    words[WORD_MAGIC] = MAGIC;
+    words[WORD_SEQUENCE] = sequence;
+    words[WORD_SCHEMA] = schema;
+    words[WORD_COUNT] = count;
+    writer->crc = UINT32_MAX;
+    for (uint32_t n = 0; n < STORE_HEADER; n++) {
+        writer->crc = crc_word(writer->crc, words[n]);
     }
-    page[WORD_MAGIC] = MAGIC;
-    page[WORD_SEQUENCE] = sequence;
-    page[WORD_COUNT] = count;
-    page[WORD_CRC] = crc_of(page, count);
-    return HEADER + 2U * count;
+}
+
+void store_put(store_writer_t *writer, store_pair_t pair, uint32_t words[2])
+{
+    words[0] = pair.id;
+    words[1] = (uint32_t)pair.value;
+    writer->crc = crc_word(crc_word(writer->crc, words[0]), words[1]);
+}
+
+void store_end(const store_writer_t *writer, uint32_t words[2])
+{
+    words[0] = ~writer->crc;
+    words[1] = writer->crc;
 }

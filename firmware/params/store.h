@@ -1,12 +1,17 @@
-/* Parameters in two pages of flash: pairs of identifier and value, so that another firmware version takes
- * over what it knows and leaves out what it does not.
+/* Values in two pages of flash: pairs of identifier and value, so that another firmware version takes over
+ * what it knows and leaves out what it does not.
  *
- * A page is complete or void: a CRC guards everything. Writing goes to the page that is not the newest, so
- * that power lost at any moment leaves the other one.
+ * A page is complete or void: a CRC over all of it is written last. Writing goes to the page that is not the
+ * newest, so that power lost at any moment leaves the other one.
  *
- *   page = magic, sequence, count, crc, then count pairs (id, value); 32-bit little-endian words
+ *   page = magic, sequence, schema, count, then count pairs (id, value), then crc, ~crc
  *
- * No access to flash here: the caller moves the bytes (hal.h). Tests: tests/unit/params. */
+ * 32-bit little-endian words; an identifier is index * 256 + sub-index of the dictionary, where none is ever
+ * used twice. The schema tells whether the page is of another version: then what is known is taken all the
+ * same, and the caller counts what is not.
+ *
+ * No access to flash here: the caller moves the words (hal.h), two at a time, in order. Tests:
+ * tests/unit/params. */
 #ifndef PARAMS_STORE_H
 #define PARAMS_STORE_H
 
@@ -18,11 +23,9 @@ typedef struct {
     int32_t value;
 } store_pair_t;
 
-#define STORE_PAIRS_MAX 126U
-#define STORE_WORDS     (4U + 2U * STORE_PAIRS_MAX) /* most of a page that is used: 1 kB */
-
-/* Identifier of a parameter: 32-bit FNV-1a of its name. A test proves that no two collide. */
-uint32_t store_id(const char *name);
+#define STORE_PAIRS_MAX 253U
+#define STORE_HEADER    4U                                         /* words */
+#define STORE_WORDS     (STORE_HEADER + 2U * STORE_PAIRS_MAX + 2U) /* a page of 2 kB */
 
 /* Number of pairs of a valid page, -1: void. */
 int32_t store_check(const uint32_t page[STORE_WORDS]);
@@ -30,11 +33,21 @@ int32_t store_check(const uint32_t page[STORE_WORDS]);
 /* Of two pages the valid one with the newer sequence (which wraps): 0, 1, or -1: both void. */
 int32_t store_newest(const uint32_t first[STORE_WORDS], const uint32_t second[STORE_WORDS]);
 
+/* Of a valid page */
 uint32_t store_sequence(const uint32_t page[STORE_WORDS]);
+uint32_t store_schema(const uint32_t page[STORE_WORDS]);
 store_pair_t store_pair(const uint32_t page[STORE_WORDS], uint32_t index);
+bool store_find(const uint32_t page[STORE_WORDS], uint32_t id, int32_t *value); /* false: it has none */
 
-/* Fills a page. Returns its words, even: the rest is left alone. 0: too many. */
-uint32_t store_make(uint32_t page[STORE_WORDS], uint32_t sequence, const store_pair_t pairs[],
-                    uint32_t count);
+/* A page is made in order: begin, as many pairs as were announced, end. Each gives the words to be written
+ * next: the header four, the others two. */
+typedef struct {
+    uint32_t crc;
+} store_writer_t;
+
+void store_begin(store_writer_t *writer, uint32_t sequence, uint32_t schema, uint32_t count,
+                 uint32_t words[STORE_HEADER]);
+void store_put(store_writer_t *writer, store_pair_t pair, uint32_t words[2]);
+void store_end(const store_writer_t *writer, uint32_t words[2]);
 
 #endif

@@ -1,100 +1,11 @@
 // The application on the simulated board: what stands between the user and a bridge that is on.
-#include <cstring>
-#include <memory>
-#include <string>
+#include "tests/unit/app/bench.h"
 
-#include <gtest/gtest.h>
-
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpedantic"
-#pragma GCC diagnostic ignored "-Wc++20-extensions"
-extern "C" {
-#include "firmware/params/store.h"
-#include "hal/sim/sim_loop.h"
-}
-#pragma GCC diagnostic pop
-#include "tests/support/plants.h"
+using app_test::Bench;
+using app_test::defaults;
 
 namespace
 {
-
-class Bench
-{
-  public:
-    Bench() : plant_(make(), &plant_destroy)
-    {
-        sim_hal_init(&loop.hal, plant_.get());
-    }
-
-    // As from power-on, with these parameters in flash or none
-    void boot(const drive_params_t *params)
-    {
-        if (params != nullptr) {
-            ASSERT_TRUE(app_save(&loop.hal, params));
-        }
-        sim_loop_boot(&loop);
-    }
-
-    void send(bool enable, bool clear = false)
-    {
-        const hal_can_frame_t frame = {
-            0x201,
-            6,
-            {uint8_t((enable ? 1 : 0) | (clear ? 0x80 : 0)), DRIVE_MODE_SPEED, 0x30, 0x75, 0, 0}}; // 30 rad/s
-        ASSERT_TRUE(sim_queue_put(&loop.hal.received, &frame));
-    }
-
-    void run_ms(int ms)
-    {
-        for (int k = 0; k < 10 * ms; ++k) {
-            sim_loop_step(&loop);
-        }
-    }
-
-    // Commanded again and again, as a master does
-    void run_enabled_ms(int ms)
-    {
-        for (int done = 0; done < ms; done += 100) {
-            send(true);
-            run_ms(std::min(100, ms - done));
-        }
-    }
-
-    drive_fault_t fault() const
-    {
-        return loop.app.drive.fault;
-    }
-
-    std::string console() const
-    {
-        return loop.hal.console;
-    }
-
-    plant_t *plant() const
-    {
-        return plant_.get();
-    }
-
-    sim_loop_t loop = {};
-
-  private:
-    static plant_t *make()
-    {
-        plant_config_t c = plants::ipm_1000();
-        c.inverter.timer_counts = 8500;
-        const char *error = nullptr;
-        return plant_create(&c, 1.0, &error);
-    }
-
-    std::unique_ptr<plant_t, void (*)(plant_t *)> plant_;
-};
-
-drive_params_t defaults()
-{
-    drive_params_t params;
-    drive_params_default(&params);
-    return params;
-}
 
 TEST(App, RunsTheMotorOnCommandsOverCan)
 {
@@ -170,7 +81,7 @@ TEST(App, PowerLostInMidWriteKeepsTheOldParameters)
     const drive_params_t old = defaults();
     drive_params_t wanted = old;
     wanted.i_max = 1234;
-    const uint32_t words = 4 + 2 * DRIVE_PARAM_COUNT;
+    const uint32_t words = 4 + 2 * DRIVE_PARAM_COUNT + 2;
     for (uint32_t cut = 0; cut < words; ++cut) {
         Bench x;
         ASSERT_TRUE(app_save(&x.loop.hal, &old));
@@ -186,12 +97,20 @@ TEST(App, PowerLostInMidWriteKeepsTheOldParameters)
 TEST(App, NamesOfAnotherVersionAreLeftOut)
 {
     Bench x;
-    const store_pair_t pairs[] = {{store_id("i_max"), 2500}, {store_id("not_a_parameter"), 5}};
-    ASSERT_GT(store_make(x.loop.hal.store[0], 1, pairs, 2), 0U);
+    const od_entry_t *i_max = Bench::entry_of(DRIVE_PARAM_i_max);
+    const store_pair_t pairs[] = {{i_max->index * 256U + i_max->sub, 2500}, {0x2FFF01, 5}, {0x01203001, 7}};
+    uint32_t *page = x.loop.hal.store[0];
+    store_writer_t writer;
+    store_begin(&writer, 1, od_schema + 1, 3, page);
+    for (const store_pair_t &pair : pairs) {
+        page += 2;
+        store_put(&writer, pair, page + 2);
+    }
+    store_end(&writer, page + 4);
     drive_params_t back;
     uint32_t unknown;
     ASSERT_TRUE(app_load(&x.loop.hal, &back, &unknown));
-    EXPECT_EQ(unknown, 1U);
+    EXPECT_EQ(unknown, 2U);
     EXPECT_EQ(back.i_max, 2500);
     EXPECT_EQ(back.R_s, defaults().R_s);
 }
@@ -203,11 +122,12 @@ TEST(App, CommandsThatCeaseAreAFault)
     x.boot(&params);
     x.run_enabled_ms(600);
     ASSERT_EQ(x.loop.app.drive.state, DRIVE_RUNNING);
-    x.run_ms(405); // the last command is 100 ms old
+    x.run_ms(505);
     EXPECT_EQ(x.fault(), DRIVE_FAULT_REMOTE_LOST);
     EXPECT_FALSE(x.loop.hal.armed);
     x.run_enabled_ms(300); // does not start by itself
     EXPECT_FALSE(x.loop.hal.armed);
+    EXPECT_EQ(x.get(0x603F), 0x8250U);
     x.send(false, true);
     x.run_ms(5);
     EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
@@ -244,6 +164,19 @@ TEST(App, BreakInputAndItsClearing)
     x.send(false, true);
     x.run_ms(2);
     EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+}
+
+// A rig that commands the drive itself is not overruled by a bus on which nobody speaks.
+TEST(App, WithoutAMasterTheDriveIsLeftAlone)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    const drive_command_t command = {true, DRIVE_MODE_SPEED, 30000, 0, 0, false};
+    drive_command(&x.loop.app.drive, &command);
+    x.run_ms(700);
+    EXPECT_EQ(std::memcmp(&x.loop.app.drive.command, &command, sizeof command), 0);
+    EXPECT_EQ(x.loop.app.drive.state, DRIVE_RUNNING);
 }
 
 TEST(App, MissingTemperatureSensorIsAFault)

@@ -1,0 +1,106 @@
+/* The shadow set of parameters: checked as a whole, then handed over as a whole. */
+#include <stddef.h>
+#include <string.h>
+
+#include "firmware/app/app_parts.h"
+
+_Static_assert((uint32_t)DRIVE_PARAM_COUNT == (uint32_t)OD_PARAMETER_COUNT, "dictionary and drive agree");
+
+/* What the hardware runs with was given to it once, before it was started. */
+static bool needs_restart(const app_t *app)
+{
+    const hal_config_t now = app_hal_config(&app->params, app->hal_config.can_kbit_s);
+    return app->params.f_pwm != app->f_pwm || now.timer_counts != app->hal_config.timer_counts ||
+           now.dead_time_ns != app->hal_config.dead_time_ns || now.break_level != app->hal_config.break_level;
+}
+
+/* The slow interrupt takes `next` only while it is marked ready, and is not interrupted by us. */
+static void hand_over(app_t *app, const drive_config_t *config)
+{
+    app->next_ready = false;
+    __atomic_signal_fence(__ATOMIC_SEQ_CST);
+    app->next = *config;
+    __atomic_signal_fence(__ATOMIC_SEQ_CST);
+    app->next_ready = true;
+}
+
+void app_take_parameters(app_t *app)
+{
+    if (app->next_ready) {
+        drive_reconfigure(&app->drive, &app->next);
+        app->next_ready = false;
+        app->slow_divider = app->drive.config.slow_divider;
+        if (app_ready(app) != APP_READY) {
+            drive_trip(&app->drive, DRIVE_FAULT_PARAMETERS);
+        }
+    }
+}
+
+/* The shadow set as it is now: abort code. A set that was bad before may stay bad, or it could not be mended
+ * one by one. */
+static uint32_t check(app_t *app, bool was_bad)
+{
+    drive_config_t config;
+    (void)memset(&config, 0, sizeof config);
+    const drive_result_t result = drive_configure(&config, &app->params);
+    app->refused_param = result.param;
+    if (!result.ok) {
+        return was_bad ? 0U : SDO_INCOMPATIBLE;
+    }
+    if (app_is_on(app) && !drive_same_frame(&config, &app->drive.config)) {
+        return SDO_STATE;
+    }
+    app->refused = false;
+    app->restart = needs_restart(app);
+    if (!app->restart) { /* else the drive keeps what the hardware has */
+        hand_over(app, &config);
+    }
+    return 0;
+}
+
+uint32_t app_put_parameter(app_t *app, drive_param_id_t id, int32_t value)
+{
+    const int32_t old = drive_param_get(&app->params, id);
+    drive_param_set(&app->params, id, value);
+    if (app->batch || value == old) {
+        return 0;
+    }
+    const uint32_t code = check(app, app->refused);
+    if (code != 0U) {
+        drive_param_set(&app->params, id, old);
+    }
+    return code;
+}
+
+uint32_t app_put_batch(app_t *app, bool open)
+{
+    if (open == app->batch) {
+        return 0;
+    }
+    app->batch = open;
+    if (open) {
+        app->before_batch = app->params;
+        return 0;
+    }
+    const uint32_t code = check(app, false);
+    if (code != 0U) {
+        app->params = app->before_batch;
+    }
+    return code;
+}
+
+void app_give_parameters(app_t *app)
+{
+    (void)check(app, app->refused);
+}
+
+uint32_t app_refused_object(const app_t *app)
+{
+    for (uint32_t row = 0; row < od_count; row++) {
+        const od_entry_t *entry = &od_table[row];
+        if (entry->kind == (uint8_t)OD_PARAMETER && entry->slot == (uint16_t)app->refused_param) {
+            return (uint32_t)entry->index * 256U + entry->sub;
+        }
+    }
+    return 0;
+}

@@ -1,0 +1,34 @@
+/* What the parts of the application ask of each other. */
+#ifndef APP_APP_PARTS_H
+#define APP_APP_PARTS_H
+
+#include "firmware/app/app.h"
+
+/* app.c */
+hal_config_t app_hal_config(const drive_params_t *params, uint16_t can_kbit_s);
+void app_trip(app_t *app, drive_fault_t fault);
+
+/* app_bus.c: the node and the drive profile */
+void app_bus_init(app_t *app);
+void app_bus_run(app_t *app);
+bool app_is_on(const app_t *app); /* the bridge is on, or about to be */
+
+/* app_values.c: what is shown of the drive; false: not one of these */
+bool app_value(app_t *app, uint16_t slot, int32_t *value);
+bool app_traceable(void *app, uint16_t index, uint8_t sub, trace_signal_t *signal);
+cia402_in_t app_drive_facts(const app_t *app);
+int32_t app_torque_uNm(const app_t *app, int32_t permille);
+
+/* app_parameters.c: abort codes */
+uint32_t app_put_parameter(app_t *app, drive_param_id_t id, int32_t value);
+uint32_t app_put_batch(app_t *app, bool open);
+uint32_t app_refused_object(const app_t *app);
+void app_take_parameters(app_t *app); /* slow */
+void app_give_parameters(app_t *app); /* the present set again: it may be good for something now */
+
+/* app_store.c */
+bool app_stored_value(const hal_t *hal, uint16_t index, uint8_t sub, int32_t *value);
+bool app_store_group(app_t *app, uint32_t group, bool keep); /* keep: the present values; else none */
+void app_recall(app_t *app, od_kind_t kind);
+
+#endif

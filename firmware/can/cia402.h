@@ -1,0 +1,74 @@
+/* Drive profile CiA 402: from the controlword to what the drive is to do, and back to the statusword.
+ *
+ * Modes: profile velocity (3), profile torque (4), and -1: current vector of a given amplitude that turns at
+ * the target velocity, for commissioning. Option codes as far as the drive has them: quick stop 0, 1, 5;
+ * shutdown 0, 1; disable operation 0, 1; halt 1; fault reaction 0 (the bridge opens at once, always).
+ *
+ * Facts about the drive come in, orders go out: cia402_step() after every frame and once per round of the
+ * main loop; the order `clear_fault` holds for this step alone. A fault is left only by the rising edge of
+ * bit 7 of the controlword after its cause has gone; nothing starts by itself. The mode is taken when
+ * operation is enabled. Tests: tests/unit/can/cia402_test.cpp. */
+#ifndef CAN_CIA402_H
+#define CAN_CIA402_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "firmware/can/dictionary.h"
+
+typedef enum {
+    CIA402_NOT_READY,
+    CIA402_SWITCH_ON_DISABLED,
+    CIA402_READY_TO_SWITCH_ON,
+    CIA402_SWITCHED_ON,
+    CIA402_OPERATION_ENABLED,
+    CIA402_QUICK_STOP_ACTIVE,
+    CIA402_FAULT_REACTION_ACTIVE,
+    CIA402_FAULT,
+} cia402_state_t;
+
+enum { CIA402_MODE_CURRENT = -1, CIA402_MODE_NONE = 0, CIA402_MODE_VELOCITY = 3, CIA402_MODE_TORQUE = 4 };
+
+/* What the drive says */
+typedef struct {
+    bool ready;     /* it may be switched on: parameters and hardware are as they must be */
+    bool fault;     /* latched */
+    bool off;       /* the bridge is, and the drive is at rest */
+    bool following; /* the targets: not while it calibrates, finds the position or stops */
+    bool voltage;   /* DC link within its limits */
+    bool limited, warning;
+    int32_t velocity; /* mrad/s */
+} cia402_in_t;
+
+/* What it is told */
+typedef struct {
+    bool enable;
+    bool coast; /* when not enabled: the bridge opens at once; else the drive stops first */
+    bool clear_fault;
+    int16_t mode;
+    int32_t velocity; /* mrad/s */
+    int32_t torque;   /* permille of the rated torque */
+    int32_t current;  /* mA */
+} cia402_out_t;
+
+typedef struct {
+    cia402_state_t state;
+    uint16_t controlword, seen; /* as given, and as at the last step */
+    bool clearing;              /* the fault may go */
+    bool coast;
+    int16_t mode, active_mode;
+    int16_t quick_stop_option, shutdown_option, disable_option;
+    uint16_t window, threshold; /* mrad/s */
+    int32_t target_velocity, target_torque, target_current;
+} cia402_t;
+
+void cia402_init(cia402_t *self);
+cia402_out_t cia402_step(cia402_t *self, const cia402_in_t *in);
+uint16_t cia402_statusword(const cia402_t *self, const cia402_in_t *in);
+bool cia402_on(const cia402_t *self); /* the drive is, or is about to be */
+
+/* Objects of the profile by slot (OD_LIVE_...). False: not one of these. */
+bool cia402_get(const cia402_t *self, uint16_t slot, int32_t *value);
+bool cia402_put(cia402_t *self, uint16_t slot, int32_t value, uint32_t *code);
+
+#endif

@@ -1,0 +1,99 @@
+/* Errors: register, history and messages. */
+#include "firmware/can/node_parts.h"
+
+#include <stddef.h>
+
+#define COB_OFF 0x80000000U
+#define COB_ID  0x000007FFU
+
+/* Error register of an error code; generic is always set. */
+static uint32_t bits_of(uint32_t code)
+{
+    if (code >= 0x8100U && code < 0x8300U) {
+        return 0x11U; /* communication */
+    }
+    switch (code >> 12) {
+    case 1:
+        return 0x01U;
+    case 2:
+        return 0x03U; /* current */
+    case 3:
+        return 0x05U; /* voltage */
+    case 4:
+        return 0x09U; /* temperature */
+    default:
+        return 0x81U; /* manufacturer's */
+    }
+}
+
+static uint8_t update_register(node_t *node)
+{
+    uint32_t bits = 0;
+    for (uint32_t source = 0; source < (uint32_t)NODE_ERRORS; source++) {
+        bits |= node->error[source] != 0U ? bits_of(node->error[source]) : 0U;
+    }
+    uint32_t *place = object_place(node, OD_ERROR_REGISTER, 0);
+    if (place != NULL) {
+        *place = bits;
+    }
+    return (uint8_t)bits;
+}
+
+/* The newest first; sub 0 counts. */
+static void remember(node_t *node, uint32_t code, uint32_t info)
+{
+    uint32_t *count = object_place(node, OD_ERROR_HISTORY, 0);
+    uint32_t *newest = object_place(node, OD_ERROR_HISTORY, 1);
+    if (count == NULL || newest == NULL) {
+        return;
+    }
+    for (uint32_t n = (uint32_t)NODE_HISTORY - 1U; n > 0U; n--) {
+        newest[n] = newest[n - 1U];
+    }
+    newest[0] = code | ((info & 0xFFFFU) << 16);
+    *count += *count < (uint32_t)NODE_HISTORY ? 1U : 0U;
+}
+
+void node_error(node_t *node, node_error_t source, uint16_t code, uint32_t info)
+{
+    if (node->error[source] == code) {
+        return;
+    }
+    node->error[source] = code;
+    const uint8_t error_register = update_register(node);
+    if (code != 0U) {
+        remember(node, code, info);
+    }
+    if (node->emcy_count < (uint8_t)NODE_EMCY) {
+        node->emcy[node->emcy_count] =
+            (node_emcy_t){.code = code, .error_register = error_register, .info = info};
+        node->emcy_count++;
+    }
+}
+
+void emcy_run(node_t *node)
+{
+    const bool allowed = node->nmt == NODE_OPERATIONAL || node->nmt == NODE_PRE_OPERATIONAL;
+    if (node->emcy_count == 0U || !allowed) {
+        return;
+    }
+    const uint32_t cob = object_word(node, OD_EMCY_ID, 0);
+    const uint32_t inhibit_us = object_word(node, OD_EMCY_INHIBIT, 0) * 100U;
+    if ((cob & COB_OFF) != 0U) {
+        node->emcy_count = 0;
+    } else if (node_elapsed(node, node->emcy_last_us, inhibit_us)) {
+        const node_emcy_t *first = &node->emcy[0];
+        node_frame_t frame = {.id = (uint16_t)(cob & COB_ID), .length = 8};
+        le_put(&frame.data[0], 2, first->code);
+        frame.data[2] = first->error_register;
+        le_put(&frame.data[3], 4, first->info);
+        (void)node_send(node, &frame);
+        node->emcy_last_us = node->now_us;
+        node->emcy_count--;
+        for (uint32_t n = 0; n < node->emcy_count; n++) {
+            node->emcy[n] = node->emcy[n + 1U];
+        }
+    } else {
+        /* later */
+    }
+}

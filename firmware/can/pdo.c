@@ -1,0 +1,137 @@
+/* Process data: mapping, and what is received. */
+#include "firmware/can/node_parts.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#define COB_OFF       0x80000000U
+#define COB_ID        0x000007FFU
+#define TYPE_EVENT    254U /* and above: no SYNC */
+#define CODE_SHORT    0x8210U
+#define CODE_LONG     0x8220U
+#define CODE_TIME_OUT 0x8250U
+
+/* A mapping is index, sub-index and bits. */
+uint32_t pdo_mappable(uint32_t mapping, bool receive, const od_entry_t **entry)
+{
+    const uint32_t code = object_find((uint16_t)(mapping >> 16), (uint8_t)((mapping >> 8) & 0xFFU), entry);
+    if (code != SDO_OK) {
+        return code;
+    }
+    const uint32_t flag = receive ? OD_MAP_RX : OD_MAP_TX;
+    const bool fits = 8U * od_size(*entry) == (mapping & 0xFFU);
+    return (fits && ((*entry)->flags & flag) != 0U) ? SDO_OK : SDO_NOT_MAPPABLE;
+}
+
+uint32_t pdo_map(const node_t *node, uint16_t map_index, uint8_t count, node_pdo_t *pdo)
+{
+    const bool receive = map_index < (uint16_t)OD_TPDO;
+    uint32_t length = 0;
+    for (uint8_t n = 0; n < count; n++) {
+        const od_entry_t *entry;
+        const uint32_t mapping = object_word(node, map_index, (uint8_t)(n + 1U));
+        const uint32_t code = pdo_mappable(mapping, receive, &entry);
+        if (code != SDO_OK) {
+            return code;
+        }
+        length += od_size(entry);
+        if (length > 8U) {
+            return SDO_PDO_LENGTH;
+        }
+        pdo->row[n] = (uint16_t)(entry - od_table);
+    }
+    pdo->count = count;
+    pdo->length = (uint8_t)length;
+    return SDO_OK;
+}
+
+void pdo_setup(node_t *node, bool receive, uint32_t number)
+{
+    const uint16_t index = (uint16_t)((receive ? (uint32_t)OD_RPDO : (uint32_t)OD_TPDO) + number);
+    const uint16_t map = (uint16_t)((receive ? (uint32_t)OD_RPDO_MAP : (uint32_t)OD_TPDO_MAP) + number);
+    node_pdo_t *pdo = receive ? &node->rpdo[number] : &node->tpdo[number];
+    const uint32_t cob = object_word(node, index, 1);
+    const uint32_t count = object_word(node, map, 0);
+    *pdo = (node_pdo_t){
+        .type = (uint8_t)object_word(node, index, 2),
+        .inhibit_us = receive ? 0U : object_word(node, index, 3) * 100U,
+        .event_us = object_word(node, index, 5) * 1000U,
+        .last_us = node->now_us,
+    };
+    const bool maps = count <= (uint32_t)NODE_MAPPED && pdo_map(node, map, (uint8_t)count, pdo) == SDO_OK;
+    pdo->id = (maps && (cob & COB_OFF) == 0U) ? (uint16_t)(cob & COB_ID) : 0U;
+}
+
+void pdo_start(node_t *node)
+{
+    for (uint32_t n = 0; n < (uint32_t)NODE_PDOS; n++) {
+        node->rpdo[n].timed = false;
+        node->rpdo[n].waiting = false;
+        node->tpdo[n].timed = false;
+        node->tpdo[n].waiting = true;
+        node->tpdo[n].syncs = 0;
+    }
+}
+
+/* A value that is refused leaves the old one, and the others are taken all the same. */
+static void apply(node_t *node, const node_pdo_t *pdo)
+{
+    uint32_t at = 0;
+    for (uint32_t n = 0; n < pdo->count; n++) {
+        const od_entry_t *entry = &od_table[pdo->row[n]];
+        (void)object_put(node, entry, object_from_bytes(entry, &pdo->data[at]));
+        at += od_size(entry);
+    }
+}
+
+static void receive_one(node_t *node, node_pdo_t *pdo, uint32_t number, const node_frame_t *frame)
+{
+    if (frame->length < pdo->length) {
+        node_error(node, NODE_ERROR_LENGTH, CODE_SHORT, number);
+        return;
+    }
+    node_error(node, NODE_ERROR_LENGTH, frame->length > pdo->length ? (uint16_t)CODE_LONG : 0U, number);
+    node_error(node, NODE_ERROR_RPDO, 0, number);
+    (void)memcpy(pdo->data, frame->data, sizeof pdo->data);
+    pdo->last_us = node->now_us;
+    pdo->timed = true;
+    if (pdo->type < TYPE_EVENT) {
+        pdo->waiting = true;
+    } else {
+        apply(node, pdo);
+    }
+}
+
+void pdo_receive(node_t *node, const node_frame_t *frame)
+{
+    for (uint32_t n = 0; n < (uint32_t)NODE_PDOS; n++) {
+        if (node->rpdo[n].id == frame->id && frame->id != 0U) {
+            receive_one(node, &node->rpdo[n], n + 1U, frame);
+        }
+    }
+}
+
+void pdo_sync(node_t *node)
+{
+    for (uint32_t n = 0; n < (uint32_t)NODE_PDOS; n++) {
+        if (node->rpdo[n].waiting && node->rpdo[n].id != 0U) {
+            node->rpdo[n].waiting = false;
+            apply(node, &node->rpdo[n]);
+        }
+    }
+    pdo_transmit_sync(node);
+}
+
+void pdo_run(node_t *node)
+{
+    for (uint32_t n = 0; n < (uint32_t)NODE_PDOS; n++) {
+        node_pdo_t *pdo = &node->rpdo[n];
+        if (pdo->timed && pdo->event_us > 0U && node_elapsed(node, pdo->last_us, pdo->event_us)) {
+            pdo->timed = false;
+            if (node->host->on(node->context)) {
+                node_alarm(node, NODE_ERROR_RPDO, CODE_TIME_OUT);
+            }
+        }
+    }
+    pdo_transmit_run(node);
+}

@@ -1,0 +1,88 @@
+/* Trace: up to eight signals, sampled in the control interrupt into a ring, around a trigger. The
+ * oscilloscope of the drive.
+ *
+ * A signal is a 32-bit number in memory, chosen by its index in the dictionary; it is kept as 16 bits:
+ * shifted right, and limited. `scale` is its value at raw 32768, in the unit of the dictionary. All signals
+ * of a sample are taken in the same call.
+ *
+ *   trace_init(t, ring, length, find, context)   the ring is the caller's, `length` numbers in all
+ *   trace_sample(t)    control interrupt, at its end; 3 instructions while nothing is armed
+ *   trace_put(), trace_get(), trace_read()       thread: objects 3100h to 3103h by slot (OD_LIVE_...)
+ *
+ * Order: set up, arm (command 1), wait for state 4, upload. While armed, settings are refused. The divider
+ * counts calls per sample. `pretrigger` permille of the length lie before the trigger. Level and edge compare
+ * successive samples of the trigger signal. Tests: tests/unit/can/trace_test.cpp. */
+#ifndef CAN_TRACE_H
+#define CAN_TRACE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "firmware/can/dictionary.h"
+
+#define TRACE_SIGNALS 8U
+
+typedef enum {
+    TRACE_OFF,
+    TRACE_FILLING,   /* until there is enough before the trigger */
+    TRACE_WAITING,   /* for the trigger */
+    TRACE_TRIGGERED, /* until there is enough after it */
+    TRACE_COMPLETE,
+} trace_state_t;
+
+typedef enum { TRACE_RISING, TRACE_FALLING, TRACE_BOTH } trace_edge_t;
+
+typedef struct {
+    const volatile int32_t *source;
+    int32_t shift; /* to the right */
+    int32_t scale; /* value at raw 32768 */
+} trace_signal_t;
+
+/* Where a dictionary entry lives; false: it cannot be traced. */
+typedef bool (*trace_find_t)(void *context, uint16_t index, uint8_t sub, trace_signal_t *signal);
+
+typedef struct {
+    volatile uint32_t active; /* not zero: filling, waiting or triggered */
+    volatile trace_state_t state;
+    volatile bool forced; /* trigger now */
+    trace_signal_t signal[TRACE_SIGNALS];
+    uint32_t count; /* signals */
+    uint32_t divider, countdown;
+    int16_t *ring;
+    uint32_t end;     /* numbers of the ring that are used: whole samples */
+    uint32_t next;    /* where the next sample goes */
+    uint32_t left;    /* samples until the state changes */
+    uint32_t trigger; /* signal, TRACE_SIGNALS: at once */
+    int32_t level;    /* raw */
+    int32_t previous; /* of the trigger signal */
+    uint32_t after;   /* samples from the trigger on */
+    trace_edge_t edge;
+
+    /* as set */
+    uint32_t size; /* of the ring */
+    trace_find_t find;
+    void *context;
+    uint32_t object[TRACE_SIGNALS]; /* index << 16 | sub << 8; 0: none */
+    uint16_t set_divider, pretrigger;
+    uint8_t set_trigger, set_edge; /* 0: at once, or number of the signal */
+    int32_t set_level;             /* in the unit of the signal */
+} trace_t;
+
+void trace_init(trace_t *trace, int16_t ring[], uint32_t length, trace_find_t find, void *context);
+void trace_record(trace_t *trace);
+
+static inline void trace_sample(trace_t *trace)
+{
+    if (trace->active != 0U) {
+        trace_record(trace);
+    }
+}
+
+/* Objects by slot. False: not one of these. `code` is an SDO abort code, 0: done. */
+bool trace_get(const trace_t *trace, uint16_t slot, int32_t *value);
+bool trace_put(trace_t *trace, uint16_t slot, int32_t value, uint32_t *code);
+
+uint32_t trace_size(const trace_t *trace); /* bytes of the data; 0: there is none yet */
+void trace_read(const trace_t *trace, uint32_t offset, uint8_t bytes[], uint32_t count);
+
+#endif

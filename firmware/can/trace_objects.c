@@ -1,0 +1,236 @@
+/* What is set and shown of the trace. */
+#include <stddef.h>
+
+#include "firmware/can/dictionary_slots.h"
+#include "firmware/can/trace.h"
+
+#define OK           0U
+#define NOT_MAPPABLE 0x06040041U
+#define INCOMPATIBLE 0x06040043U
+#define STATE        0x08000022U
+
+enum { COMMAND_OFF, COMMAND_ARM, COMMAND_TRIGGER };
+
+void trace_init(trace_t *trace, int16_t ring[], uint32_t length, trace_find_t find, void *context)
+{
+    *trace = (trace_t){
+        .state = TRACE_OFF,
+        .size = length,
+        .find = find,
+        .context = context,
+        .set_divider = 1,
+        .pretrigger = 100,
+    };
+    trace->ring = ring;
+}
+
+static uint32_t length_of(const trace_t *trace)
+{
+    return trace->count == 0U ? 0U : trace->size / trace->count;
+}
+
+/* Level in the unit of the signal to raw: a value beyond what can be kept is never crossed. */
+static int32_t raw_level(const trace_t *trace, const trace_signal_t *signal)
+{
+    const int64_t raw = ((int64_t)trace->set_level * 32768) / (signal->scale == 0 ? 1 : signal->scale);
+    if (raw > 32767) {
+        return 32768;
+    }
+    return raw < -32768 ? -32769 : (int32_t)raw;
+}
+
+static uint32_t set_trigger(trace_t *trace)
+{
+    trace->trigger = TRACE_SIGNALS;
+    trace->level = 0;
+    if (trace->set_trigger == 0U) {
+        return OK;
+    }
+    /* signals that are not set are left out of the samples */
+    uint32_t place = 0;
+    for (uint32_t n = 0; n + 1U < trace->set_trigger; n++) {
+        place += trace->object[n] != 0U ? 1U : 0U;
+    }
+    if (trace->object[trace->set_trigger - 1U] == 0U) {
+        return INCOMPATIBLE;
+    }
+    trace->trigger = place;
+    trace->level = raw_level(trace, &trace->signal[place]);
+    return OK;
+}
+
+static uint32_t arm(trace_t *trace)
+{
+    trace->active = 0;
+    trace->state = TRACE_OFF;
+    trace->count = 0;
+    for (uint32_t n = 0; n < TRACE_SIGNALS; n++) {
+        const uint32_t object = trace->object[n];
+        const uint16_t index = (uint16_t)(object >> 16);
+        const uint8_t sub = (uint8_t)((object >> 8) & 0xFFU);
+        if (object != 0U) {
+            if (!trace->find(trace->context, index, sub, &trace->signal[trace->count])) {
+                return NOT_MAPPABLE;
+            }
+            trace->count++;
+        }
+    }
+    const uint32_t length = length_of(trace);
+    if (length < 2U || set_trigger(trace) != OK) {
+        return INCOMPATIBLE;
+    }
+    uint32_t before = (length * trace->pretrigger) / 1000U;
+    before = before >= length ? length - 1U : before;
+    before = before == 0U ? 1U : before; /* an edge needs one */
+    trace->after = length - before;
+    trace->end = length * trace->count;
+    trace->next = 0;
+    trace->left = before;
+    trace->previous = 0;
+    trace->edge = (trace_edge_t)trace->set_edge;
+    trace->divider = trace->set_divider;
+    trace->countdown = 1;
+    trace->forced = false;
+    trace->state = TRACE_FILLING;
+    __atomic_signal_fence(__ATOMIC_RELEASE); /* the interrupt looks at this alone, so it comes last */
+    trace->active = 1;
+    return OK;
+}
+
+static uint32_t command(trace_t *trace, int32_t value)
+{
+    switch (value) {
+    case COMMAND_OFF:
+        trace->active = 0;
+        trace->state = TRACE_OFF;
+        return OK;
+    case COMMAND_ARM:
+        return arm(trace);
+    case COMMAND_TRIGGER:
+    default:
+        if (trace->active == 0U) {
+            return STATE;
+        }
+        trace->forced = true;
+        return OK;
+    }
+}
+
+static uint32_t put_signal(trace_t *trace, uint32_t number, uint32_t object)
+{
+    trace_signal_t signal;
+    const uint16_t index = (uint16_t)(object >> 16);
+    const uint8_t sub = (uint8_t)((object >> 8) & 0xFFU);
+    if (object != 0U && !trace->find(trace->context, index, sub, &signal)) {
+        return NOT_MAPPABLE;
+    }
+    trace->object[number] = object;
+    return OK;
+}
+
+static bool is_setting(uint16_t slot)
+{
+    return (slot >= (uint16_t)OD_LIVE_TRACE_DIVIDER && slot <= (uint16_t)OD_LIVE_TRACE_LEVEL) ||
+           (slot >= (uint16_t)OD_LIVE_TRACE_SIGNAL_1 && slot <= (uint16_t)OD_LIVE_TRACE_SIGNAL_8);
+}
+
+static void put_setting(trace_t *trace, uint16_t slot, int32_t value, uint32_t *code)
+{
+    switch (slot) {
+    case OD_LIVE_TRACE_DIVIDER:
+        trace->set_divider = (uint16_t)((uint32_t)value & 0xFFFFU);
+        break;
+    case OD_LIVE_TRACE_PRETRIGGER:
+        trace->pretrigger = (uint16_t)((uint32_t)value & 0xFFFFU);
+        break;
+    case OD_LIVE_TRACE_TRIGGER:
+        trace->set_trigger = (uint8_t)((uint32_t)value & 0xFFU);
+        break;
+    case OD_LIVE_TRACE_EDGE:
+        trace->set_edge = (uint8_t)((uint32_t)value & 0xFFU);
+        break;
+    case OD_LIVE_TRACE_LEVEL:
+        trace->set_level = value;
+        break;
+    default:
+        *code = put_signal(trace, (uint32_t)slot - (uint32_t)OD_LIVE_TRACE_SIGNAL_1, (uint32_t)value);
+        break;
+    }
+}
+
+bool trace_put(trace_t *trace, uint16_t slot, int32_t value, uint32_t *code)
+{
+    *code = OK;
+    if (slot == (uint16_t)OD_LIVE_TRACE_COMMAND) {
+        *code = command(trace, value);
+        return true;
+    }
+    if (!is_setting(slot)) {
+        return false;
+    }
+    if (trace->active != 0U) {
+        *code = STATE;
+    } else {
+        trace->state = TRACE_OFF; /* the data are of other settings */
+        put_setting(trace, slot, value, code);
+    }
+    return true;
+}
+
+static int32_t scale_of(const trace_t *trace, uint32_t number)
+{
+    trace_signal_t signal = {.scale = 0};
+    const uint32_t object = trace->object[number];
+    if (object != 0U) {
+        (void)trace->find(trace->context, (uint16_t)(object >> 16), (uint8_t)((object >> 8) & 0xFFU),
+                          &signal);
+    }
+    return signal.scale;
+}
+
+static int32_t get_list(const trace_t *trace, uint16_t slot)
+{
+    if (slot >= (uint16_t)OD_LIVE_TRACE_SCALE_1) {
+        return scale_of(trace, (uint32_t)slot - (uint32_t)OD_LIVE_TRACE_SCALE_1);
+    }
+    return (int32_t)trace->object[(uint32_t)slot - (uint32_t)OD_LIVE_TRACE_SIGNAL_1];
+}
+
+bool trace_get(const trace_t *trace, uint16_t slot, int32_t *value)
+{
+    switch (slot) {
+    case OD_LIVE_TRACE_COMMAND:
+        *value = trace->active != 0U ? COMMAND_ARM : COMMAND_OFF;
+        return true;
+    case OD_LIVE_TRACE_STATE:
+        *value = (int32_t)trace->state;
+        return true;
+    case OD_LIVE_TRACE_DIVIDER:
+        *value = trace->set_divider;
+        return true;
+    case OD_LIVE_TRACE_PRETRIGGER:
+        *value = trace->pretrigger;
+        return true;
+    case OD_LIVE_TRACE_TRIGGER:
+        *value = trace->set_trigger;
+        return true;
+    case OD_LIVE_TRACE_EDGE:
+        *value = trace->set_edge;
+        return true;
+    case OD_LIVE_TRACE_LEVEL:
+        *value = trace->set_level;
+        return true;
+    case OD_LIVE_TRACE_LENGTH:
+        *value = (int32_t)length_of(trace);
+        return true;
+    case OD_LIVE_TRACE_AT:
+        *value = trace->state == TRACE_COMPLETE ? (int32_t)(length_of(trace) - trace->after) : 0;
+        return true;
+    default:
+        if (slot >= (uint16_t)OD_LIVE_TRACE_SIGNAL_1 && slot <= (uint16_t)OD_LIVE_TRACE_SCALE_8) {
+            *value = get_list(trace, slot);
+            return true;
+        }
+        return false;
+    }
+}

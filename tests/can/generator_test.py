@@ -1,0 +1,368 @@
+"""What the generator of the dictionary refuses, with file and line, and a few facts of what it makes.
+
+Each refusal breaks the project's own source in one place, so that the rest of it stays a good source.
+"""
+import lzma
+import re
+import shutil
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+from random import Random
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+from dictionary import generate, reader  # noqa: E402
+from dictionary.source import SourceError  # noqa: E402
+
+GOOD = (ROOT / generate.SOURCE).read_text(encoding="utf-8")
+POLE_PAIRS = '{sub: 1, name: pole_pairs, unit: "1", exp10: 0, range: [1, 50], preset: 3, access: off, help: pole pairs}'
+
+
+class Project:
+    """A folder with the sources of the generator, and perhaps all that was made from them."""
+
+    def __enter__(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.root = Path(self.folder.name)
+        for path in (generate.SOURCE, generate.FAULTS, generate.LEDGER):
+            (self.root / path).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / path, self.root / path)
+        return self
+
+    def __exit__(self, *_):
+        self.folder.cleanup()
+
+    def replace(self, old, new, path=generate.SOURCE):
+        file = self.root / path
+        text = file.read_text(encoding="utf-8")
+        assert text.count(old) == 1, f"{old!r} stands {text.count(old)} times in {path}"
+        file.write_text(text.replace(old, new), encoding="utf-8")
+        return text[: text.index(old)].count("\n") + 1
+
+
+class Refusals(unittest.TestCase):
+    def refused(self, old, new, words, lines_on=0):
+        """The changed source is refused, at the line of the change (or so many after it), in these words."""
+        with Project() as project:
+            line = project.replace(old, new) + lines_on
+            with self.assertRaises(SourceError) as caught:
+                generate.files(project.root)
+            text = str(caught.exception)
+            self.assertIn(words, text)
+            self.assertRegex(text, rf"^firmware/params/parameters\.yaml:{line}: ")
+
+    def member(self, old, new, words):
+        self.assertIn(old, POLE_PAIRS)
+        self.refused(POLE_PAIRS, POLE_PAIRS.replace(old, new), words)
+
+    def test_not_yaml(self):
+        self.refused(POLE_PAIRS, "{" + POLE_PAIRS, "expected ','", lines_on=1)
+
+    def test_unknown_key(self):
+        self.member("access", "acces", "unknown key `acces`")
+
+    def test_comma_that_ends_a_text(self):
+        self.member("help: pole pairs", "help: pole pairs, of the rotor", "unknown key `of the rotor`")
+
+    def test_key_twice(self):
+        self.member("preset: 3", "preset: 3, preset: 4", "key `preset` stands twice")
+
+    def test_missing_key(self):
+        self.member(", help: pole pairs", "", "key `help` is missing")
+
+    def test_no_integer(self):
+        self.member("preset: 3", "preset: three", "`three` is not an integer")
+
+    def test_fraction(self):
+        self.member("preset: 3", "preset: 3.5", "`3.5` is not an integer")
+
+    def test_unknown_choice(self):
+        self.member("access: off", "access: sometimes", "`access` is one of")
+
+    def test_bad_name(self):
+        self.member("name: pole_pairs", "name: pole-pairs", "`pole-pairs` is not a name")
+
+    def test_range_upside_down(self):
+        self.member("[1, 50]", "[50, 1]", "range 50 to 1 is empty")
+
+    def test_range_of_three(self):
+        self.member("[1, 50]", "[1, 2, 50]", "range is [least, most]")
+
+    def test_range_beyond_type(self):
+        self.member("[1, 50]", "[1, 2147483648]", "beyond i32")
+
+    def test_range_without_room(self):
+        self.member("[1, 50]", "[1, 2147483647]", "room beyond both ends")
+
+    def test_preset_out_of_range(self):
+        self.member("preset: 3", "preset: 51", "preset 51 is outside 1 to 50")
+
+    def test_scaling_out_of_range(self):
+        self.member("exp10: 0", "exp10: -10", "exp10 must be")
+
+    def test_parameter_without_unit(self):
+        self.member('unit: "1", exp10: 0, ', "", "with unit, range and preset")
+
+    def test_parameter_of_another_type(self):
+        self.member("sub: 1,", "sub: 1, type: u32,", "is an i32")
+
+    def test_parameter_that_cannot_be_written(self):
+        self.member("access: off", "access: read", "can be written")
+
+    def test_sub_index_out_of_range(self):
+        self.member("sub: 1,", "sub: 255,", "sub-indices are 1 to 254")
+
+    def test_sub_index_zero(self):
+        self.member("sub: 1,", "sub: 0,", "sub-indices are 1 to 254")
+
+    def test_book_without_row(self):
+        self.member("access: off", 'access: off, book: "1.3"', "book is section and row")
+
+    def test_book_row_that_is_none(self):
+        self.member("access: off", 'access: off, book: "1.3 #153"', "book is section and row")
+
+    def test_help_of_two_lines(self):
+        self.member("help: pole pairs", 'help: "pole\\npairs"', "help must be one line")
+
+    def test_text_that_is_not_ascii(self):
+        self.member("help: pole pairs", "help: pôle pairs", "only printable ASCII")
+        self.member('unit: "1"', 'unit: "\\\""', "only printable ASCII")
+
+    def test_value_out_of_range(self):
+        self.member("preset: 3", "preset: 3, values: {3: three, 51: many}", "value 51 is outside")
+
+    def test_preset_that_is_no_value(self):
+        self.member("preset: 3", "preset: 3, values: {4: four}", "preset 3 is none of its values")
+
+    def test_value_that_is_no_integer(self):
+        self.member("preset: 3", "preset: 3, values: {x: four}", "keys of values are integers")
+
+    def test_flag_that_is_none(self):
+        self.member("access: off", "stored: maybe", "is true or false")
+
+    def test_received_but_only_when_off(self):
+        self.member("access: off", "access: off, map: rx", "only into what is writable at any time")
+
+    def test_same_sub_index(self):
+        self.refused("{sub: 2, name: R_s,", "{sub: 1, name: R_s,", "is used by")
+
+    def test_same_name(self):
+        self.refused("{sub: 2, name: R_s,", "{sub: 2, name: pole_pairs,", "the name is used at")
+
+    def test_same_index(self):
+        self.refused("index: 0x2200\n", "index: 0x2100\n", "index 2100h is used by machine already")
+
+    def test_index_out_of_range(self):
+        self.refused("index: 0x2200\n", "index: 0xA000\n", "is outside 1000h to 9FFFh")
+
+    def test_reserved_index(self):
+        self.refused("index: 0x2200\n", "index: 0x1F50\n", "is reserved for program download")
+
+    def test_stored_without_preset(self):
+        self.refused("stored: true, group: communication,\n   unit: s, exp10: -3, preset: 500,",
+                     "stored: true, group: communication,\n   unit: s, exp10: -3,", "needs a preset")
+
+    def test_group_without_store(self):
+        self.refused("{sub: 1, name: target_current,", "{sub: 1, stored: true, name: target_current, access: read,",
+                     "what is stored must be writable")
+
+    def test_constant_without_preset(self):
+        self.refused("access: const, preset: 0x0001000C", "access: const", "a constant needs a preset")
+
+    def test_alias_of_nothing(self):
+        self.refused("alias: acceleration", "alias: nothing", "no parameter `nothing`")
+
+    def test_alias_that_does_not_fit(self):
+        self.refused("alias: acceleration", "alias: L_dqh_rated", "cannot hold all values")
+
+    def test_repeated_without_number(self):
+        self.refused('repeat: 8, name: "{n}", help: scale', "repeat: 8, name: s, help: scale", "must hold {n}")
+
+    def test_mapping_of_nothing(self):
+        self.refused("map: [i_d, i_q]", "map: [i_d, i_x]", "no object `i_x` to be mapped")
+
+    def test_mapping_in_the_wrong_direction(self):
+        self.refused("map: [i_d, i_q]", "map: [i_d, controlword]", "`controlword` may not be mapped (tx)")
+
+    def test_mapping_of_a_parameter(self):
+        self.refused("map: [i_d, i_q]", "map: [R_s]", "`R_s` may not be mapped")
+
+    def test_mapping_too_long(self):
+        self.refused("map: [i_d, i_q]", "map: [i_d, i_q, quality]", "more than 8 bytes")
+
+    def test_identifier_twice(self):
+        self.refused("{cob_id: 0x280,", "{cob_id: 0x180,", "is used twice")
+
+    def test_identifier_of_others(self):
+        self.refused("{cob_id: 0x280,", "{cob_id: 0x80,", "none of the pre-defined")
+
+    def test_fault_in_the_wrong_place(self):
+        self.refused("- {name: STALL,", "- {name: STALLED,", "stands where fault.def has `STALL`")
+
+    def test_fault_code_that_is_none(self):
+        self.refused("- {name: STALL, code: 0x7121,", "- {name: STALL, code: 0x121,", "code is 1000h to FFFFh")
+
+    def test_error_twice(self):
+        self.refused("{code: 0x8120,", "{code: 0x8110,", "the code stands twice")
+
+    def test_fault_left_out(self):
+        with Project() as project:
+            project.replace('PM_FAULT(TEMPERATURE_SENSOR', 'PM_FAULT(NEW, "new")\nPM_FAULT(TEMPERATURE_SENSOR',
+                            generate.FAULTS)
+            with self.assertRaisesRegex(SourceError, "fault.def has `NEW`"):
+                generate.files(project.root)
+
+    def test_empty_and_missing(self):
+        with Project() as project:
+            (project.root / generate.SOURCE).write_text("# nothing\n", encoding="utf-8")
+            with self.assertRaisesRegex(SourceError, "parameters.yaml: the file is empty"):
+                generate.files(project.root)
+            (project.root / generate.SOURCE).unlink()
+            with self.assertRaisesRegex(SourceError, "parameters.yaml: "):
+                generate.files(project.root)
+
+
+class Mutations(unittest.TestCase):
+    """Whatever is typed, the answer is files or a refusal that names the file; never another error."""
+
+    PIECES = ("{", "}", "[", "]", ": ", "- ", "#", '"', "0x", "-1", "~", "&a ", "*a ", "1e9", "\t", "é", "...", "---",
+              "$NODEID + ", "$x", "<<: ", "99999999999999999999", "? ", "\\")
+
+    def mutate(self, random, text):
+        at = random.randrange(len(text))
+        kind = random.randrange(4)
+        if kind == 0:
+            return text[:at] + random.choice(self.PIECES) + text[at:]
+        if kind == 1:
+            return text[:at] + text[at + random.randint(1, 30) :]
+        if kind == 2:
+            return text[:at] + chr(random.randrange(32, 127)) + text[at + 1 :]
+        lines = text.split("\n")
+        lines[random.randrange(len(lines))] = random.choice(lines)
+        return "\n".join(lines)
+
+    def test_mutations(self):
+        random = Random(402)
+        refused = 0
+        with Project() as project:
+            for _ in range(150):
+                text = GOOD
+                for _ in range(random.randint(1, 3)):
+                    text = self.mutate(random, text)
+                (project.root / generate.SOURCE).write_text(text, encoding="utf-8")
+                try:
+                    generate.files(project.root)
+                except SourceError as error:
+                    refused += 1
+                    self.assertRegex(str(error), r"(parameters\.yaml|allocations\.txt)(:\d+)?: ")
+        self.assertGreater(refused, 75)
+
+
+class Ledger(unittest.TestCase):
+    """A place is never given twice."""
+
+    def removed(self, project):
+        project.replace(f"  - {POLE_PAIRS}\n", "")
+
+    def refused(self, project, words):
+        with self.assertRaisesRegex(SourceError, re.escape(words)):
+            generate.files(project.root)
+
+    def test_removed_without_a_word(self):
+        with Project() as project:
+            self.removed(project)
+            self.refused(project, "2100h:01 `pole_pairs` is gone from parameters.yaml and not among `retired`")
+
+    def test_retired(self):
+        with Project() as project:
+            self.removed(project)
+            project.replace("retired: []", "retired: [{index: 0x2100, sub: 1, name: pole_pairs, why: a test}]")
+            files = generate.files(project.root)
+            self.assertIn("2100:01 i32 10^0_1 pole_pairs\n", files[generate.LEDGER])
+            self.assertNotIn("pole_pairs", files["firmware/drive/parameters.def"])
+
+    def test_place_given_again(self):
+        with Project() as project:
+            project.replace(POLE_PAIRS, POLE_PAIRS.replace("pole_pairs", "other"))
+            project.replace("retired: []", "retired: [{index: 0x2100, sub: 1, name: pole_pairs, why: a test}]")
+            self.refused(project, "2100h:01 was `pole_pairs` and is never used again")
+
+    def test_name_given_again(self):
+        with Project() as project:
+            project.replace(POLE_PAIRS, POLE_PAIRS.replace("sub: 1,", "sub: 100,"))
+            project.replace("retired: []", "retired: [{index: 0x2100, sub: 1, name: pole_pairs, why: a test}]")
+            self.refused(project, "is that of a retired object")
+
+    def test_renamed(self):
+        with Project() as project:
+            project.replace(POLE_PAIRS, POLE_PAIRS.replace("pole_pairs", "poles"))
+            self.refused(project, "2100h:01 was given to `pole_pairs`")
+
+    def test_scaled_otherwise(self):
+        with Project() as project:
+            project.replace(POLE_PAIRS, POLE_PAIRS.replace("exp10: 0", "exp10: -1"))
+            self.refused(project, "another meaning needs another place")
+
+    def test_line_that_is_none(self):
+        with Project() as project:
+            project.replace("2100:01 i32", "2100.01 i32", generate.LEDGER)
+            self.refused(project, "not a line of the ledger")
+
+    def test_range_may_change(self):
+        with Project() as project:
+            project.replace(POLE_PAIRS, POLE_PAIRS.replace("[1, 50]", "[1, 60]"))
+            generate.files(project.root)
+
+
+class Made(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.files = generate.files(ROOT)
+        cls.dictionary = reader.read(ROOT / generate.SOURCE, ROOT / generate.FAULTS)
+
+    def rows(self):
+        return re.findall(r"^    \{(0x\w{4})U, (\d+)U, .*\},$", self.files["firmware/can/dictionary_table.c"], re.M)
+
+    def test_table_is_sorted_and_complete(self):
+        places = [(int(index, 16), int(sub)) for index, sub in self.rows()]
+        self.assertEqual(places, sorted(set(places)))
+        self.assertEqual(len(places), len(self.dictionary.entries))
+        self.assertIn(f"od_count = {len(places)}U;", self.files["firmware/can/dictionary_table.c"])
+
+    def test_slots_are_dense(self):
+        for lives in ("node", "parameter", "live"):
+            slots = [entry.slot for entry in self.dictionary.of(lives)]
+            self.assertEqual(slots, list(range(len(slots))), lives)
+
+    def test_parameters_are_in_the_order_of_their_slots(self):
+        names = re.findall(r"^PM_PARAM\((\w+),", self.files["firmware/drive/parameters.def"], re.M)
+        self.assertEqual(names, [entry.name for entry in self.dictionary.of("parameter")])
+
+    def test_stored_values_fit_a_page(self):
+        self.assertLessEqual(sum(entry.stored for entry in self.dictionary.entries), 254)
+
+    def test_stored_data_sheet(self):
+        data = generate.stored_eds(self.files[generate.BYTES])
+        text = lzma.decompress(data, format=lzma.FORMAT_ALONE).decode("ascii")
+        whole = self.files[f"{generate.PACKAGE}/pmdrive.eds"].splitlines()
+        self.assertEqual(text.splitlines(), [x for x in whole if not re.match(r"Description=(?!Sensorless)", x)])
+        self.assertLess(len(data), 4500)  # of 64 KiB of flash; was 3.7 KB
+
+    def test_same_source_same_files(self):
+        self.assertEqual(self.files, generate.files(ROOT))
+
+    def test_another_compressor_changes_nothing(self):
+        with Project() as project:
+            first = generate.files(project.root)[generate.BYTES]
+            data = generate.stored_eds(first)
+            weak = lzma.compress(lzma.decompress(data), format=lzma.FORMAT_ALONE, preset=0)
+            self.assertNotEqual(weak, data)
+            generate.write(generate.BYTES, "stored_eds[] = {" + ",".join(f"0x{x:02X}" for x in weak) + "}",
+                           project.root)
+            self.assertEqual(generate.stored_eds(generate.files(project.root)[generate.BYTES]), weak)
+
+
+if __name__ == "__main__":
+    unittest.main()

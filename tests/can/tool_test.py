@@ -1,0 +1,406 @@
+"""The host tool against the firmware's node (simulated.py): commands and the Python interface.
+
+usage: tool_test.py LIBRARY [unittest's words]     the shared library of firmware/can
+"""
+import contextlib
+import csv
+import io
+import json
+import sys
+import tempfile
+import threading
+import time
+import unittest
+from pathlib import Path
+from unittest import mock
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "pmdrive"))
+import canopen  # noqa: E402
+import pmdrive  # noqa: E402
+from pmdrive import cli, dictionary, files, motion, names  # noqa: E402
+from simulated import SimulatedNode  # noqa: E402
+
+LIBRARY = None
+NODE = 5
+SILENT = 127  # nobody has this id
+TOO_HIGH, TOO_LOW, NOT_NOW, READ_ONLY, NO_SUCH = 0x06090031, 0x06090032, 0x08000022, 0x06010002, 0x06020000
+
+
+class Bench(unittest.TestCase):
+    def setUp(self):
+        self.channel = f"{type(self).__name__}.{self._testMethodName}"
+        self.node = SimulatedNode(LIBRARY, self.channel, NODE)
+        self.folder = tempfile.TemporaryDirectory()
+
+    def tearDown(self):
+        self.node.stop()
+        self.folder.cleanup()
+
+    def path(self, name):
+        return str(Path(self.folder.name) / name)
+
+    def connect(self, node=NODE):
+        return pmdrive.connect(f"virtual:{self.channel}", node)
+
+    def command(self, *words, code=0, node=NODE):
+        """Output and error text of a command, whose exit code must be that."""
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            got = cli.main(["--can", f"virtual:{self.channel}", "--node", str(node), *words])
+        self.assertEqual(got, code, out.getvalue() + err.getvalue())
+        return out.getvalue(), err.getvalue()
+
+    def json(self, *words, code=0):
+        out, _ = self.command("--json", *words, code=code)
+        return [json.loads(line) for line in out.splitlines()]
+
+    def refused(self, code, function, *arguments):
+        with self.assertRaises(pmdrive.Refused) as caught:
+            function(*arguments)
+        self.assertEqual(caught.exception.code, code, str(caught.exception))
+
+
+class WholeDictionary(Bench):
+    """Every object, past the tool's own checks."""
+
+    def test_read(self):
+        with self.connect() as drive:
+            for entry in dictionary.ENTRIES:
+                with self.subTest(entry.name):
+                    if entry.name == "trace_data":
+                        self.refused(0x08000024, drive.read, entry)  # nothing has been recorded
+                    else:
+                        drive.read(entry)
+
+    def stuck(self, entry):
+        """Not for values: their writing does something else than keep a number."""
+        return entry.record in ("store", "restore", "trace", "rpdo1", "rpdo1_mapping") or entry.name in (
+            "controlword", "parameter_batch", "identification.command") or entry.record.startswith(("tpdo", "rpdo"))
+
+    def test_limits(self):
+        tried = 0
+        with self.connect() as drive:
+            for entry in dictionary.ENTRIES:
+                if entry.least is None or not entry.writable or self.stuck(entry):
+                    continue
+                with self.subTest(entry.name):
+                    tried += 1
+                    self.check_limits(drive, entry)
+        self.assertGreater(tried, len(names.select([])))
+
+    def check_limits(self, drive, entry):
+        before = drive.read(entry)
+        # the toy's cross check; two consumers of one node
+        together = entry.name in ("i_max", "i_trip", "heartbeat_consumer.consumer_2")
+        for raw in (entry.least, entry.most):
+            if not together:
+                drive.write(entry, raw)
+                self.assertEqual(drive.read(entry), raw)
+        _, _, lowest, highest = pmdrive.entry.NUMBERS[entry.type]
+        if entry.most < highest:
+            self.refused(TOO_HIGH, drive.write, entry, entry.most + 1)
+            self.refused(TOO_HIGH, drive.write, entry, highest)
+        if entry.least > lowest:
+            self.refused(TOO_LOW, drive.write, entry, entry.least - 1)
+            self.refused(TOO_LOW, drive.write, entry, lowest)
+        drive.write(entry, before)
+
+    def test_read_only(self):
+        with self.connect() as drive:
+            for entry in dictionary.ENTRIES:
+                if not entry.writable and entry.number:
+                    with self.subTest(entry.name):
+                        self.refused(READ_ONLY, drive.download, entry.index, entry.sub, entry.encode(0))
+
+    def test_while_running(self):
+        with self.connect() as drive, motion.Motion(drive, "speed", speed=1000):
+            for entry in dictionary.ENTRIES:
+                if entry.writable and entry.access == "off":
+                    with self.subTest(entry.name):
+                        self.refused(NOT_NOW, drive.write, entry, entry.preset)
+            drive.set("R_s", "6.1")
+            self.assertEqual(drive.state(), "operation enabled")
+
+    def test_no_such_object(self):
+        with self.connect() as drive:
+            self.refused(NO_SUCH, drive.upload, 0x5FFF, 0)
+            self.refused(0x06090011, drive.upload, 0x2100, 99)
+
+
+class Values(Bench):
+    def test_scan(self):
+        self.assertEqual(self.json("scan"), [{"nodes": [NODE]}])
+
+    def test_get_and_set(self):
+        out, _ = self.command("set", "R_s=6200mohm", "mode=profile torque")
+        self.assertIn("6.2 ohm", out)
+        self.assertIn("4 (profile torque)", out)
+        self.assertEqual(self.json("get", "R_s"), [{"R_s": {"value": 6.2, "unit": "ohm", "raw": 6200000}}])
+        out, _ = self.command("get", "machine", "6060")
+        self.assertEqual(len(out.splitlines()), 13)
+
+    def test_nothing_is_sent_when_one_is_wrong(self):
+        _, err = self.command("set", "R_s=6.2", "L_d=1kH", code=1)
+        self.assertIn("L_d (2100h:03): 1000 H is above the most, 1 H", err)
+        self.assertEqual(self.node["R_s"], 6000000)
+        self.assertIn("NAME=VALUE", self.command("set", "R_s", code=2)[1])
+
+    def test_the_parameter_in_the_way_is_named(self):
+        _, err = self.command("set", "i_max=9.5", code=1)
+        self.assertIn("i_max (2200h:01), by i_trip (2600h:01)", err)
+        self.assertIn("0604 0043h", err)
+
+    def test_nobody_there(self):
+        _, err = self.command("get", "R_s", code=1, node=SILENT)
+        self.assertIn(f"node {SILENT} does not answer to R_s (2100h:02)", err)
+        self.assertIn("pmdrive scan", err)
+
+    def test_errors_as_json(self):
+        found = self.json("get", "R_z", code=2)[0]
+        self.assertEqual(found, {"error": "no object is called `R_z`", "do": "did you mean R_s?"})
+        found = self.json("set", "i_max=9.5", code=1)[0]
+        self.assertEqual((found["abort"], found["index"], found["sub"]), (0x06040043, 0x2200, 1))
+
+    def test_info(self):
+        self.assertEqual(self.json("info")[0]["identity.product_code"]["value"], dictionary.PRODUCT_CODE)
+        self.assertIn("0.0001 ohm to 100 ohm", self.command("info", "R_s")[0])
+
+    def test_monitor(self):
+        self.assertEqual(len(self.json("monitor", "velocity_actual", "--count", "3", "--interval", "0")), 3)
+
+    def test_data_sheet_in_the_device(self):
+        path = self.path("device.eds")
+        self.command("eds", "--out", path)
+        od = canopen.import_od(path, node_id=NODE)
+        self.assertEqual(od["machine"]["R_s"].unit, "ohm")
+        self.assertEqual(sum(len(o) if hasattr(o, "subindices") else 1 for o in od.values()), len(dictionary.ENTRIES))
+
+
+class Sets(Bench):
+    def write(self, text):
+        path = self.path("a.yaml")
+        Path(path).write_text(text, encoding="utf-8")
+        return path
+
+    def test_dump_and_load(self):
+        path = self.path("dump.yaml")
+        self.command("set", "R_s=6.5", "psi_m=0.2")
+        self.command("dump", "--out", path)
+        self.assertEqual(len(files.read(path)), len(names.stored()))
+        self.command("set", "R_s=6", "psi_m=0.236")
+        self.assertEqual({x["name"] for x in self.json("diff", path)[0]}, {"R_s", "psi_m"})
+        self.json("load", path)
+        self.assertEqual(self.json("diff", path), [[]])
+        self.assertEqual((self.node["R_s"], self.node["psi_m"]), (6500000, 200000000))
+
+    def test_dry_run_writes_nothing(self):
+        out, _ = self.command("load", self.write("R_s: 7 ohm\n"), "--dry-run")
+        self.assertIn("6 ohm -> 7 ohm", out)
+        self.assertEqual(self.node["R_s"], 6000000)
+
+    def test_no_terminal_to_ask_at(self):
+        with mock.patch.object(sys, "stdin", io.StringIO()):
+            _, err = self.command("load", self.write("R_s: 7 ohm\n"), code=2)
+        self.assertIn("--yes", err)
+        self.assertEqual(self.node["R_s"], 6000000)
+
+    def test_those_that_belong_together(self):
+        """In the order of the file, i_max alone would be refused."""
+        self.command("load", self.write("i_max: 20 A\ni_trip: 30 A\n"), "--yes")
+        self.assertEqual((self.node["i_max"], self.node["i_trip"]), (20000, 30000))
+
+    def test_refused_together_is_undone(self):
+        _, err = self.command("load", self.write("R_s: 7 ohm\ni_max: 40 A\ni_trip: 30 A\n"), "--yes", code=1)
+        self.assertIn("by i_trip (2600h:01)", err)
+        self.assertEqual((self.node["R_s"], self.node["i_max"], self.node["i_trip"]), (6000000, 5000, 9000))
+        self.assertEqual(self.node["parameter_batch"], 0)
+
+    def test_read_back(self):
+        """A drive that takes a value without keeping it does not go unnoticed."""
+        path = self.write("R_s: 7 ohm\n")
+        with self.connect() as drive, mock.patch.object(type(drive), "write"):
+            with self.assertRaisesRegex(pmdrive.NotDone, "R_s is 6 ohm"):
+                drive.load(files.read(path))
+
+    def test_file_and_line(self):
+        self.assertIn("a.yaml:2: no object is called", self.command("diff", self.write("R_s: 6\nR_x: 3\n"), code=2)[1])
+
+    def test_defaults(self):
+        self.assertEqual(self.json("diff"), [[]])
+        self.command("set", "R_s=7")
+        self.assertEqual([x["name"] for x in self.json("diff")[0]], ["R_s"])
+
+    def test_save_restore_reset(self):
+        self.command("set", "R_s=7", "i_max=6", "heartbeat_time=0.2")
+        self.command("save")
+        self.command("reset")
+        self.assertEqual([self.node[x] for x in ("R_s", "i_max")], [7000000, 6000])
+        self.assertEqual(self.json("get", "heartbeat_time")[0]["heartbeat_time"]["raw"], 200)
+        self.command("restore", "machine")
+        self.assertEqual(self.node["R_s"], 7000000)
+        self.command("reset")
+        self.assertEqual([self.node[x] for x in ("R_s", "i_max")], [6000000, 6000])
+        self.command("restore")
+        self.command("reset")
+        self.assertEqual(self.node["i_max"], 5000)
+
+    def test_not_saved_is_lost(self):
+        self.command("set", "R_s=7")
+        self.command("reset")
+        self.assertEqual(self.node["R_s"], 6000000)
+
+
+class Motion(Bench):
+    def wait(self, condition, seconds=3.0):
+        end = time.monotonic() + seconds
+        while not condition() and time.monotonic() < end:
+            time.sleep(0.01)
+        self.assertTrue(condition())
+
+    def test_speed(self):
+        with self.connect() as drive:
+            with motion.Motion(drive, "speed", speed=20000) as running:
+                self.wait(lambda: drive.read("velocity_actual") == 20000)
+                running.set_speed(-10000)
+                self.wait(lambda: drive.read("velocity_actual") == -10000)
+            self.assertNotIn(drive.state(), ("operation enabled", "switched on"))
+            self.wait(lambda: drive.read("velocity_actual") == 0)
+
+    def test_run_for_a_time(self):
+        seen = [x["velocity_actual"]["value"] for x in self.json("run", "speed", "200rpm", "--for", "1")]
+        self.assertAlmostEqual(max(seen), 20.944, places=3)
+        self.wait(lambda: self.node["velocity_actual"] == 0)
+        self.assertIsNone(self.node.enabled_at)
+
+    def test_never_unattended(self):
+        with mock.patch.object(sys, "stdin", io.StringIO()):
+            _, err = self.command("run", "speed", "200rpm", code=2)
+        self.assertIn("--for SECONDS", err)
+        self.command("run", "speed", "200rpm", "--for", "1e9", code=2)
+        self.assertEqual(self.node.lib.cia402_on(self.node.profile), 0)
+
+    def test_stops_on_interrupt(self):
+        with self.connect() as drive:
+            with self.assertRaises(KeyboardInterrupt):
+                with motion.Motion(drive, "speed", speed=20000):
+                    self.wait(lambda: drive.read("velocity_actual") == 20000)
+                    raise KeyboardInterrupt
+            self.wait(lambda: self.node["velocity_actual"] == 0)
+            self.assertEqual(self.node.fault, 0)
+
+    def test_commands_cease(self):
+        """The program is killed: the drive's own timer switches the torque off."""
+        with self.connect() as drive:
+            running = motion.Motion(drive, "speed", speed=20000)
+            running.start()
+            running.task.stop()
+            began = time.monotonic()
+            self.wait(lambda: self.node.fault != 0)
+            self.assertLess(time.monotonic() - began, 1.5)  # 0.5 s of 1400h:05
+            self.assertEqual(self.node.alarms[0], 0x8250)
+
+    def test_timer_that_was_switched_off(self):
+        with self.connect() as drive:
+            drive.write("rpdo1.event_timer", 0)
+            with motion.Motion(drive, "speed", speed=0):
+                self.assertEqual(drive.read("rpdo1.event_timer"), motion.WATCH_MS)
+
+    def test_fault_while_running(self):
+        threading.Timer(0.5, lambda: self.node.trip(1)).start()
+        _, err = self.command("run", "speed", "200rpm", "--for", "10", code=1)
+        self.assertIn("over-current", err)
+        self.assertIn("pmdrive faults --clear", err)
+
+    def test_fault_before(self):
+        with self.node.gate:
+            self.node.trip(3)
+        self.assertIn("DC-link over-voltage", self.command("run", "speed", "200rpm", "--for", "1", code=1)[1])
+
+    def test_mapping_of_another(self):
+        with self.connect() as drive:
+            drive.write("rpdo1.cob_id", 0x80000200 + NODE)
+            drive.write("rpdo1_mapping.count", 0)
+        _, err = self.command("run", "speed", "200rpm", "--for", "1", code=2)
+        self.assertIn("receive PDO 1 is not as delivered", err)
+
+    def test_faults(self):
+        with self.node.gate:
+            self.node.trip(8)
+        out, _ = self.command("faults")
+        self.assertIn("position lost", out)
+        self.assertIn("7305h", out)
+        self.assertEqual(self.json("faults")[0]["code"], 8)
+        self.command("faults", "--clear")
+        self.assertEqual(self.json("faults")[0]["fault"], None)
+
+    def test_stop(self):
+        with self.connect() as drive, motion.Motion(drive, "speed", speed=20000) as running:
+            self.wait(lambda: drive.state() == "operation enabled")
+            running.task.stop()
+            self.command("stop")
+            self.assertNotEqual(drive.state(), "operation enabled")
+
+
+class Trace(Bench):
+    def test_csv(self):
+        path = self.path("t.csv")
+        found = self.json("trace", "i_d", "theta", "--trigger", "i_d", "--level", "1.5A", "--edge", "falling", "--pre",
+                          "0.25", "--divider", "2", "--out", path)
+        self.assertEqual(found, [{"file": path, "samples": 300, "signals": ["i_d", "theta"]}])
+        self.assertEqual([self.node[f"trace.{x}"] for x in ("trigger", "level", "edge", "pretrigger", "divider")],
+                         [1, 1500, 1, 250, 2])
+        self.assertEqual([self.node[f"trace_signal.{n}"] for n in (1, 2, 3)], [0x29000100, 0x29000A00, 0])
+        with open(path, encoding="ascii") as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual(list(rows[0]), ["t_s", "i_d_A", "theta_turn"])
+        for k in (0, 2, 299):
+            self.assertAlmostEqual(float(rows[k]["t_s"]), (k - 2) * 2e-4, places=9)
+            self.assertAlmostEqual(float(rows[k]["i_d_A"]), 0.001 * (100 + k - 2), places=9)
+            self.assertAlmostEqual(float(rows[k]["theta_turn"]), (200 + k - 2) / 65536, places=8)
+
+    def test_refusals(self):
+        self.assertIn("cannot be recorded", self.command("trace", "R_s", code=2)[1])
+        self.assertIn("not among the signals", self.command("trace", "i_d", "--trigger", "i_q", code=2)[1])
+        self.assertIn("1 to 8", self.command("trace", *["i_d"] * 9, code=2)[1])
+        self.assertIn("neither .csv, .png nor .mf4", self.command("trace", "i_d", "--out", "x.mat", code=2)[1])
+
+    def test_never_triggered(self):
+        self.node._trace = lambda command: None
+        _, err = self.command("trace", "i_d", "--wait", "0.1", code=1)
+        self.assertIn("nothing was recorded in 0.1 s", err)
+
+
+class Shell(Bench):
+    def test_commands(self):
+        from pmdrive.shell import Shell as Prompt
+
+        with self.connect() as drive:
+            prompt = Prompt(cli.parser().parse_args(["shell"]), drive)
+            out = io.StringIO()
+            with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
+                for line in ("set R_s=6.3", "get R_s", "get R_z", "nonsense", "", "set 'R_s"):
+                    self.assertFalse(prompt.onecmd(line))
+            self.assertTrue(prompt.onecmd("quit"))
+        self.assertEqual(out.getvalue().count("6.3 ohm"), 2)
+        self.assertIn("did you mean R_s?", out.getvalue())
+        self.assertEqual(prompt.completedefault("psi_"), ["psi_m"])
+        self.assertEqual(prompt.completenames("fau"), ["faults"])
+
+    def test_completion(self):
+        out, _ = self.command("completion")
+        self.assertIn(" psi_m ", out)
+
+    def test_interface(self):
+        self.assertIn("is no CAN interface", str(self.error("socketcand:host")))
+        self.assertIn("cannot open", str(self.error("nosuchcan0")))
+
+    def error(self, spec):
+        with self.assertRaises(pmdrive.PmdriveError) as caught:
+            pmdrive.connect(spec)
+        return caught.exception
+
+
+if __name__ == "__main__":
+    LIBRARY = Path(sys.argv.pop(1)).absolute()
+    sys.path.insert(0, str(Path(__file__).parent))
+    unittest.main()

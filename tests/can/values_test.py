@@ -1,0 +1,150 @@
+"""Values, names and files of the host tool: what people write and read against what is on the bus."""
+import sys
+import unittest
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "pmdrive"))
+from pmdrive import dictionary, files, names  # noqa: E402
+from pmdrive.errors import ABORTS, Refused, UsageError, ValueRefused  # noqa: E402
+from pmdrive.entry import NUMBERS  # noqa: E402
+
+
+class Values(unittest.TestCase):
+    def parsed(self, name, text, raw):
+        self.assertEqual(names.find(name).parse(text), raw, f"{name} {text}")
+
+    def refused(self, name, text, words):
+        entry = names.find(name)
+        with self.assertRaises(ValueRefused) as caught:
+            entry.check(entry.parse(text))
+        self.assertIn(entry.where, str(caught.exception))
+        self.assertIn(words, str(caught.exception))
+
+    def test_units_and_prefixes(self):
+        for text in ("6.2", "6.2 ohm", "6.2ohm", "6200 mohm", "6.2e3mohm", "0.0062 kohm", "6.2 Ω"):
+            self.parsed("R_s", text, 6200000)
+        self.parsed("dead_time", "2.5 us", 2500)
+        self.parsed("dead_time", "2.5 µs", 2500)
+        self.parsed("dead_time", "2500 ns", 2500)
+        self.parsed("L_d", "43 mH", 43000000)
+        self.parsed("current_bandwidth", "0.5 kHz", 500000)
+        self.parsed("target_velocity", "-100 rpm", -10472)
+        self.parsed("theta", "90 deg", 2**30)
+        self.parsed("quality", "50 %", 500)
+        self.parsed("pole_pairs", "3", 3)
+        self.parsed("device_type", "0x20192", 0x20192)
+
+    def test_words(self):
+        self.parsed("mode", "profile torque", 4)
+        self.parsed("mode", "Open-loop current", -1)
+        self.parsed("trace.edge", "falling", 1)
+        self.refused("mode", "profile", "profile torque")
+
+    def test_decimals_are_exact(self):
+        for raw in (1, 3, 999999999, -4466001):
+            entry = names.find("L_dqh_rated")
+            self.assertEqual(entry.parse(entry.text(raw)), raw)
+
+    def test_refusals(self):
+        self.refused("R_s", "6 V", "unit `V` is not understood: its unit is ohm")
+        self.refused("R_s", "6 mV", "not understood")
+        self.refused("R_s", "much", "is not a number")
+        self.refused("R_s", "", "is not a number")
+        self.refused("R_s", "1..2", "is not a number")
+        self.refused("R_s", "nan", "is not a number")
+        self.refused("R_s", "1e-8", "less than its resolution")
+        self.refused("R_s", "99 uohm", "below the least, 0.0001 ohm")
+        self.refused("R_s", "100.000001", "above the most, 100 ohm")
+        self.refused("R_s", "1e400", "above the most")
+        self.refused("pole_pairs", "3.5", "is not an integer")
+        self.refused("pole_pairs", "3 Hz", "it has no unit")
+
+    def test_limits_and_presets_survive(self):
+        for entry in dictionary.ENTRIES:
+            if not entry.number or entry.exp2:
+                continue
+            for raw in (entry.least, entry.most, entry.preset):
+                if raw is not None:
+                    self.assertEqual(entry.raw(entry.physical(raw)), raw, entry.name)
+                    self.assertEqual(entry.decode(entry.encode(raw)), raw, entry.name)
+                    if not entry.values:
+                        self.assertEqual(entry.parse(entry.text(raw)), raw, entry.name)
+
+    def test_bytes(self):
+        entry = names.find("L_dqh_rated")
+        self.assertEqual(entry.encode(-2), b"\xfe\xff\xff\xff")
+        self.assertEqual(names.find("mode").decode(b"\xff"), -1)
+        self.assertEqual(names.find("device_name").decode(b"pmdrive\0"), "pmdrive")
+        with self.assertRaises(ValueRefused):
+            entry.decode(b"\0\0")
+        for kind, (_, _, least, most) in NUMBERS.items():
+            entry = next(e for e in dictionary.ENTRIES if e.type == kind)
+            for raw in (least - 1, most + 1):
+                with self.assertRaises(ValueRefused):
+                    entry.encode(raw)
+
+
+class Names(unittest.TestCase):
+    def test_found(self):
+        entry = names.find("R_s")
+        for text in ("2100:02", "2100:2", "0x2100:0x02", "2100h:02h", "r_s"):
+            self.assertIs(names.find(text), entry)
+        self.assertEqual(names.find("1000").name, "device_type")
+
+    def test_not_found(self):
+        with self.assertRaisesRegex(UsageError, "did you mean v_injection"):
+            names.find("v_injecton")
+        with self.assertRaisesRegex(UsageError, "2100h:FE is not in the dictionary"):
+            names.find("2100:FE")
+
+    def test_select(self):
+        self.assertEqual(len(names.select([])), 54)
+        self.assertEqual({e.record for e in names.select(["machine", "R_s"])}, {"machine"})
+
+    def test_identity_on_the_bus_is_not_among_the_stored(self):
+        self.assertNotIn("can_node_id", [e.name for e in names.stored()])
+        self.assertEqual({e.record for e in names.stored("machine")}, {"machine"})
+
+
+class Files(unittest.TestCase):
+    def test_there_and_back(self):
+        for group in ("machine", "application", "communication"):
+            values = {entry: entry.preset for entry in names.stored(group)}
+            self.assertEqual(files.parse(files.render(values, group), "x"), values)
+
+    def test_as_a_machine_file_has_it(self):
+        values = files.parse("drive:\n  R_s: 6.0      # measured\n\n  # L\n  L_d: 43.0e-3  # D: #1\n", "x")
+        self.assertEqual({e.name: raw for e, raw in values.items()}, {"R_s": 6000000, "L_d": 43000000})
+
+    def refused(self, text, words):
+        with self.assertRaises(UsageError) as caught:
+            files.parse(text, "a.yaml")
+        self.assertIn(words, str(caught.exception))
+
+    def test_refusals(self):
+        self.refused("R_s: 6\nL_d 3\n", "a.yaml:2: not a line")
+        self.refused("R_s: 6\n\nR_z: 3\n", "a.yaml:3: no object is called `R_z`")
+        self.refused("R_s: 6\nR_s: 7\n", "a.yaml:2: R_s stands here and in line 1")
+        self.refused("R_s: 6 kg\n", "a.yaml:1: R_s (2100h:02): unit `kg`")
+        self.refused("R_s: 1e9\n", "a.yaml:1: R_s (2100h:02): 1000000000 ohm is above the most")
+        self.refused("statusword: 1\n", "cannot be set")
+        self.refused("trace_data: 1\n", "cannot be set")
+
+    def test_missing_file(self):
+        with self.assertRaisesRegex(UsageError, "/nowhere/x.yaml"):
+            files.read("/nowhere/x.yaml")
+
+
+class Words(unittest.TestCase):
+    def test_abort_codes_say_what_to_do(self):
+        for code, (meaning, do) in ABORTS.items():
+            self.assertTrue(meaning and do, hex(code))
+        text = str(Refused("R_s (2100h:02)", 0x08000022))
+        self.assertIn("R_s (2100h:02)", text)
+        self.assertIn("0800 0022h", text)
+        self.assertIn("pmdrive stop", text)
+        self.assertIn("does not know", str(Refused("x", 0x12345678)))
+
+
+if __name__ == "__main__":
+    unittest.main()

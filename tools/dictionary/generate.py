@@ -1,0 +1,80 @@
+"""All files made from the dictionary, as {path: text}."""
+import re
+from pathlib import Path
+
+import jinja2
+
+from . import emit_c, emit_dbc, emit_docs, emit_eds, ledger, reader
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = "firmware/params/parameters.yaml"
+FAULTS = "firmware/drive/fault.def"
+PACKAGE = "tools/pmdrive/pmdrive"
+BYTES = "firmware/can/dictionary_bytes.c"
+LEDGER = "firmware/params/allocations.txt"
+
+
+def _environment():
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(str(Path(__file__).parent / "templates")),
+        undefined=jinja2.StrictUndefined, keep_trailing_newline=True, autoescape=False,
+    )
+    environment.filters.update(emit_c.FILTERS)
+    environment.filters.update(emit_eds.FILTERS_OF_TEMPLATE)
+    environment.filters.update(emit_docs.FILTERS)
+    return environment
+
+
+def _c_files(render, dictionary, sheet):
+    render("firmware/drive/parameters.def", "parameters.def.j2", objects=dictionary.objects)
+    render("firmware/app/error_codes.def", "error_codes.def.j2", faults=dictionary.faults)
+    render("firmware/can/dictionary_slots.h", "dictionary_slots.h.j2", node=dictionary.of("node"),
+           live=dictionary.of("live"), parameters=dictionary.of("parameter"),
+           bytes=[e for e in dictionary.of("constant") if e.bits == 0])
+    render("firmware/can/dictionary_table.c", "dictionary_table.c.j2", entries=dictionary.entries,
+           schema=emit_c.schema(dictionary))
+    render(BYTES, "dictionary_bytes.c.j2",
+           constants=emit_c.constants(dictionary, sheet))
+
+
+def stored_eds(text):
+    """The electronic data sheet that the text of BYTES holds, empty if there is none."""
+    match = re.search(r"stored_eds\[\] = \{([^}]*)\}", text)
+    return bytes(int(x, 16) for x in re.findall(r"0x([0-9A-F]{2})", match[1])) if match else b""
+
+
+def files(root=ROOT):
+    """Reads and checks the source below root and makes everything from it: {path: text}."""
+    root = Path(root)
+    dictionary = reader.read(root / SOURCE, root / FAULTS, SOURCE)
+    out = {LEDGER: ledger.update(root / LEDGER, dictionary)}
+    environment = _environment()
+
+    def render(path, template, **names):
+        out[path] = environment.get_template(template).render(**names)
+
+    counts = {way: sum(p.direction == way for p in dictionary.pdos) for way in ("receive", "transmit")}
+    names = {"device": dictionary.device, "objects": dictionary.objects, "faults": dictionary.faults,
+             "errors": dictionary.errors, "pdos": dictionary.pdos, "schema": emit_c.schema(dictionary), **counts}
+    render("docs/object-dictionary.md", "object-dictionary.md.j2", parts=emit_docs.parts(dictionary), **names)
+    render(f"{PACKAGE}/dictionary.py", "dictionary.py.j2",
+           rows=[(obj.name, e) for obj in dictionary.objects for e in obj.entries], **names)
+    render(f"{PACKAGE}/pmdrive.dbc", "dbc.j2", messages=emit_dbc.messages(dictionary),
+           node_id=dictionary.device["default_node_id"])
+    lists = emit_eds.lists(dictionary)
+    render(f"{PACKAGE}/pmdrive.eds", "eds.j2", stored=False, lists=lists, **names)
+    short = environment.get_template("eds.j2").render(stored=True, lists=lists, **names)
+    before = (root / BYTES).read_text(encoding="ascii") if (root / BYTES).is_file() else ""
+    _c_files(render, dictionary, emit_eds.compressed(short, stored_eds(before)))
+    return out
+
+
+def same(path, data, root=ROOT):
+    target = Path(root) / path
+    return target.is_file() and target.read_bytes() == data.encode("utf-8")
+
+
+def write(path, data, root=ROOT):
+    target = Path(root) / path
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_bytes(data.encode("utf-8"))

@@ -1,0 +1,200 @@
+"""From the source to the dictionary of model.py."""
+import re
+
+from . import model, pdo, source
+from .model import Entry, Object
+
+NODE_ID = re.compile(r"\$NODEID *\+ *(0x[0-9A-Fa-f]+|\d+)")
+EDS_FORMAT = 0x80  # 1022h: the manufacturer's own
+DEVICE_KEYS = ("vendor", "vendor_id", "product", "product_code", "revision", "default_node_id")
+FAULT_LINE = re.compile(r'PM_FAULT\((\w+), "([^"]*)"\)')
+
+
+def _preset(table, entry, device):
+    if "preset" not in table.nodes:
+        return
+    text = table.text("preset")
+    relative = NODE_ID.fullmatch(text)
+    if relative:
+        entry.node_id, entry.preset = True, int(relative[1], 0)
+    elif entry.type in ("string", "domain"):
+        entry.text = device.get(text[1:], text) if text.startswith("$") else text
+        entry.preset = 0
+    elif text.startswith("$") and text[1:] in device:
+        entry.preset = device[text[1:]]
+    else:
+        entry.preset = table.integer("preset")
+
+
+def _name(table, pattern=model.NAME):
+    name = table.text("name")
+    if not pattern.fullmatch(name):
+        raise table.error(f"`{name}` is not a name: letters, digits and _ only", "name")
+    return name
+
+
+def _entry(table, index, sub, member, record, inherit, device):
+    def get(key, method, *args):
+        holder = table if key in table.nodes else inherit
+        return getattr(holder, method)(key, *args)
+
+    alias = table.text("alias", "")
+    lives = "parameter" if alias else get("lives", "choice", model.LIVES)
+    record_name = record if record is None else _name(record)
+    name = member if record is None or record.flag("flat") else f"{record_name}.{member}"
+    entry = Entry(
+        place=table.place, index=index, sub=sub, name=name, member=member, alias=alias, lives=lives,
+        type=get("type", "choice", tuple(model.TYPES)), access=get("access", "choice", model.ACCESS),
+        help=table.text("help"), unit=get("unit", "text", " ").strip(), exp10=get("exp10", "integer", 0),
+        exp2=get("exp2", "integer", 0),
+        stored=get("stored", "flag"), group=get("group", "choice", model.GROUPS, "none"),
+        map=get("map", "choice", model.MAPS, "none"), book=table.text("book", ""),
+    )
+    entry.book = entry.book.strip()
+    if "range" in table.nodes:
+        limits = table.integers("range")
+        if len(limits) != 2:
+            raise table.error("range is [least, most]", "range")
+        entry.least, entry.most = limits
+    if "values" in table.nodes:
+        values = table.table("values")
+        try:
+            entry.values = {int(key, 0): values.text(key) for key in values.nodes}
+        except ValueError:
+            raise table.error("keys of values are integers", "values") from None
+    _preset(table, entry, device)
+    if not entry.stored:
+        entry.group = "none"
+    return entry
+
+
+def _members(table, index, device):
+    """Entries of a record, with sub-index 0 before them."""
+    entries = []
+    for member in table.tables("members", f"member of {table.text('name')}"):
+        member.only(model.MEMBER_KEYS)
+        first, count = member.integer("sub"), member.integer("repeat", 1)
+        if first < 1 or count < 1 or first + count > 255:
+            raise member.error("sub-indices are 1 to 254", "sub")
+        name = member.text("name")
+        if count > 1 and "{n}" not in name:
+            raise member.error("the name of repeated members must hold {n}", "name")
+        for n in range(count):
+            own = name.replace("{n}", str(n + 1))
+            if not (model.NAME if table.flag("flat") else model.MEMBER).fullmatch(own):
+                raise member.error(f"`{own}` is not a name: letters, digits and _ only", "name")
+            entries.append(_entry(member, index, first + n, own, table, table, device))
+    if not entries:
+        raise table.error("a record has members", "members")
+    entries.sort(key=lambda x: x.sub)
+    return [_count_entry(table, index, entries[-1].sub, device)] + entries
+
+
+def _count_entry(table, index, highest, device):
+    if "sub0" not in table.nodes:
+        return Entry(place=table.place, index=index, sub=0, name=f"{_name(table)}.count", member="count", type="u8",
+                     lives="constant", access="const", help="highest sub-index", preset=highest)
+    own = table.table("sub0")
+    own.only(("access", "preset", "range", "help"))
+    entry = _entry(own, index, 0, "count", table, table, device)
+    entry.type, entry.unit, entry.exp10, entry.map, entry.values = "u8", "", 0, "none", {}
+    return entry
+
+
+def _object(table, device):
+    table.only(model.OBJECT_KEYS)
+    index, name = table.integer("index"), _name(table)
+    if not 0x1000 <= index <= 0x9FFF:
+        raise table.error(f"index {index:#x} is outside 1000h to 9FFFh", "index")
+    if "members" in table.nodes:
+        form = table.choice("form", ("record", "array"), "record")
+        entries = _members(table, index, device)
+    else:
+        form = "variable"
+        entries = [_entry(table, index, 0, name, None, table, device)]
+    return Object(table.place, index, name, table.text("help"), form, entries)
+
+
+def _device(root):
+    table = root.table("device")
+    table.only(DEVICE_KEYS)
+    device = {key: table.integer(key) for key in DEVICE_KEYS if key not in ("vendor", "product")}
+    if not 1 <= device["default_node_id"] <= 127:
+        raise table.error("default_node_id is 1 to 127", "default_node_id")
+    device["eds_format"] = EDS_FORMAT
+    device["version"] = f"{device['revision'] // 0x10000}.{device['revision'] % 0x10000}"
+    return {**device, "vendor": _plain(table, "vendor"), "product": _plain(table, "product")}
+
+
+def _faults(root, fault_file):
+    """In the order of the drive's own list, which gives the numbers."""
+    with open(fault_file, encoding="utf-8") as file:
+        known = FAULT_LINE.findall(file.read())
+    tables = root.tables("faults", "fault")
+    faults = []
+    for table in tables:
+        table.only(("name", "code", "register", "do"))
+        name = table.text("name")
+        wanted = known[len(faults)][0] if len(faults) < len(known) else "no more"
+        if name != wanted:
+            raise table.error(f"`{name}` stands where fault.def has `{wanted}`", "name")
+        code, bit = table.integer("code"), table.integer("register")
+        if not 0x1000 <= code <= 0xFFFF or not 0 <= bit <= 7:
+            raise table.error("code is 1000h to FFFFh and register a bit, 0 to 7")
+        faults.append(model.Fault(name, known[len(faults)][1], code, bit, _plain(table, "do")))
+    if len(faults) < len(known):
+        raise root.error(f"fault.def has `{known[len(faults)][0]}`, which is not here", "faults")
+    return faults
+
+
+def _plain(table, key):
+    text = table.text(key)
+    if not model.TEXT.fullmatch(text):
+        raise table.error(f"only printable ASCII without quotes and backslash is possible in `{key}`", key)
+    return text
+
+
+def _errors(root):
+    errors = {}
+    for table in root.tables("errors", "error"):
+        table.only(("code", "text"))
+        if table.integer("code") in errors:
+            raise table.error("the code stands twice", "code")
+        errors[table.integer("code")] = _plain(table, "text")
+    return errors
+
+
+def _reserved(root):
+    out = []
+    for table in root.tables("reserved", "reserved range"):
+        table.only(("first", "last", "why"))
+        out.append((table.integer("first"), table.integer("last"), table.text("why")))
+    return out
+
+
+def _retired(root):
+    out = []
+    for table in root.tables("retired", "retired object"):
+        table.only(("index", "sub", "name", "why"))
+        table.text("why")
+        out.append((table.integer("index"), table.integer("sub"), table.text("name")))
+    return out
+
+
+def read(path, fault_file, shown=None):
+    """The whole dictionary; SourceError with file and line if anything is wrong."""
+    root = source.load(path, shown)
+    root.only(("device", "reserved", "retired", "objects", "pdos", "faults", "errors"))
+    device = _device(root)
+    objects = [_object(table, device) for table in root.tables("objects", "object")]
+    plans = pdo.read(root)
+    objects += pdo.objects(plans)
+    objects.sort(key=lambda x: x.index)
+    dictionary = model.Dictionary(
+        device, objects, [], _faults(root, fault_file), _errors(root), _reserved(root), _retired(root)
+    )
+    model.link_alias(dictionary)
+    model.check_all(dictionary)
+    model.number_slots(dictionary)
+    dictionary.pdos = pdo.resolve(plans, dictionary)
+    return dictionary

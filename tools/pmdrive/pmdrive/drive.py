@@ -1,0 +1,208 @@
+"""One drive on the bus: its values, what it keeps, its faults. Motion is in motion.py, the oscilloscope in trace.py."""
+import time
+
+import can
+import canopen
+from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
+
+from . import dictionary, names
+from .entry import Entry
+from .errors import BusError, FaultError, NoAnswer, NotDone, Refused, UsageError
+
+SAVE = int.from_bytes(b"save", "little")
+LOAD = int.from_bytes(b"load", "little")
+TOGETHER = 0x06040043  # abort code of the check of all parameters together
+GROUPS = ("all", "communication", "application", "machine")
+# Statusword: (mask, value): state of CiA 402
+STATES = (
+    (0x4F, 0x00, "not ready to switch on"), (0x4F, 0x40, "switch on disabled"), (0x6F, 0x21, "ready to switch on"),
+    (0x6F, 0x23, "switched on"), (0x6F, 0x27, "operation enabled"), (0x6F, 0x07, "quick stop active"),
+    (0x4F, 0x0F, "fault reaction active"), (0x4F, 0x08, "fault"),
+)
+
+
+def state_of(statusword):
+    return next((name for mask, value, name in STATES if statusword & mask == value), f"0x{statusword:04X}")
+
+
+def error_text(code):
+    """Of an error code of 603Fh, 1003h or an emergency message."""
+    fault = next((f for f in dictionary.FAULTS if f.error_code == code & 0xFFFF), None)
+    return fault.text if fault else dictionary.ERRORS.get(code & 0xFFFF, "unknown error")
+
+
+class Drive:
+    """Closes its network. Names may be those of the dictionary or index:sub."""
+
+    def __init__(self, network, node_id):
+        self.network, self.node_id = network, node_id
+        self.node = canopen.RemoteNode(node_id, canopen.ObjectDictionary())
+        network.add_node(self.node)
+        self.node.sdo.RESPONSE_TIMEOUT = 0.5
+        self.node.sdo.MAX_RETRIES = 2
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def close(self):
+        self.network.disconnect()
+
+    # --- single values ----------------------------------------------------------------------------------------
+
+    def _call(self, label, index, sub, function, *arguments):
+        try:
+            return function(index, sub, *arguments)
+        except SdoAbortedError as error:
+            raise Refused(label, error.code, index, sub) from None
+        except SdoCommunicationError:
+            raise NoAnswer(self.node_id, label) from None
+        except can.CanError as error:
+            raise BusError(f"cannot send: {error}", "nobody acknowledges: check cable, bit rate and power") from None
+
+    def upload(self, index, sub, label=""):
+        return self._call(label or f"{index:04X}h:{sub:02X}", index, sub, self.node.sdo.upload)
+
+    def download(self, index, sub, data, label=""):
+        self._call(label or f"{index:04X}h:{sub:02X}", index, sub, self.node.sdo.download, data)
+
+    @staticmethod
+    def entry(name):
+        return name if isinstance(name, Entry) else names.find(name)
+
+    def read(self, name):
+        """The integer, text or bytes of an object."""
+        entry = self.entry(name)
+        return entry.decode(self.upload(entry.index, entry.sub, entry.label))
+
+    def write(self, name, raw):
+        entry = self.entry(name)
+        if not entry.writable or not entry.number:
+            raise UsageError(f"{entry.label} cannot be set", entry.help)
+        try:
+            self.download(entry.index, entry.sub, entry.encode(raw), entry.label)
+        except Refused as error:
+            if error.code != TOGETHER:
+                raise
+            culprit = names.BY_PLACE.get(divmod(self.read("parameter_refused"), 256))
+            if culprit is None:
+                raise
+            raise Refused(f"{entry.label}, by {culprit.label}", error.code, entry.index, entry.sub) from None
+
+    def get(self, name):
+        """A Decimal in the unit of the dictionary, or text."""
+        entry = self.entry(name)
+        raw = self.read(entry)
+        return entry.physical(raw) if entry.number else raw
+
+    def set(self, name, value):
+        """A number, or text with a unit. Returns the integer that is there then."""
+        entry = self.entry(name)
+        raw = entry.parse(value)
+        entry.check(raw)
+        self.write(entry, raw)
+        return self.read(entry)
+
+    # --- many values ------------------------------------------------------------------------------------------
+
+    def dump(self, entries=None, progress=None):
+        """{entry: integer}; all that is stored if no entries are given."""
+        entries = names.stored() if entries is None else entries
+        out = {}
+        for n, entry in enumerate(entries, 1):
+            out[entry] = self.read(entry)
+            if progress:
+                progress(n, len(entries))
+        return out
+
+    def diff(self, values, progress=None):
+        """[(entry, here, there)] of what differs from values."""
+        present = self.dump(list(values), progress)
+        return [(entry, present[entry], raw) for entry, raw in values.items() if present[entry] != raw]
+
+    def load(self, values, dry_run=False, progress=None):
+        """Sets what differs, all checked together by the drive, and reads it back. Returns what diff() gave."""
+        changes = self.diff(values)
+        if dry_run or not changes:
+            return changes
+        together = [e for e, _, _ in changes if e.record in names.DRIVE_RECORDS]
+        if together:
+            self.write("parameter_batch", 1)
+        try:
+            for n, (entry, _, raw) in enumerate(changes, 1):
+                self.write(entry, raw)
+                if progress:
+                    progress(n, len(changes))
+        finally:
+            if together:
+                self.write("parameter_batch", 0)
+        wrong = self.diff({entry: raw for entry, _, raw in changes})
+        if wrong:
+            lost = ", ".join(f"{entry.name} is {entry.text(here)}" for entry, here, _ in wrong[:5])
+            raise NotDone(f"{len(wrong)} of {len(changes)} values were not taken: {lost}",
+                          "the drive has refused them when it checked all together")
+        return changes
+
+    def save(self, group="all"):
+        self._store(0x1010, group, SAVE)
+
+    def restore(self, group="all"):
+        """Defaults, from the next reset on."""
+        self._store(0x1011, group, LOAD)
+
+    def _store(self, index, group, signature):
+        if group not in GROUPS:
+            raise UsageError(f"`{group}` is none of the groups", ", ".join(GROUPS))
+        name = {0x1010: "store", 0x1011: "restore"}[index]
+        self.download(index, GROUPS.index(group) + 1, signature.to_bytes(4, "little"), f"{name}.{group}")
+
+    def reset(self, communication=False, seconds=3.0):
+        """Restart of the drive, or of its communication alone; returns when it answers again."""
+        self.network.send_message(0, bytes([130 if communication else 129, self.node_id]))
+        end = time.monotonic() + seconds
+        time.sleep(0.05)
+        while True:
+            try:
+                self.read("device_type")
+                return
+            except NoAnswer:
+                if time.monotonic() > end:
+                    raise
+
+    # --- what it is and how it does ---------------------------------------------------------------------------
+
+    def info(self):
+        """{name: integer or text} of what identifies it and of its state."""
+        wanted = ("device_name", "hardware_version", "software_version", "identity.vendor_id", "identity.product_code",
+                  "identity.revision", "identity.serial_number", "parameters_ready", "statusword", "mode_display",
+                  "drive_state", "drive_fault", "dc_link_voltage", "temperature")
+        return {name: self.read(name) for name in wanted}
+
+    def state(self):
+        return state_of(self.read("statusword"))
+
+    def faults(self):
+        """The latched fault, its record and the history of errors."""
+        code = self.read("drive_fault")
+        record = [e for e in names.RECORDS["fault_record"] if e.sub]
+        count = self.read("error_history.count")
+        return {
+            "fault": dictionary.FAULTS[code - 1] if 0 < code <= len(dictionary.FAULTS) else None,
+            "code": code,
+            "record": {e: self.read(e) for e in record},
+            "history": [self.read(f"error_history.{n}") for n in range(1, min(count, 8) + 1)],
+        }
+
+    def clear_fault(self, seconds=2.0):
+        """By the rising edge of bit 7 of the controlword."""
+        self.write("controlword", 0)
+        self.write("controlword", 0x80)
+        end = time.monotonic() + seconds
+        while self.state() in ("fault", "fault reaction active"):
+            if time.monotonic() > end:
+                fault = self.faults()["fault"]
+                raise FaultError(f"the fault stays: {fault.text if fault else 'unknown'}", fault.do if fault else "")
+            time.sleep(0.02)
+        self.write("controlword", 0)

@@ -1,0 +1,58 @@
+"""Files of values: one `name: value unit` a line, # before a comment. So written, a file is YAML as well."""
+import re
+from pathlib import Path
+
+from . import names
+from .errors import PmdriveError, UsageError
+
+LINE = re.compile(r"\s*([A-Za-z0-9_.:]+?)\s*:\s+(.*?)\s*")
+
+
+def _comment(text):
+    """Without the comment: # at the start of a line or after a blank."""
+    match = re.search(r"(^|\s)#", text)
+    return text[: match.start()] if match else text
+
+
+def parse(text, shown):
+    """{entry: integer}; errors name file and line."""
+    out, lines = {}, {}
+    for number, line in enumerate(text.splitlines(), 1):
+        line = _comment(line)
+        if not line.strip() or line.strip() in ("drive:", "---"):
+            continue
+        match = LINE.fullmatch(line)
+        if not match:
+            raise UsageError(f"{shown}:{number}: not a line of the form `name: value`: {line.strip()}")
+        try:
+            entry = names.find(match[1])
+            if not entry.writable or not entry.number:
+                raise UsageError(f"{entry.label} cannot be set")
+            raw = entry.parse(match[2].strip("\"'"))
+            entry.check(raw)
+        except PmdriveError as error:
+            raise UsageError(f"{shown}:{number}: {error.text}", error.do) from None
+        if entry in out:
+            raise UsageError(f"{shown}:{number}: {entry.name} stands here and in line {lines[entry]}")
+        out[entry], lines[entry] = raw, number
+    return out
+
+
+def read(path):
+    try:
+        return parse(Path(path).read_text(encoding="utf-8"), path)
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path}: {error}") from None
+
+
+def render(values, title=""):
+    """The text of a file: {entry: integer}, by record, with units and help."""
+    lines, record = ([f"# {title}"] if title else []), None
+    for entry, raw in values.items():
+        if entry.record != record:
+            lines += ["", f"# {entry.record}"]
+            record = entry.record
+        number = str(raw) if entry.values or not entry.unit else entry.plain(raw)
+        value = f"{number} {entry.unit}" if entry.unit not in ("", "1") and not entry.values else number
+        lines.append(f"{entry.name + ':':32s} {value:24s} # {entry.help}")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,112 @@
+"""Runs the motor, as long as someone attends: a time that was given, or a key that is held.
+
+The commands go out ten times a second in receive PDO 1, whose timer in the drive (1400h:05) switches the torque off
+when they cease: pulling the cable, closing the laptop or killing the program stops the motor.
+"""
+import struct
+import time
+
+from . import dictionary
+from .drive import state_of
+from .errors import FaultError, NotDone, UsageError
+
+PERIOD_S = 0.1
+WATCH_MS = 500
+MODES = {"speed": 3, "torque": 4, "current": -1}
+MAPPED = (0x60400010, 0x60600008, 0x60FF0020)
+SHUTDOWN, SWITCH_ON, ENABLE = 0x06, 0x07, 0x0F
+
+
+class Motion:
+    """Between start() and stop() the drive follows; use it with `with`, which stops it whatever happens."""
+
+    def __init__(self, drive, mode, speed=0, torque=0, current=0):
+        """Speed in mrad/s, torque in thousandths of rated, current in mA: the integers of the dictionary."""
+        if mode not in MODES:
+            raise UsageError(f"`{mode}` is no mode", ", ".join(MODES))
+        self.drive, self.mode = drive, MODES[mode]
+        self.speed, self.torque, self.current = speed, torque, current
+        self.task = None
+
+    def __enter__(self):
+        try:
+            self.start()
+        except BaseException:
+            self.stop()
+            raise
+        return self
+
+    def __exit__(self, *_):
+        self.stop()
+
+    def _data(self, controlword):
+        return struct.pack("<Hbi", controlword, self.mode, self.speed)
+
+    def _send(self, controlword):
+        self.controlword = controlword
+        self.task.update(self._data(controlword))
+
+    def _prepare(self):
+        drive = self.drive
+        words = [drive.read(f"rpdo1_mapping.object_{n}") for n in range(1, drive.read("rpdo1_mapping.count") + 1)]
+        cob_id = drive.read("rpdo1.cob_id")
+        if tuple(words) != MAPPED or cob_id & 0x80000000:
+            raise UsageError("receive PDO 1 is not as delivered: it carries the commands",
+                             "`pmdrive restore communication`, then `pmdrive reset`")
+        if not 0 < drive.read("rpdo1.event_timer") <= 1000:
+            drive.write("rpdo1.event_timer", WATCH_MS)
+        self.check_fault()
+        drive.write("target_torque", self.torque)
+        drive.write("target_current", self.current)
+        drive.network.send_message(0, bytes([1, drive.node_id]))  # NMT: start
+        return cob_id & 0x7FF
+
+    def start(self, seconds=10.0):
+        cob_id = self._prepare()
+        self.task = self.drive.network.send_periodic(cob_id, self._data(0), PERIOD_S)
+        for controlword, wanted in ((SHUTDOWN, "ready to switch on"), (SWITCH_ON, "switched on"),
+                                    (ENABLE, "operation enabled")):
+            self._send(controlword)
+            self._wait(wanted, seconds)
+
+    def _wait(self, wanted, seconds):
+        end = time.monotonic() + seconds
+        while self.drive.state() != wanted:
+            self.check_fault()
+            if time.monotonic() > end:
+                ready = self.drive.entry("parameters_ready")
+                raise NotDone(f"the drive does not go to `{wanted}`, it is `{self.drive.state()}`",
+                              f"parameters_ready says: {ready.text(self.drive.read(ready))}")
+            time.sleep(0.02)
+
+    def check_fault(self):
+        if "fault" in state_of(self.drive.read("statusword")):
+            code = self.drive.read("drive_fault")
+            known = dictionary.FAULTS[code - 1] if 0 < code <= len(dictionary.FAULTS) else None
+            raise FaultError(f"the drive is in a fault: {known.text if known else 'of the communication'}",
+                             f"{known.do + '; then ' if known else ''}`pmdrive faults --clear`")
+
+    def set_speed(self, speed):
+        self.speed = speed
+        self._send(self.controlword)
+
+    def stop(self, seconds=30.0):
+        """Slows down, then off; the commands go on until it is off."""
+        if self.task is None:
+            return
+        try:
+            self._send(SWITCH_ON)  # disable operation, as 605Ch says
+            end = time.monotonic() + seconds
+            while self.drive.state() == "operation enabled" and time.monotonic() < end:
+                time.sleep(0.02)
+            self._send(0)
+            time.sleep(2 * PERIOD_S)
+        finally:
+            self.task.stop()
+            self.task = None
+            self.drive.network.send_message(0, bytes([128, self.drive.node_id]))  # NMT: pre-operational
+
+
+def switch_off(drive):
+    """From anywhere, at once: the torque goes off, the motor coasts."""
+    drive.write("controlword", 0)
