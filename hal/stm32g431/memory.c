@@ -4,7 +4,9 @@
 #include <stdint.h>
 
 void *memcpy(void *restrict to, const void *restrict from, size_t size);
+void *memmove(void *to, const void *from, size_t size);
 void *memset(void *to, int value, size_t size);
+int memcmp(const void *first, const void *second, size_t size);
 
 static bool by_words(uintptr_t a, uintptr_t b, size_t size)
 {
@@ -44,4 +46,32 @@ void *memset(void *to, int value, size_t size)
         }
     }
     return to;
+}
+
+void *memmove(void *to, const void *from, size_t size)
+{
+    uint8_t *t = to;
+    const uint8_t *f = from;
+    if ((uintptr_t)to < (uintptr_t)from) {
+        for (size_t n = 0; n < size; ++n) {
+            t[n] = f[n];
+        }
+    } else {
+        for (size_t n = size; n > 0U; --n) {
+            t[n - 1U] = f[n - 1U];
+        }
+    }
+    return to;
+}
+
+int memcmp(const void *first, const void *second, size_t size)
+{
+    const uint8_t *a = first;
+    const uint8_t *b = second;
+    for (size_t n = 0; n < size; ++n) {
+        if (a[n] != b[n]) {
+            return (int)a[n] - (int)b[n];
+        }
+    }
+    return 0;
 }
