@@ -127,7 +127,7 @@ static bool obey_fault(cia402_t *self, const cia402_in_t *in, bool edge)
 static void give_targets(const cia402_t *self, cia402_out_t *out)
 {
     const bool halted = (self->controlword & HALT) != 0U || self->state == CIA402_QUICK_STOP_ACTIVE;
-    out->mode = self->active_mode;
+    out->mode = (int8_t)self->active_mode;
     if (!halted) {
         out->velocity = self->active_mode == CIA402_MODE_TORQUE ? 0 : self->target_velocity;
         out->torque = self->active_mode == CIA402_MODE_TORQUE ? self->target_torque : 0;

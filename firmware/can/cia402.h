@@ -45,7 +45,7 @@ typedef struct {
     bool enable;
     bool coast; /* when not enabled: the bridge opens at once; else the drive stops first */
     bool clear_fault;
-    int16_t mode;
+    int8_t mode;
     int32_t velocity; /* mrad/s */
     int32_t torque;   /* permille of the rated torque */
     int32_t current;  /* mA */
