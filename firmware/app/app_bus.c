@@ -35,7 +35,7 @@ static uint16_t error_code(const app_t *app)
 
 /* --- called up by the node -------------------------------------------------------------------------- */
 
-static bool send(void *context, const node_frame_t *frame)
+bool node_host_send(void *context, const node_frame_t *frame)
 {
     hal_can_frame_t out = {.id = frame->id, .length = frame->length};
     (void)memcpy(out.data, frame->data, sizeof out.data);
@@ -49,12 +49,12 @@ bool app_is_on(const app_t *app)
            (state != DRIVE_OFF && state != DRIVE_FAULT);
 }
 
-static bool on(void *context)
+bool node_host_on(void *context)
 {
     return app_is_on(app_of(context));
 }
 
-static int32_t get(void *context, const od_entry_t *entry)
+int32_t node_host_get(void *context, const od_entry_t *entry)
 {
     app_t *app = app_of(context);
     int32_t value = 0;
@@ -74,7 +74,7 @@ static int32_t get(void *context, const od_entry_t *entry)
     return value;
 }
 
-static uint32_t put(void *context, const od_entry_t *entry, int32_t value)
+uint32_t node_host_put(void *context, const od_entry_t *entry, int32_t value)
 {
     app_t *app = app_of(context);
     uint32_t code = 0;
@@ -94,7 +94,7 @@ static bool is_board_name(const od_entry_t *entry)
     return entry->slot == (uint16_t)OD_LIVE_HARDWARE_VERSION;
 }
 
-static uint32_t size(void *context, const od_entry_t *entry)
+uint32_t node_host_size(void *context, const od_entry_t *entry)
 {
     const app_t *app = app_of(context);
     if (is_board_name(entry)) {
@@ -103,7 +103,7 @@ static uint32_t size(void *context, const od_entry_t *entry)
     return entry->slot == (uint16_t)OD_LIVE_TRACE_DATA ? trace_size(&app->trace) : 0U;
 }
 
-static void read(void *context, const od_entry_t *entry, uint32_t offset, uint8_t bytes[], uint32_t count)
+void node_host_read(void *context, const od_entry_t *entry, uint32_t offset, uint8_t bytes[], uint32_t count)
 {
     const app_t *app = app_of(context);
     if (is_board_name(entry)) {
@@ -113,8 +113,8 @@ static void read(void *context, const od_entry_t *entry, uint32_t offset, uint8_
     }
 }
 
-static uint32_t write(void *context, const od_entry_t *entry, uint32_t offset, const uint8_t bytes[],
-                      uint32_t count, bool last)
+uint32_t node_host_write(void *context, const od_entry_t *entry, uint32_t offset, const uint8_t bytes[],
+                         uint32_t count, bool last)
 {
     (void)context;
     (void)entry;
@@ -125,7 +125,7 @@ static uint32_t write(void *context, const od_entry_t *entry, uint32_t offset, c
     return SDO_UNSUPPORTED; /* the dictionary has no domain that is written */
 }
 
-static bool store(void *context, uint32_t group)
+bool node_host_store(void *context, uint32_t group)
 {
     app_t *app = app_of(context);
     const bool done = app_store_group(app, group, true);
@@ -136,18 +136,18 @@ static bool store(void *context, uint32_t group)
     return done;
 }
 
-static bool restore(void *context, uint32_t group)
+bool node_host_restore(void *context, uint32_t group)
 {
     return app_store_group(app_of(context), group, false);
 }
 
-static void recall(void *context)
+void node_host_recall(void *context)
 {
     app_recall(app_of(context), OD_NODE);
 }
 
 /* While it is off there is nothing to save. */
-static void alarm(void *context, uint16_t code)
+void node_host_alarm(void *context, uint16_t code)
 {
     app_t *app = app_of(context);
     if (app_is_on(app) && app->drive.fault == DRIVE_FAULT_NONE) {
@@ -156,25 +156,10 @@ static void alarm(void *context, uint16_t code)
     }
 }
 
-static void reset(void *context)
+void node_host_reset(void *context)
 {
     hal_reset(app_of(context)->hal);
 }
-
-static const node_host_t host = {
-    .send = send,
-    .on = on,
-    .get = get,
-    .put = put,
-    .size = size,
-    .read = read,
-    .write = write,
-    .store = store,
-    .restore = restore,
-    .recall = recall,
-    .alarm = alarm,
-    .reset = reset,
-};
 
 /* --- the drive ---------------------------------------------------------------------------------------- */
 
@@ -271,10 +256,10 @@ void app_bus_init(app_t *app)
     hal_unique_id(app->hal, id);
     cia402_init(&app->cia402);
     app_recall(app, OD_LIVE);
-    trace_init(&app->trace, app->trace_ring, APP_TRACE_NUMBERS, app_traceable, app);
+    trace_init(&app->trace, app->trace_ring, APP_TRACE_NUMBERS, app);
     const cia402_in_t facts = app_drive_facts(app);
     app->given = cia402_step(&app->cia402, &facts); /* nothing that the drive does not do already */
-    node_init(&app->node, &host, app, id[0] ^ id[1] ^ id[2], hal_time_us(app->hal));
+    node_init(&app->node, app, id[0] ^ id[1] ^ id[2], hal_time_us(app->hal));
 }
 
 void app_bus_run(app_t *app)

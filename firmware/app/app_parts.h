@@ -15,7 +15,6 @@ bool app_is_on(const app_t *app); /* the bridge is on, or about to be */
 
 /* app_values.c: what is shown of the drive; false: not one of these */
 bool app_value(app_t *app, uint16_t slot, int32_t *value);
-bool app_traceable(void *app, uint16_t index, uint8_t sub, trace_signal_t *signal);
 cia402_in_t app_drive_facts(const app_t *app);
 int32_t app_torque_uNm(const app_t *app, int32_t permille);
 

@@ -42,37 +42,45 @@ static unit_t speed_e(const app_t *app)
     return (unit_t){.base = app->drive.config.base.omega, .exponent = 3};
 }
 
-static unit_t speed_mech(const app_t *app)
-{
-    return (unit_t){.base = omega_mech(app), .exponent = 3};
-}
+typedef enum { IN_CURRENT, IN_VOLTAGE, IN_SPEED_E, IN_SPEED_MECH, IN_SHARE } unit_kind_t;
 
-static unit_t share(const app_t *app)
+static unit_t unit_of(const app_t *app, unit_kind_t kind)
 {
-    (void)app;
-    return (unit_t){.base = pm_num(1), .exponent = 3};
+    switch (kind) {
+    case IN_CURRENT:
+        return current(app);
+    case IN_VOLTAGE:
+        return voltage(app);
+    case IN_SPEED_E:
+        return speed_e(app);
+    case IN_SPEED_MECH:
+        return (unit_t){.base = omega_mech(app), .exponent = 3};
+    case IN_SHARE:
+    default:
+        return (unit_t){.base = pm_num(1), .exponent = 3};
+    }
 }
 
 /* A signal of the drive that is a number in memory, as it is in every period */
 typedef struct {
     uint16_t slot, offset;
-    unit_t (*unit)(const app_t *app);
+    unit_kind_t unit;
 } signal_row_t;
 
 static const signal_row_t signals[] = {
-    {OD_LIVE_I_D, offsetof(drive_t, status.i.d), current},
-    {OD_LIVE_I_Q, offsetof(drive_t, status.i.q), current},
-    {OD_LIVE_I_D_REF, offsetof(drive_t, i_ref.d), current},
-    {OD_LIVE_I_Q_REF, offsetof(drive_t, i_ref.q), current},
-    {OD_LIVE_I_A, offsetof(drive_t, i_abc.a), current},
-    {OD_LIVE_I_B, offsetof(drive_t, i_abc.b), current},
-    {OD_LIVE_I_C, offsetof(drive_t, i_abc.c), current},
-    {OD_LIVE_OMEGA_E, offsetof(drive_t, position.pll.omega), speed_e},
-    {OD_LIVE_VELOCITY_ACTUAL, offsetof(drive_t, position.pll.omega), speed_mech},
-    {OD_LIVE_VELOCITY_DEMAND, offsetof(drive_t, status.omega_ref), speed_mech},
-    {OD_LIVE_DC_LINK_VOLTAGE, offsetof(drive_t, status.v_dc), voltage},
-    {OD_LIVE_QUALITY, offsetof(drive_t, position.quality), share},
-    {OD_LIVE_WEIGHT, offsetof(drive_t, position.weight), share},
+    {OD_LIVE_I_D, offsetof(drive_t, status.i.d), IN_CURRENT},
+    {OD_LIVE_I_Q, offsetof(drive_t, status.i.q), IN_CURRENT},
+    {OD_LIVE_I_D_REF, offsetof(drive_t, i_ref.d), IN_CURRENT},
+    {OD_LIVE_I_Q_REF, offsetof(drive_t, i_ref.q), IN_CURRENT},
+    {OD_LIVE_I_A, offsetof(drive_t, i_abc.a), IN_CURRENT},
+    {OD_LIVE_I_B, offsetof(drive_t, i_abc.b), IN_CURRENT},
+    {OD_LIVE_I_C, offsetof(drive_t, i_abc.c), IN_CURRENT},
+    {OD_LIVE_OMEGA_E, offsetof(drive_t, position.pll.omega), IN_SPEED_E},
+    {OD_LIVE_VELOCITY_ACTUAL, offsetof(drive_t, position.pll.omega), IN_SPEED_MECH},
+    {OD_LIVE_VELOCITY_DEMAND, offsetof(drive_t, status.omega_ref), IN_SPEED_MECH},
+    {OD_LIVE_DC_LINK_VOLTAGE, offsetof(drive_t, status.v_dc), IN_VOLTAGE},
+    {OD_LIVE_QUALITY, offsetof(drive_t, position.quality), IN_SHARE},
+    {OD_LIVE_WEIGHT, offsetof(drive_t, position.weight), IN_SHARE},
 };
 
 static const signal_row_t *signal_of(uint16_t slot)
@@ -92,7 +100,7 @@ static const volatile int32_t *place_of(const app_t *app, const signal_row_t *ro
 }
 
 /* Kept with a range of twice the base, resolution 2^-14 of it */
-bool app_traceable(void *context, uint16_t index, uint8_t sub, trace_signal_t *signal)
+bool trace_host_find(void *context, uint16_t index, uint8_t sub, trace_signal_t *signal)
 {
     const app_t *app = context;
     bool has_index;
@@ -109,7 +117,7 @@ bool app_traceable(void *context, uint16_t index, uint8_t sub, trace_signal_t *s
     if (row == NULL) {
         return false;
     }
-    const unit_t unit = row->unit(app);
+    const unit_t unit = unit_of(app, row->unit);
     const int32_t scale = in_units(2 * PM_ONE, unit.base, unit.exponent);
     *signal = (trace_signal_t){.source = place_of(app, row), .shift = PM_Q_BITS - 14, .scale = scale};
     return true;
@@ -229,7 +237,7 @@ bool app_value(app_t *app, uint16_t slot, int32_t *value)
 {
     const signal_row_t *row = signal_of(slot);
     if (row != NULL) {
-        const unit_t unit = row->unit(app);
+        const unit_t unit = unit_of(app, row->unit);
         *value = in_units(*place_of(app, row), unit.base, unit.exponent);
         return true;
     }
@@ -268,7 +276,7 @@ cia402_in_t app_drive_facts(const app_t *app)
     const drive_t *drive = &app->drive;
     const protection_config_t *limit = &drive->config.protection;
     const uint32_t derated = (uint32_t)DRIVE_LIMIT_TEMPERATURE | (uint32_t)DRIVE_LIMIT_DC_VOLTAGE;
-    const unit_t unit = speed_mech(app);
+    const unit_t unit = unit_of(app, IN_SPEED_MECH);
     return (cia402_in_t){
         .ready = app_ready(app) == APP_READY,
         .fault = drive->fault != DRIVE_FAULT_NONE,

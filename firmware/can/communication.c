@@ -172,7 +172,7 @@ static void preset_words(node_t *node)
         const od_entry_t *entry = &od_table[row];
         node_recall(node, entry, entry->preset);
     }
-    node->host->recall(node->context);
+    node_host_recall(node->context);
 }
 
 void communication_reset(node_t *node)

@@ -112,13 +112,13 @@ static void configure(node_t *node, const uint8_t data[8])
 {
     const uint8_t command = data[0];
     uint32_t result = ERROR_OPERATION;
-    if (!node->host->on(node->context)) {
+    if (!node_host_on(node->context)) {
         if (command == (uint8_t)LSS_CONFIGURE_ID) {
             result = configure_id(node, data[1]);
         } else if (command == (uint8_t)LSS_CONFIGURE_RATE) {
             result = configure_rate(node, data[1], data[2]);
         } else {
-            result = node->host->store(node->context, NODE_GROUP_LSS) ? 0U : ERROR_STORE;
+            result = node_host_store(node->context, NODE_GROUP_LSS) ? 0U : ERROR_STORE;
         }
     }
     reply(node, command, result);

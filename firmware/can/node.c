@@ -24,7 +24,7 @@ enum {
 
 static void drain(node_t *node)
 {
-    while (node->ring_count > 0U && node->host->send(node->context, &node->ring[node->ring_first])) {
+    while (node->ring_count > 0U && node_host_send(node->context, &node->ring[node->ring_first])) {
         node->ring_first = (uint8_t)((node->ring_first + 1U) % (uint32_t)NODE_RING);
         node->ring_count--;
     }
@@ -38,7 +38,7 @@ uint32_t node_room(const node_t *node)
 bool node_send(node_t *node, const node_frame_t *frame)
 {
     drain(node);
-    if (node->ring_count == 0U && node->host->send(node->context, frame)) {
+    if (node->ring_count == 0U && node_host_send(node->context, frame)) {
         return true;
     }
     if (node_room(node) == 0U) {
@@ -53,7 +53,7 @@ bool node_send(node_t *node, const node_frame_t *frame)
 void node_alarm(node_t *node, node_error_t source, uint16_t code)
 {
     node_error(node, source, code, 0);
-    node->host->alarm(node->context, code);
+    node_host_alarm(node->context, code);
 }
 
 void node_lose_master(node_t *node)
@@ -87,10 +87,9 @@ void node_boot_up(node_t *node)
     }
 }
 
-void node_init(node_t *node, const node_host_t *host, void *context, uint32_t serial, uint32_t now_us)
+void node_init(node_t *node, void *context, uint32_t serial, uint32_t now_us)
 {
     (void)memset(node, 0, sizeof *node);
-    node->host = host;
     node->context = context;
     node->now_us = now_us;
     node_boot_up(node);
@@ -104,7 +103,7 @@ void node_init(node_t *node, const node_host_t *host, void *context, uint32_t se
 static void leave(node_t *node, node_nmt_t next)
 {
     const bool loses = next == NODE_STOPPED || node->nmt == NODE_OPERATIONAL;
-    if (loses && node->host->on(node->context)) {
+    if (loses && node_host_on(node->context)) {
         node_alarm(node, NODE_ERROR_NMT, CODE_NMT);
         emcy_run(node); /* in STOPPED there is none */
     }
@@ -137,7 +136,7 @@ static void nmt_receive(node_t *node, const node_frame_t *frame)
         break;
     case NMT_RESET:
         leave(node, NODE_STOPPED);
-        node->host->reset(node->context);
+        node_host_reset(node->context);
         node_boot_up(node);
         break;
     case NMT_RESET_COMMUNICATION:

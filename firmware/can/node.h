@@ -3,7 +3,7 @@
  * NMT slave, heartbeat producer and consumer, SDO server (expedited, segmented, block), four RPDOs and four
  * TPDOs, SYNC, EMCY with history, LSS. It knows nothing of motors: values are the application's, by slot.
  *
- *   node_init(n, host, context, serial, now)   values of the dictionary, then boot-up
+ *   node_init(n, context, serial, now)   values of the dictionary, then boot-up
  *   node_receive(n, frame, now)                for every frame, at any time
  *   node_run(n, now)                           once per round of the main loop: timers and what waits to be
  * sent node_bus(n, state), node_error(n, ...)     what the application has noticed
@@ -13,8 +13,8 @@
  * counted, but an SDO block waits for room.
  *
  * Reactions: heartbeat of a master lost, RPDO time-out, bus-off, and leaving OPERATIONAL or a reset while the
- * application is on, call host->alarm(). After a lost heartbeat or bus-off the node goes from OPERATIONAL to
- * PRE-OPERATIONAL as 1029h says. Tests: tests/unit/can. */
+ * application is on, call node_host_alarm(). After a lost heartbeat or bus-off the node goes from OPERATIONAL
+ * to PRE-OPERATIONAL as 1029h says. Tests: tests/unit/can. */
 #ifndef CAN_NODE_H
 #define CAN_NODE_H
 
@@ -64,30 +64,32 @@ typedef enum {
 #define SDO_STATE        0x08000022U /* not in the present state of the device */
 #define SDO_NO_DATA      0x08000024U
 
-/* What the node asks of the application. Numbers of 8 and 16 bits come and go as the value they mean;
- * unsigned 32 bits as their bit pattern. Ranges have been checked, and that OD_ONLY_OFF finds it off. */
-typedef struct {
-    bool (*send)(void *context, const node_frame_t *frame); /* false: no room */
-    bool (*on)(void *context);                              /* the bridge is on, or about to be */
-    int32_t (*get)(void *context, const od_entry_t *entry); /* OD_PARAMETER, OD_LIVE */
-    uint32_t (*put)(void *context, const od_entry_t *entry, int32_t value); /* abort code */
-    uint32_t (*size)(void *context, const od_entry_t *entry);               /* bytes of a live domain */
-    /* Of a live domain, within its size; the same bytes may be asked for again. */
-    void (*read)(void *context, const od_entry_t *entry, uint32_t offset, uint8_t bytes[], uint32_t count);
-    /* In order; `last` comes once, after all checks, perhaps with count 0. Abort code. */
-    uint32_t (*write)(void *context, const od_entry_t *entry, uint32_t offset, const uint8_t bytes[],
-                      uint32_t count, bool last);
-    bool (*store)(void *context, uint32_t group);   /* OD_GROUP_..., NODE_GROUP_... */
-    bool (*restore)(void *context, uint32_t group); /* forgets what is stored */
-    void (*recall)(void *context);                  /* give stored communication objects: node_recall() */
-    void (*alarm)(void *context, uint16_t code);    /* torque off; what EMCY says */
-    void (*reset)(void *context);                   /* restart of all; may return */
-} node_host_t;
+/* What the node asks of the application, which defines it: called directly, so that the depth of the stack
+ * can be told. Numbers of 8 and 16 bits come and go as the value they mean; unsigned 32 bits as their bit
+ * pattern. Ranges have been checked, and that OD_ONLY_OFF finds it off. */
+bool node_host_send(void *context, const node_frame_t *frame); /* false: no room */
+bool node_host_on(void *context);                              /* the bridge is on, or about to be */
+int32_t node_host_get(void *context, const od_entry_t *entry); /* OD_PARAMETER, OD_LIVE */
+uint32_t node_host_put(void *context, const od_entry_t *entry, int32_t value); /* abort code */
+uint32_t node_host_size(void *context, const od_entry_t *entry);               /* bytes of a live domain */
+
+/* Of a live domain, within its size; the same bytes may be asked for again. */
+void node_host_read(void *context, const od_entry_t *entry, uint32_t offset, uint8_t bytes[], uint32_t count);
+
+/* In order; `last` comes once, after all checks, perhaps with count 0. Abort code. */
+uint32_t node_host_write(void *context, const od_entry_t *entry, uint32_t offset, const uint8_t bytes[],
+                         uint32_t count, bool last);
+
+bool node_host_store(void *context, uint32_t group);   /* OD_GROUP_..., NODE_GROUP_... */
+bool node_host_restore(void *context, uint32_t group); /* forgets what is stored */
+void node_host_recall(void *context);                  /* give stored communication objects: node_recall() */
+void node_host_alarm(void *context, uint16_t code);    /* torque off; what EMCY says */
+void node_host_reset(void *context);                   /* restart of all; may return */
 
 typedef struct node node_t; /* caller-owned: node_state.h */
 
-/* The host stays the caller's; `serial` is sub 4 of 1018h. */
-void node_init(node_t *node, const node_host_t *host, void *context, uint32_t serial, uint32_t now_us);
+/* `context` is given back to the application; `serial` is sub 4 of 1018h. */
+void node_init(node_t *node, void *context, uint32_t serial, uint32_t now_us);
 void node_receive(node_t *node, const node_frame_t *frame, uint32_t now_us);
 void node_run(node_t *node, uint32_t now_us);
 
@@ -97,7 +99,7 @@ void node_bus(node_t *node, node_bus_t state);
  * bytes. The same code again says nothing new. */
 void node_error(node_t *node, node_error_t source, uint16_t code, uint32_t info);
 
-/* Of an OD_NODE entry: from within host->recall(), as stored; and to be stored. Those with OD_NODE_ID are
+/* Of an OD_NODE entry: from within node_host_recall(), as stored; and to be stored. Those with OD_NODE_ID are
  * relative to the node id. */
 void node_recall(node_t *node, const od_entry_t *entry, int32_t value);
 int32_t node_stored(const node_t *node, const od_entry_t *entry);

@@ -68,7 +68,6 @@ typedef struct {
 } node_emcy_t;
 
 struct node {
-    const node_host_t *host;
     void *context;
     node_nmt_t nmt;
     uint8_t id;    /* in use; 255: none */

@@ -64,7 +64,7 @@ int32_t object_get(const node_t *node, const od_entry_t *entry)
         return (int32_t)node->word[entry->slot];
     case OD_PARAMETER:
     case OD_LIVE:
-        return node->host->get(node->context, entry);
+        return node_host_get(node->context, entry);
     case OD_CONSTANT:
     default:
         return object_preset(node, entry);
@@ -112,8 +112,7 @@ static uint32_t put_signature(const node_t *node, const od_entry_t *entry, uint3
     if (value != (store ? SIGNATURE_SAVE : SIGNATURE_LOAD)) {
         return SDO_SIGNATURE;
     }
-    const bool done =
-        store ? node->host->store(node->context, group) : node->host->restore(node->context, group);
+    const bool done = store ? node_host_store(node->context, group) : node_host_restore(node->context, group);
     return done ? SDO_OK : SDO_HARDWARE;
 }
 
@@ -123,7 +122,7 @@ uint32_t object_check_write(const node_t *node, const od_entry_t *entry)
         return SDO_READ_ONLY;
     }
     const bool only_off = (entry->flags & (uint32_t)OD_ONLY_OFF) != 0U;
-    return (only_off && node->host->on(node->context)) ? SDO_STATE : SDO_OK;
+    return (only_off && node_host_on(node->context)) ? SDO_STATE : SDO_OK;
 }
 
 uint32_t object_put(node_t *node, const od_entry_t *entry, int32_t value)
@@ -140,7 +139,7 @@ uint32_t object_put(node_t *node, const od_entry_t *entry, int32_t value)
         return communication_put(node, entry, (uint32_t)value);
     case OD_PARAMETER:
     case OD_LIVE:
-        return node->host->put(node->context, entry, value);
+        return node_host_put(node->context, entry, value);
     case OD_CONSTANT:
     default:
         return put_signature(node, entry, (uint32_t)value);

@@ -128,7 +128,7 @@ void pdo_run(node_t *node)
         node_pdo_t *pdo = &node->rpdo[n];
         if (pdo->timed && pdo->event_us > 0U && node_elapsed(node, pdo->last_us, pdo->event_us)) {
             pdo->timed = false;
-            if (node->host->on(node->context)) {
+            if (node_host_on(node->context)) {
                 node_alarm(node, NODE_ERROR_RPDO, CODE_TIME_OUT);
             }
         }

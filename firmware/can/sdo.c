@@ -76,7 +76,7 @@ uint32_t sdo_begin_upload(node_t *node, const uint8_t request[8])
     } else if (entry->kind == (uint8_t)OD_CONSTANT) {
         sdo->size = od_bytes[entry->slot].size;
     } else {
-        sdo->size = node->host->size(node->context, entry);
+        sdo->size = node_host_size(node->context, entry);
     }
     return sdo->size == 0U ? SDO_NO_DATA : SDO_OK;
 }
@@ -89,7 +89,7 @@ void sdo_fetch(const node_t *node, uint32_t position, uint8_t bytes[], uint32_t 
     } else if (sdo->entry->kind == (uint8_t)OD_CONSTANT) {
         (void)memcpy(bytes, &od_bytes[sdo->entry->slot].bytes[position], count);
     } else {
-        node->host->read(node->context, sdo->entry, position, bytes, count);
+        node_host_read(node->context, sdo->entry, position, bytes, count);
     }
 }
 
@@ -172,7 +172,7 @@ uint32_t sdo_deliver(node_t *node, const uint8_t bytes[], uint32_t count, bool l
         return SDO_TOO_SHORT;
     }
     if (!is_number(sdo->entry)) {
-        return node->host->write(node->context, sdo->entry, at, bytes, count, last);
+        return node_host_write(node->context, sdo->entry, at, bytes, count, last);
     }
     (void)memcpy(&sdo->number[at], bytes, count);
     return last ? object_put(node, sdo->entry, object_from_bytes(sdo->entry, sdo->number)) : SDO_OK;

@@ -5,7 +5,7 @@
  * shifted right, and limited. `scale` is its value at raw 32768, in the unit of the dictionary. All signals
  * of a sample are taken in the same call.
  *
- *   trace_init(t, ring, length, find, context)   the ring is the caller's, `length` numbers in all
+ *   trace_init(t, ring, length, context)   the ring is the caller's, `length` numbers in all
  *   trace_sample(t)    control interrupt, at its end; 3 instructions while nothing is armed
  *   trace_put(), trace_get(), trace_read()       thread: objects 3100h to 3103h by slot (OD_LIVE_...)
  *
@@ -39,7 +39,7 @@ typedef struct {
 } trace_signal_t;
 
 /* Where a dictionary entry lives; false: it cannot be traced. */
-typedef bool (*trace_find_t)(void *context, uint16_t index, uint8_t sub, trace_signal_t *signal);
+bool trace_host_find(void *context, uint16_t index, uint8_t sub, trace_signal_t *signal);
 
 typedef struct {
     volatile uint32_t active; /* not zero: filling, waiting or triggered */
@@ -60,7 +60,6 @@ typedef struct {
 
     /* as set */
     uint32_t size; /* of the ring */
-    trace_find_t find;
     void *context;
     uint32_t object[TRACE_SIGNALS]; /* index << 16 | sub << 8; 0: none */
     uint16_t set_divider, pretrigger;
@@ -68,7 +67,7 @@ typedef struct {
     int32_t set_level;             /* in the unit of the signal */
 } trace_t;
 
-void trace_init(trace_t *trace, int16_t ring[], uint32_t length, trace_find_t find, void *context);
+void trace_init(trace_t *trace, int16_t ring[], uint32_t length, void *context);
 void trace_record(trace_t *trace);
 
 static inline void trace_sample(trace_t *trace)

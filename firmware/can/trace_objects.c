@@ -11,12 +11,11 @@
 
 enum { COMMAND_OFF, COMMAND_ARM, COMMAND_TRIGGER };
 
-void trace_init(trace_t *trace, int16_t ring[], uint32_t length, trace_find_t find, void *context)
+void trace_init(trace_t *trace, int16_t ring[], uint32_t length, void *context)
 {
     *trace = (trace_t){
         .state = TRACE_OFF,
         .size = length,
-        .find = find,
         .context = context,
         .set_divider = 1,
         .pretrigger = 100,
@@ -69,7 +68,7 @@ static uint32_t arm(trace_t *trace)
         const uint16_t index = (uint16_t)(object >> 16);
         const uint8_t sub = (uint8_t)((object >> 8) & 0xFFU);
         if (object != 0U) {
-            if (!trace->find(trace->context, index, sub, &trace->signal[trace->count])) {
+            if (!trace_host_find(trace->context, index, sub, &trace->signal[trace->count])) {
                 return NOT_MAPPABLE;
             }
             trace->count++;
@@ -121,7 +120,7 @@ static uint32_t put_signal(trace_t *trace, uint32_t number, uint32_t object)
     trace_signal_t signal;
     const uint16_t index = (uint16_t)(object >> 16);
     const uint8_t sub = (uint8_t)((object >> 8) & 0xFFU);
-    if (object != 0U && !trace->find(trace->context, index, sub, &signal)) {
+    if (object != 0U && !trace_host_find(trace->context, index, sub, &signal)) {
         return NOT_MAPPABLE;
     }
     trace->object[number] = object;
@@ -182,8 +181,8 @@ static int32_t scale_of(const trace_t *trace, uint32_t number)
     trace_signal_t signal = {.scale = 0};
     const uint32_t object = trace->object[number];
     if (object != 0U) {
-        (void)trace->find(trace->context, (uint16_t)(object >> 16), (uint8_t)((object >> 8) & 0xFFU),
-                          &signal);
+        (void)trace_host_find(trace->context, (uint16_t)(object >> 16), (uint8_t)((object >> 8) & 0xFFU),
+                              &signal);
     }
     return signal.scale;
 }

@@ -198,8 +198,6 @@ void reset(void *)
 {
 }
 
-const node_host_t host = {send, on, get, put, size_of, read, write, store, store, recall, alarm, reset};
-
 void give(Device &d, uint16_t id, uint8_t length, Input &input)
 {
     node_frame_t frame = {id, length, {}};
@@ -278,6 +276,74 @@ void operate(Device &d, Input &input)
 
 } // namespace
 
+extern "C" {
+bool trace_host_find(void *context, uint16_t index, uint8_t sub, trace_signal_t *signal)
+{
+    return find(context, index, sub, signal);
+}
+
+bool node_host_send(void *context, const node_frame_t *frame)
+{
+    return send(context, frame);
+}
+
+bool node_host_on(void *context)
+{
+    return on(context);
+}
+
+int32_t node_host_get(void *context, const od_entry_t *entry)
+{
+    return get(context, entry);
+}
+
+uint32_t node_host_put(void *context, const od_entry_t *entry, int32_t value)
+{
+    return put(context, entry, value);
+}
+
+uint32_t node_host_size(void *context, const od_entry_t *entry)
+{
+    return size_of(context, entry);
+}
+
+void node_host_read(void *context, const od_entry_t *entry, uint32_t offset, uint8_t bytes[], uint32_t count)
+{
+    read(context, entry, offset, bytes, count);
+}
+
+uint32_t node_host_write(void *context, const od_entry_t *entry, uint32_t offset, const uint8_t bytes[],
+                         uint32_t count, bool last)
+{
+    return write(context, entry, offset, bytes, count, last);
+}
+
+bool node_host_store(void *context, uint32_t group)
+{
+    return store(context, group);
+}
+
+bool node_host_restore(void *context, uint32_t group)
+{
+    return store(context, group);
+}
+
+void node_host_recall(void *context)
+{
+    recall(context);
+}
+
+void node_host_alarm(void *context, uint16_t code)
+{
+    alarm(context, code);
+}
+
+void node_host_reset(void *context)
+{
+    reset(context);
+}
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static Device d;
@@ -288,8 +354,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     d.facts.ready = true;
     d.facts.off = true;
     cia402_init(&d.profile);
-    trace_init(&d.trace, d.ring, sizeof d.ring / sizeof d.ring[0], find, &d);
-    node_init(&d.node, &host, &d, 0x12345678, 0);
+    trace_init(&d.trace, d.ring, sizeof d.ring / sizeof d.ring[0], &d);
+    node_init(&d.node, &d, 0x12345678, 0);
     while (!input.empty()) {
         operate(d, input);
     }

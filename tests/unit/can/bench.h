@@ -75,9 +75,7 @@ class Bench
 
     void boot()
     {
-        static const node_host_t host = {send,  on_,   get,     put,    size,  read,
-                                         write, store, restore, recall, alarm, reset};
-        node_init(&node, &host, this, 0x12345678, now);
+        node_init(&node, this, 0x12345678, now);
     }
 
     // --- bus
@@ -224,7 +222,8 @@ class Bench
     int finished = 0;
     std::function<uint32_t()> on_write = [] { return 0U; };
 
-  private:
+    // --- what the node asks of its application
+
     static Bench &self(void *context)
     {
         return *static_cast<Bench *>(context);
@@ -330,5 +329,69 @@ class Bench
 };
 
 } // namespace can
+
+// The node calls these; one test program is one file.
+extern "C" {
+bool node_host_send(void *context, const node_frame_t *frame)
+{
+    return can::Bench::send(context, frame);
+}
+
+bool node_host_on(void *context)
+{
+    return can::Bench::on_(context);
+}
+
+int32_t node_host_get(void *context, const od_entry_t *entry)
+{
+    return can::Bench::get(context, entry);
+}
+
+uint32_t node_host_put(void *context, const od_entry_t *entry, int32_t value)
+{
+    return can::Bench::put(context, entry, value);
+}
+
+uint32_t node_host_size(void *context, const od_entry_t *entry)
+{
+    return can::Bench::size(context, entry);
+}
+
+void node_host_read(void *context, const od_entry_t *entry, uint32_t offset, uint8_t bytes[], uint32_t count)
+{
+    can::Bench::read(context, entry, offset, bytes, count);
+}
+
+uint32_t node_host_write(void *context, const od_entry_t *entry, uint32_t offset, const uint8_t bytes[],
+                         uint32_t count, bool last)
+{
+    return can::Bench::write(context, entry, offset, bytes, count, last);
+}
+
+bool node_host_store(void *context, uint32_t group)
+{
+    return can::Bench::store(context, group);
+}
+
+bool node_host_restore(void *context, uint32_t group)
+{
+    return can::Bench::restore(context, group);
+}
+
+void node_host_recall(void *context)
+{
+    can::Bench::recall(context);
+}
+
+void node_host_alarm(void *context, uint16_t code)
+{
+    can::Bench::alarm(context, code);
+}
+
+void node_host_reset(void *context)
+{
+    can::Bench::reset(context);
+}
+}
 
 #endif

@@ -19,7 +19,7 @@ class Scope
   public:
     Scope()
     {
-        trace_init(&t, ring, RING, find, this);
+        trace_init(&t, ring, RING, this);
     }
 
     uint32_t put(int slot, int32_t value)
@@ -72,7 +72,6 @@ class Scope
     int32_t source[8] = {};
     int32_t shift = 0, scale = 32768;
 
-  private:
     static bool find(void *context, uint16_t index, uint8_t sub, trace_signal_t *signal)
     {
         Scope &s = *static_cast<Scope *>(context);
@@ -83,6 +82,16 @@ class Scope
         return true;
     }
 };
+
+} // namespace
+
+extern "C" bool trace_host_find(void *context, uint16_t index, uint8_t sub, trace_signal_t *signal)
+{
+    return Scope::find(context, index, sub, signal);
+}
+
+namespace
+{
 
 TEST(Trace, RecordsAtOnceAndCompletely)
 {
