@@ -9,7 +9,7 @@ static bool comparators_trip(const hal_t *hal)
         return false;
     }
     plant_truth_t truth;
-    plant_truth(hal->plant, &truth);
+    plant_truth_windings(hal->plant, &truth);
     for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
         if (fabs(truth.i_A[leg]) > hal->i_break_A) {
             return true;

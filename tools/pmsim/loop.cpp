@@ -74,7 +74,7 @@ uint32_t Loop::slow_divider() const
 
 void Loop::step_plant(const record_period_t &record)
 {
-    plant_truth(rig_plant(rig_.get()), &sample_.rig.truth);
+    plant_truth_windings(rig_plant(rig_.get()), &sample_.rig.truth);
     play();
     rig_step_plant(rig_.get(), &record);
 }

@@ -97,7 +97,7 @@ void rig_set_can_state(rig_t *rig, hal_can_state_t state)
 
 void rig_step(rig_t *rig, rig_sample_t *sample)
 {
-    plant_truth(rig->loop.hal.plant, &sample->truth);
+    plant_truth_windings(rig->loop.hal.plant, &sample->truth);
     rig->given_last = rig->given;
     rig->given = 0;
     sim_loop_step(&rig->loop);

@@ -28,7 +28,7 @@ typedef struct {
 } rig_command_t;
 
 typedef struct {
-    plant_truth_t truth;    /* at the sample instant */
+    plant_truth_t truth;    /* at the sample instant, of windings and rotor */
     int state;              /* RIG_... */
     int fault;              /* code, 0: none */
     uint32_t limits;        /* DRIVE_LIMIT_... */

@@ -382,7 +382,7 @@ static void drop_frames(rig_t *rig)
 
 void rig_step(rig_t *rig, rig_sample_t *sample)
 {
-    plant_truth(rig->plant, &sample->truth);
+    plant_truth_windings(rig->plant, &sample->truth);
     if (!live && ++rig->since_sent >= REPEAT_PERIODS) {
         send(rig);
     }
