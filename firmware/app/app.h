@@ -62,6 +62,7 @@ struct app {
     drive_params_t params;       /* the shadow set */
     drive_params_t before_batch; /* while one is open */
     drive_config_t next;         /* made from it, for app_slow() to take */
+    bool next_lost;              /* a set that waited to be taken was overwritten by one that was refused */
     volatile bool next_ready;
     bool stored, refused, restart, batch;
     drive_param_id_t refused_param; /* that the last check named */

@@ -14,16 +14,6 @@ static bool needs_restart(const app_t *app)
            now.dead_time_ns != app->hal_config.dead_time_ns || now.break_level != app->hal_config.break_level;
 }
 
-/* The slow interrupt takes `next` only while it is marked ready, and is not interrupted by us. */
-static void hand_over(app_t *app, const drive_config_t *config)
-{
-    app->next_ready = false;
-    __atomic_signal_fence(__ATOMIC_SEQ_CST);
-    app->next = *config;
-    __atomic_signal_fence(__ATOMIC_SEQ_CST);
-    app->next_ready = true;
-}
-
 void app_take_parameters(app_t *app)
 {
     if (app->next_ready) {
@@ -36,26 +26,51 @@ void app_take_parameters(app_t *app)
     }
 }
 
+/* The slow interrupt takes `next` only while it is marked ready, and is not interrupted by us. */
+static drive_result_t make_next(app_t *app)
+{
+    app->next_ready = false;
+    __atomic_signal_fence(__ATOMIC_SEQ_CST);
+    (void)memset(&app->next, 0, sizeof app->next);
+    return drive_configure(&app->next, &app->params);
+}
+
+static void hand_over(app_t *app)
+{
+    __atomic_signal_fence(__ATOMIC_SEQ_CST);
+    app->next_ready = true;
+}
+
 /* The shadow set as it is now: abort code. A set that was bad before may stay bad, or it could not be mended
  * one by one. */
 static uint32_t check(app_t *app, bool was_bad)
 {
-    drive_config_t config;
-    (void)memset(&config, 0, sizeof config);
-    const drive_result_t result = drive_configure(&config, &app->params);
+    const bool waited = app->next_ready;
+    const drive_result_t result = make_next(app);
     app->refused_param = result.param;
+    app->next_lost = waited;
     if (!result.ok) {
         return was_bad ? 0U : SDO_INCOMPATIBLE;
     }
-    if (app_is_on(app) && !drive_same_frame(&config, &app->drive.config)) {
+    if (app_is_on(app) && !drive_same_frame(&app->next, &app->drive.config)) {
         return SDO_STATE;
     }
     app->refused = false;
     app->restart = needs_restart(app);
+    app->next_lost = false;
     if (!app->restart) { /* else the drive keeps what the hardware has */
-        hand_over(app, &config);
+        hand_over(app);
     }
     return 0;
+}
+
+/* After a refusal, with the set as it was before: what waited to be taken is made again. */
+static void renew(app_t *app)
+{
+    if (app->next_lost && make_next(app).ok) {
+        hand_over(app);
+    }
+    app->next_lost = false;
 }
 
 uint32_t app_put_parameter(app_t *app, drive_param_id_t id, int32_t value)
@@ -68,6 +83,7 @@ uint32_t app_put_parameter(app_t *app, drive_param_id_t id, int32_t value)
     const uint32_t code = check(app, app->refused);
     if (code != 0U) {
         drive_param_set(&app->params, id, old);
+        renew(app);
     }
     return code;
 }
@@ -85,6 +101,7 @@ uint32_t app_put_batch(app_t *app, bool open)
     const uint32_t code = check(app, false);
     if (code != 0U) {
         app->params = app->before_batch;
+        renew(app);
     }
     return code;
 }

@@ -92,6 +92,18 @@ static void check_machine(maker_t *m)
     }
 }
 
+static void make_limits(maker_t *m, drive_config_t *config)
+{
+    config->k_theta = config->position.pll_low.k_theta;
+    config->i_max = per_unit(m, DRIVE_PARAM_i_max, m->base.i);
+    config->i_d_light = per_unit(m, DRIVE_PARAM_i_d_light, m->base.i);
+    config->omega_max = speed(m, DRIVE_PARAM_speed_max);
+    config->v_linear = fixed(m, pm_num_mul(pm_num_ratio(98, 100), pm_num_sqrt(pm_num_ratio(1, 3))), UNIT_BITS,
+                             DRIVE_PARAM_v_full_scale);
+    config->psi_m = config->current.psi_m;
+    config->dL = config->current.L_d - config->current.L_q;
+}
+
 drive_result_t drive_configure(drive_config_t *config, const drive_params_t *params)
 {
     maker_t m = {.params = params, .result = {.ok = true, .param = DRIVE_PARAM_COUNT, .reason = "ok"}};
@@ -117,13 +129,6 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     }
     make_open_loop(&m, &config->open_loop);
     make_protection(&m, &config->protection);
-    config->k_theta = config->position.pll_low.k_theta;
-    config->i_max = per_unit(&m, DRIVE_PARAM_i_max, m.base.i);
-    config->i_d_light = per_unit(&m, DRIVE_PARAM_i_d_light, m.base.i);
-    config->omega_max = speed(&m, DRIVE_PARAM_speed_max);
-    config->v_linear = fixed(&m, pm_num_mul(pm_num_ratio(98, 100), pm_num_sqrt(pm_num_ratio(1, 3))),
-                             UNIT_BITS, DRIVE_PARAM_v_full_scale);
-    config->psi_m = config->current.psi_m;
-    config->dL = config->current.L_d - config->current.L_q;
+    make_limits(&m, config);
     return m.result;
 }

@@ -79,40 +79,55 @@ static bool positive(pm_num_t x)
     return pm_num_cmp(x, pm_num(0)) > 0;
 }
 
-static void make_square(maker_t *m, pulsating_square_config_t *c)
+/* Current per radian at no load, and how it falls with i_q^2. */
+static void make_gain(maker_t *m, pulsating_square_config_t *c)
 {
-    const inductances_t zero = at_zero(m);
-    const inductances_t rated = at_rated(m);
-    if (!positive(carrier_slope(m, zero)) || !positive(carrier_slope(m, rated))) {
+    const pm_num_t slope_0 = carrier_slope(m, at_zero(m));
+    const pm_num_t slope_r = carrier_slope(m, at_rated(m));
+    if (!positive(slope_0) || !positive(slope_r)) {
         refuse(m, DRIVE_PARAM_L_qh_rated, "leaves no saliency for injection at rated current");
         return;
     }
     const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
-    const pm_num_t gain_0 = pm_num_div(m->base.i, carrier_slope(m, zero));
-    const pm_num_t gain_r =
-        least(pm_num_div(m->base.i, carrier_slope(m, rated)), pm_num_mul(GAIN_RISE, gain_0));
-    const pm_num_t full = pm_num_div(rated.L_dq, rated.L_q);
-    const pm_num_t half = si(m, DRIVE_PARAM_cross_half);
-
-    c->v_h = per_unit(m, DRIVE_PARAM_v_injection, m->base.v);
+    const pm_num_t gain_0 = pm_num_div(m->base.i, slope_0);
+    const pm_num_t gain_r = least(pm_num_div(m->base.i, slope_r), pm_num_mul(GAIN_RISE, gain_0));
     c->gain_0 = fixed(m, gain_0, SMALL_BITS, DRIVE_PARAM_v_injection);
     c->gain_2 = fixed(m, pm_num_div(pm_num_sub(gain_r, gain_0), square(i_rated)), SMALL_BITS - 4,
                       DRIVE_PARAM_v_injection);
+}
+
+/* Parabola through lambda = 0, half, full at i_q = 0, i_rated/2, i_rated. */
+static void make_cross(maker_t *m, pulsating_square_config_t *c)
+{
+    const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
+    const pm_num_t full = pm_num_div(si(m, DRIVE_PARAM_L_dqh_rated), si(m, DRIVE_PARAM_L_qh_rated));
+    const pm_num_t half = si(m, DRIVE_PARAM_cross_half);
+    const pm_num_t a = pm_num_sub(pm_num_mul(pm_num(4), half), full);
+    const pm_num_t b = pm_num_mul(pm_num(2), pm_num_sub(full, pm_num_mul(pm_num(2), half)));
+    c->lambda_1 = fixed(m, pm_num_div(a, i_rated), Q_BITS, DRIVE_PARAM_L_dqh_rated);
+    c->lambda_2 = fixed(m, pm_num_div(b, square(i_rated)), Q_BITS, DRIVE_PARAM_L_dqh_rated);
+}
+
+static void make_carrier(maker_t *m, pulsating_square_config_t *c)
+{
+    const pm_num_t flux = pm_num_mul(si(m, DRIVE_PARAM_v_injection), m->base.t_s);
+    const pm_num_t h_d = pm_num_div(pm_num_div(flux, si(m, DRIVE_PARAM_L_d)), m->base.i);
+    c->v_h = per_unit(m, DRIVE_PARAM_v_injection, m->base.v);
+    c->h_d = fixed(m, h_d, Q_BITS, DRIVE_PARAM_v_injection);
+    c->h_d_inverse = fixed(m, pm_num_div(pm_num(1), h_d), SMALL_BITS, DRIVE_PARAM_v_injection);
+    c->half_step = fixed(m, pm_num_mul(pm_num_mul(m->base.t_s, m->base.omega), pm_num_ratio(1, 2)), FRAC_BITS,
+                         DRIVE_PARAM_f_pwm);
+}
+
+static void make_square(maker_t *m, pulsating_square_config_t *c)
+{
+    make_gain(m, c);
     c->lambda_1 = 0;
     c->lambda_2 = 0;
     if (m->params->cross_coupling_comp != 0) {
-        /* parabola through lambda = 0, half, full at i_q = 0, i_rated/2, i_rated */
-        const pm_num_t a = pm_num_sub(pm_num_mul(pm_num(4), half), full);
-        const pm_num_t b = pm_num_mul(pm_num(2), pm_num_sub(full, pm_num_mul(pm_num(2), half)));
-        c->lambda_1 = fixed(m, pm_num_div(a, i_rated), Q_BITS, DRIVE_PARAM_L_dqh_rated);
-        c->lambda_2 = fixed(m, pm_num_div(b, square(i_rated)), Q_BITS, DRIVE_PARAM_L_dqh_rated);
+        make_cross(m, c);
     }
-    const pm_num_t flux = pm_num_mul(si(m, DRIVE_PARAM_v_injection), m->base.t_s);
-    const pm_num_t h_d = pm_num_div(pm_num_div(flux, zero.L_d), m->base.i);
-    c->h_d = fixed(m, h_d, Q_BITS, DRIVE_PARAM_v_injection);
-    c->half_step = fixed(m, pm_num_mul(pm_num_mul(m->base.t_s, m->base.omega), pm_num_ratio(1, 2)), FRAC_BITS,
-                         DRIVE_PARAM_f_pwm);
-    c->h_d_inverse = fixed(m, pm_num_div(pm_num(1), h_d), SMALL_BITS, DRIVE_PARAM_v_injection);
+    make_carrier(m, c);
 }
 
 /* Carrier and control share the voltage vector: at most 0.6 of v_dc / sqrt(3) may go to the carrier. */
@@ -138,6 +153,13 @@ bool salient(const maker_t *m)
            positive(carrier_slope(m, at_rated(m)));
 }
 
+static int32_t per_span(maker_t *m)
+{
+    const pm_num_t span = pm_num_sub(si(m, DRIVE_PARAM_speed_high), si(m, DRIVE_PARAM_speed_low));
+    return fixed(m, pm_num_div(m->base.omega, pm_num_mul(span, pole_pairs(m))), SMALL_BITS,
+                 DRIVE_PARAM_speed_high);
+}
+
 void make_position(maker_t *m, position_config_t *c, bool injection)
 {
     make_flux(m, &c->flux);
@@ -150,9 +172,7 @@ void make_position(maker_t *m, position_config_t *c, bool injection)
         refuse(m, DRIVE_PARAM_speed_high, "must be above speed_low");
         return;
     }
-    const pm_num_t span = pm_num_sub(si(m, DRIVE_PARAM_speed_high), si(m, DRIVE_PARAM_speed_low));
-    c->per_span = fixed(m, pm_num_div(m->base.omega, pm_num_mul(span, pole_pairs(m))), SMALL_BITS,
-                        DRIVE_PARAM_speed_high);
+    c->per_span = per_span(m);
     if (injection) {
         check_carrier(m);
         make_square(m, &c->square);
