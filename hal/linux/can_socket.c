@@ -48,16 +48,15 @@ static void take_error(can_link_t *link, const struct can_frame *frame)
 {
     const unsigned passive = CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE;
     const unsigned active = CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING | CAN_ERR_CRTL_ACTIVE;
+    const unsigned told = (frame->can_id & CAN_ERR_CRTL) != 0U ? frame->data[1] : 0U; /* overflows too */
     if ((frame->can_id & CAN_ERR_BUSOFF) != 0U) {
         link->state = HAL_CAN_BUS_OFF;
-    } else if ((frame->can_id & CAN_ERR_RESTARTED) != 0U) {
-        link->state = HAL_CAN_ACTIVE;
-    } else if ((frame->can_id & CAN_ERR_CRTL) != 0U && (frame->data[1] & passive) != 0U) {
+    } else if ((told & passive) != 0U) {
         link->state = HAL_CAN_PASSIVE;
-    } else if ((frame->can_id & CAN_ERR_CRTL) != 0U && (frame->data[1] & active) != 0U) {
+    } else if ((told & active) != 0U || (frame->can_id & CAN_ERR_RESTARTED) != 0U) {
         link->state = HAL_CAN_ACTIVE;
     } else {
-        /* an overflow, or not asked for */
+        /* says nothing of the state */
     }
 }
 

@@ -46,7 +46,7 @@ std::vector<Levels> watch(bool (*sequence)(const board_lines_t *), const board_l
     for (bool last = false; !last;) {
         last = done;
         const std::chrono::duration<double, std::milli> passed = Clock::now() - start;
-        const Levels now = {gpio_sim::level(kBoot0), gpio_sim::level(kNrst), passed.count()};
+        const Levels now = {gpio_sim::level(kBoot0), gpio_sim::pulled_level(kNrst, true), passed.count()};
         if (seen.empty() || !(seen.back() == now)) {
             seen.push_back(now);
         }
@@ -116,14 +116,16 @@ TEST_F(BoardLines, RunResetsWithBoot0Off)
         in_reset = in_reset || !levels.nrst;
     }
     EXPECT_TRUE(in_reset);
-    EXPECT_TRUE(gpio_sim::level(kNrst));
+    EXPECT_TRUE(gpio_sim::pulled_level(kNrst, true));
 }
 
 TEST_F(BoardLines, AnotherMayHoldNrst)
 {
-    gpio_sim::pull(kNrst, false); // a debugger
+    EXPECT_TRUE(board_lines_run(&lines_));
+    EXPECT_FALSE(gpio_sim::pulled_level(kNrst, false)); // a debugger
     EXPECT_TRUE(board_lines_run(&lines_));
     EXPECT_FALSE(gpio_sim::level(kNrst));
+    EXPECT_TRUE(gpio_sim::pulled_level(kNrst, true));
 }
 
 TEST_F(BoardLines, ATakenLineIsRefusedAndTheOtherGivenBack)

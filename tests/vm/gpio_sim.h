@@ -2,10 +2,12 @@
 #ifndef TESTS_VM_GPIO_SIM_H
 #define TESTS_VM_GPIO_SIM_H
 
+#include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -28,7 +30,8 @@ inline std::string file(int line, const char *attribute)
     return environment("GPIOSIM_LINES") + "/sim_gpio" + std::to_string(line) + "/" + attribute;
 }
 
-// What the chip would read at a pin that nobody drives
+// What the chip reads at a pin that nobody drives. A pin that its owner has just let go keeps its level until
+// it is pulled again.
 inline void pull(int line, bool up)
 {
     std::ofstream(file(line, "pull")) << (up ? "pull-up" : "pull-down") << std::flush;
@@ -40,6 +43,18 @@ inline bool level(int line)
     std::ifstream(file(line, "value")) >> value;
     EXPECT_TRUE(value == 0 || value == 1) << value;
     return value == 1;
+}
+
+inline bool pulled_level(int line, bool up)
+{
+    pull(line, up);
+    return level(line);
+}
+
+// The simulated interrupt comes up to a tick of the kernel after the edge; edges within a tick become one.
+inline void wait_a_tick()
+{
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
 }
 
 inline std::string name(int line, const char *suffix = "")

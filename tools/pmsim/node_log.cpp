@@ -26,8 +26,10 @@ void NodeLog::say(double t_s, const std::string &text)
 
 void NodeLog::drive(double t_s, const rig_sample_t &sample)
 {
-    if (sample.state != state_ || sample.fault != fault_) {
-        state_ = sample.state;
+    // A fault is known one control period before the state that it leads to.
+    const int state = sample.fault != 0 ? RIG_FAULT : sample.state;
+    if (state != state_ || sample.fault != fault_) {
+        state_ = state;
         fault_ = sample.fault;
         const std::string fault = fault_ != 0 ? " " + name_of(fault_names(), fault_) : "";
         say(t_s, name_of(state_names(), state_) + fault);

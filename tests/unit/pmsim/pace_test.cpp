@@ -11,7 +11,7 @@ using pmsim::Pace;
 TEST(Pace, WaitsForSimulatedTimeThatIsEarly)
 {
     Pace pace;
-    EXPECT_DOUBLE_EQ(pace.at(0.010, 0.007).wait_s, 0.003);
+    EXPECT_NEAR(pace.at(0.010, 0.007).wait_s, 0.003, 1e-12);
     EXPECT_EQ(pace.latest_s(), 0.0);
 }
 
@@ -21,19 +21,19 @@ TEST(Pace, CatchesUpAfterADelay)
     const Pace::Step late = pace.at(0.010, 0.160);
     EXPECT_EQ(late.wait_s, 0.0);
     EXPECT_EQ(late.lost_s, 0.0);
-    EXPECT_DOUBLE_EQ(pace.at(0.200, 0.190).wait_s, 0.010); // by the same clock as before
-    EXPECT_DOUBLE_EQ(pace.latest_s(), 0.150);
+    EXPECT_NEAR(pace.at(0.200, 0.190).wait_s, 0.010, 1e-12); // by the same clock as before
+    EXPECT_NEAR(pace.latest_s(), 0.150, 1e-12);
     EXPECT_EQ(pace.lost_s(), 0.0);
 }
 
 TEST(Pace, GivesUpALongDelayAndSaysHowLong)
 {
     Pace pace;
-    EXPECT_DOUBLE_EQ(pace.at(1.0, 1.5).lost_s, 0.5);
-    EXPECT_DOUBLE_EQ(pace.at(1.001, 1.5).wait_s, 0.001);
-    EXPECT_DOUBLE_EQ(pace.at(2.0, 2.9).lost_s, 0.4);
-    EXPECT_DOUBLE_EQ(pace.lost_s(), 0.9);
-    EXPECT_DOUBLE_EQ(pace.latest_s(), 0.5);
+    EXPECT_NEAR(pace.at(1.0, 1.5).lost_s, 0.5, 1e-12);
+    EXPECT_NEAR(pace.at(1.001, 1.5).wait_s, 0.001, 1e-12);
+    EXPECT_NEAR(pace.at(2.0, 2.9).lost_s, 0.4, 1e-12);
+    EXPECT_NEAR(pace.lost_s(), 0.9, 1e-12);
+    EXPECT_NEAR(pace.latest_s(), 0.5, 1e-12);
 }
 
 // A computer that is always a little late: an hour of slices adds no drift.
