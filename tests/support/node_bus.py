@@ -96,7 +96,8 @@ class Remote:
     def state(cls, frame):
         """Name of the drive's state, None if the frame is of something else."""
         identifier, data = frame
-        return STATES[data[0]] if identifier == cls.STATUS and len(data) == 4 else None
+        known = identifier == cls.STATUS and len(data) == 4 and data[0] < len(STATES)
+        return STATES[data[0]] if known else None
 
     @classmethod
     def is_command(cls, identifier, data):
