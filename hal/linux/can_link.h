@@ -5,7 +5,9 @@
  *   slcan:/dev/pts/N      speaks the serial-line protocol of CAN adapters on that terminal
  *   slcan:                the same on a new pseudo-terminal, whose name can_link_where() tells
  *
- * No function blocks. Tests: tests/unit/hal_linux. */
+ * The state is that of the controller, of SocketCAN only; an interface that is removed is bus-off for good,
+ * one that is down is merely silent. No function blocks. Tests: tests/unit/hal_linux, and tests/vm with real
+ * buses. */
 #ifndef HAL_LINUX_CAN_LINK_H
 #define HAL_LINUX_CAN_LINK_H
 

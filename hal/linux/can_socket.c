@@ -47,30 +47,45 @@ static bool socket_open(can_link_t *link, const char *name, char *error, size_t 
 static void take_error(can_link_t *link, const struct can_frame *frame)
 {
     const unsigned passive = CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE;
+    const unsigned active = CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING | CAN_ERR_CRTL_ACTIVE;
+    const unsigned told = (frame->can_id & CAN_ERR_CRTL) != 0U ? frame->data[1] : 0U; /* overflows too */
     if ((frame->can_id & CAN_ERR_BUSOFF) != 0U) {
         link->state = HAL_CAN_BUS_OFF;
-    } else if ((frame->can_id & CAN_ERR_RESTARTED) != 0U) {
+    } else if ((told & passive) != 0U) {
+        link->state = HAL_CAN_PASSIVE;
+    } else if ((told & active) != 0U || (frame->can_id & CAN_ERR_RESTARTED) != 0U) {
         link->state = HAL_CAN_ACTIVE;
-    } else if ((frame->can_id & CAN_ERR_CRTL) != 0U) {
-        link->state = (frame->data[1] & passive) != 0U ? HAL_CAN_PASSIVE : HAL_CAN_ACTIVE;
     } else {
-        /* not asked for */
+        /* says nothing of the state */
+    }
+}
+
+/* A controller that was taken down and up again does not say that it has left bus-off; its frames do. */
+static void note_traffic(can_link_t *link)
+{
+    if (link->state == HAL_CAN_BUS_OFF) {
+        link->state = HAL_CAN_ACTIVE;
     }
 }
 
 static bool socket_receive(can_link_t *link, hal_can_frame_t *frame)
 {
     struct can_frame got;
-    while (read(link->fd, &got, sizeof got) == (ssize_t)sizeof got) {
+    ssize_t size;
+    while ((size = read(link->fd, &got, sizeof got)) == (ssize_t)sizeof got) {
         if ((got.can_id & CAN_ERR_FLAG) != 0U) {
             take_error(link, &got);
         } else if ((got.can_id & (CAN_EFF_FLAG | CAN_RTR_FLAG)) == 0U) {
             *frame = (hal_can_frame_t){.id = (uint16_t)(got.can_id & CAN_SFF_MASK), .length = got.can_dlc};
             memcpy(frame->data, got.data, sizeof frame->data);
+            note_traffic(link);
             return true;
         } else {
             /* not for us */
         }
+    }
+    if (size < 0 && errno == ENODEV) { /* told once, when the adapter is unplugged; it does not come back */
+        link->state = HAL_CAN_BUS_OFF;
     }
     return false;
 }

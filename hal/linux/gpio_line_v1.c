@@ -16,8 +16,9 @@ struct gpio_line {
 static int request_type(gpio_use_t use)
 {
     switch (use) {
-    case GPIO_OUTPUT_LOW:
-    case GPIO_OUTPUT_HIGH:
+    case GPIO_OUTPUT_OFF:
+    case GPIO_OUTPUT_ON:
+    case GPIO_OPEN_DRAIN:
         return GPIOD_LINE_REQUEST_DIRECTION_OUTPUT;
     case GPIO_EDGES:
         return GPIOD_LINE_REQUEST_EVENT_BOTH_EDGES;
@@ -40,11 +41,12 @@ gpio_line_t *gpio_line_open(const char *name, gpio_use_t use, char *error, size_
     const struct gpiod_line_request_config request = {
         .consumer = "pmdrive",
         .request_type = request_type(use),
-        .flags = parsed.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0,
+        .flags = (parsed.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0) |
+                 (use == GPIO_OPEN_DRAIN ? GPIOD_LINE_REQUEST_FLAG_OPEN_DRAIN : 0),
     };
     line->chip = gpiod_chip_open_lookup(parsed.chip);
     line->line = line->chip != NULL ? gpiod_chip_get_line(line->chip, parsed.offset) : NULL;
-    if (line->line == NULL || gpiod_line_request(line->line, &request, use == GPIO_OUTPUT_HIGH) != 0) {
+    if (line->line == NULL || gpiod_line_request(line->line, &request, use == GPIO_OUTPUT_ON) != 0) {
         snprintf(error, error_size, "GPIO line %s: %s", name, strerror(errno));
         line->line = NULL;
         gpio_line_close(line);

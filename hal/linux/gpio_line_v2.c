@@ -15,13 +15,16 @@ struct gpio_line {
 
 static void set_up(struct gpiod_line_settings *settings, const gpio_name_t *name, gpio_use_t use)
 {
-    const bool output = use == GPIO_OUTPUT_LOW || use == GPIO_OUTPUT_HIGH;
+    const bool output = use == GPIO_OUTPUT_OFF || use == GPIO_OUTPUT_ON || use == GPIO_OPEN_DRAIN;
     gpiod_line_settings_set_direction(settings,
                                       output ? GPIOD_LINE_DIRECTION_OUTPUT : GPIOD_LINE_DIRECTION_INPUT);
     gpiod_line_settings_set_active_low(settings, name->active_low);
     if (output) {
-        gpiod_line_settings_set_output_value(settings, use == GPIO_OUTPUT_HIGH ? GPIOD_LINE_VALUE_ACTIVE
-                                                                               : GPIOD_LINE_VALUE_INACTIVE);
+        gpiod_line_settings_set_output_value(settings, use == GPIO_OUTPUT_ON ? GPIOD_LINE_VALUE_ACTIVE
+                                                                             : GPIOD_LINE_VALUE_INACTIVE);
+    }
+    if (use == GPIO_OPEN_DRAIN) {
+        gpiod_line_settings_set_drive(settings, GPIOD_LINE_DRIVE_OPEN_DRAIN);
     }
     if (use == GPIO_EDGES) {
         gpiod_line_settings_set_edge_detection(settings, GPIOD_LINE_EDGE_BOTH);

@@ -9,7 +9,7 @@
 #include "hal/hal.h"
 #include "sim_plant/plant.h"
 
-#define SIM_FRAMES  16
+#define SIM_FRAMES  32 /* 1 Mbit/s brings at most 21 in a millisecond */
 #define SIM_CONSOLE 4096
 
 typedef struct {
