@@ -1,6 +1,5 @@
 #include "tools/pmsim_board/rig_board.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,21 +9,11 @@
 #include "sim_plant/board/board.h"
 #include "tools/pmsim/rig_sample.h"
 #include "tools/pmsim_board/figures.h"
+#include "tools/pmsim_board/master.h"
 
 #define STORE_ADDRESS  0x0801F000U
 #define BOOT_S         0.2   /* most until the timer runs */
 #define REPEAT_PERIODS 1000U /* a master repeats its commands */
-
-/* The node with its default process data, and the second of them switched on: controlword, mode, velocity;
- * controlword, torque, current */
-#define NODE_ID   1U
-#define NMT_ID    0x000U
-#define RPDO1_ID  (0x200U + NODE_ID)
-#define RPDO2_ID  (0x300U + NODE_ID)
-#define SDO_ID    (0x600U + NODE_ID)
-#define NMT_START 1U
-
-enum { SHUTDOWN = 0x06, SWITCH_ON = 0x07, ENABLE_OPERATION = 0x0F, FAULT_RESET = 0x80 };
 
 enum { EXCEPTION_PENDSV = 14, EXCEPTION_SYSTICK = 15, EXCEPTION_IRQ0 = 16 };
 enum { IRQ_ADC = 18, IRQ_FDCAN = 21, IRQ_USART2 = 38 };
@@ -44,8 +33,7 @@ struct rig {
     drive_t before;         /* at the entry of the interrupt that runs */
     rig_scale_t scale;
     drive_command_t sent;
-    double rated_torque_Nm; /* whose permille the torque is given in */
-    bool enabled;           /* as far as the master has asked */
+    master_t master;
     uint32_t since_sent;
     cpu_exception_stats_t counted[FIGURE_INTERRUPTS]; /* up to the last return */
     figures_t figures;
@@ -174,8 +162,6 @@ static bool boot(rig_t *rig, const drive_params_t *params)
     return true;
 }
 
-static void start_node(rig_t *rig);
-
 rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_params_t *params,
                   bool refusal_expected, char *error, size_t error_size)
 {
@@ -196,7 +182,6 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         return NULL;
     }
     rig->scale = rig_scale(&drive->config.base, params->pole_pairs);
-    rig->rated_torque_Nm = 1.5 * params->pole_pairs * 1e-9 * params->psi_m * 1e-3 * params->i_rated;
     rig->board = board_create(image_path, rig->plant, error, error_size);
     if (rig->board == NULL) {
         rig_destroy(rig);
@@ -215,7 +200,8 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         return NULL;
     }
     if (!live) {
-        start_node(rig);
+        rig->master = master_make(rig->board, params);
+        master_start(&rig->master);
     }
     return rig;
 }
@@ -251,71 +237,12 @@ plant_t *rig_plant(rig_t *rig)
     return rig->plant;
 }
 
-static void put_number(uint8_t *bytes, int count, int32_t value)
-{
-    for (int n = 0; n < count; n++) {
-        bytes[n] = (uint8_t)((uint32_t)value >> (8 * n));
-    }
-}
-
-static int mode_number(drive_mode_t mode)
-{
-    switch (mode) {
-    case DRIVE_MODE_TORQUE:
-        return CIA402_MODE_TORQUE;
-    case DRIVE_MODE_CURRENT:
-        return CIA402_MODE_CURRENT;
-    case DRIVE_MODE_SPEED:
-    default:
-        return CIA402_MODE_VELOCITY;
-    }
-}
-
-static void send_control(rig_t *rig, int controlword)
-{
-    board_frame_t frame = {.id = RPDO1_ID, .length = 7};
-    put_number(&frame.data[0], 2, controlword);
-    put_number(&frame.data[2], 1, mode_number(rig->sent.mode));
-    put_number(&frame.data[3], 4, rig->sent.speed_mrad_s);
-    (void)board_can_send(rig->board, &frame);
-}
-
-static void send_targets(rig_t *rig, int controlword)
-{
-    const double permille = 1e-3 * rig->sent.torque_uNm / rig->rated_torque_Nm;
-    board_frame_t frame = {.id = RPDO2_ID, .length = 8};
-    put_number(&frame.data[0], 2, controlword);
-    put_number(&frame.data[2], 2, (int32_t)lround(permille));
-    put_number(&frame.data[4], 4, rig->sent.current_mA);
-    (void)board_can_send(rig->board, &frame);
-}
-
-/* RPDO2 in use, then all of it */
-static void start_node(rig_t *rig)
-{
-    board_frame_t second = {.id = SDO_ID, .length = 8, .data = {0x23, 0x01, 0x14, 0x01}};
-    const board_frame_t start = {.id = NMT_ID, .length = 2, .data = {NMT_START, NODE_ID}};
-    put_number(&second.data[4], 4, RPDO2_ID);
-    (void)board_can_send(rig->board, &second);
-    (void)board_can_send(rig->board, &start);
-}
-
-/* The targets come first, then the steps from off to on. */
 static void send(rig_t *rig)
 {
-    if (live) {
-        return;
+    if (!live) {
+        master_send(&rig->master, &rig->sent);
+        rig->since_sent = 0;
     }
-    const bool starts = rig->sent.enable && !rig->enabled;
-    const int now = rig->enabled ? ENABLE_OPERATION : SWITCH_ON;
-    send_targets(rig, rig->sent.enable ? now : SWITCH_ON);
-    if (starts) {
-        send_control(rig, SHUTDOWN);
-        send_control(rig, SWITCH_ON);
-    }
-    rig->enabled = rig->sent.enable;
-    send_control(rig, rig->enabled ? ENABLE_OPERATION : SWITCH_ON);
-    rig->since_sent = 0;
 }
 
 void rig_command(rig_t *rig, const rig_command_t *command)
@@ -326,9 +253,9 @@ void rig_command(rig_t *rig, const rig_command_t *command)
 
 bool rig_clear_fault(rig_t *rig)
 {
-    rig->enabled = false;
-    send_control(rig, FAULT_RESET);
-    send(rig);
+    if (!live) {
+        master_clear_fault(&rig->master, &rig->sent);
+    }
     return true; /* asked for; the drive's state tells */
 }
 

@@ -63,23 +63,24 @@ void Bench::run_ms(double ms)
     }
 }
 
-static void put_word(uint8_t *bytes, int32_t value)
-{
-    for (int n = 0; n < 4; n++) {
-        bytes[n] = static_cast<uint8_t>(static_cast<uint32_t>(value) >> (8 * n));
-    }
-}
-
 void Bench::command(bool enable, drive_mode_t mode, int32_t speed_mrad_s, int32_t current_mA, bool clear)
 {
-    board_frame_t setpoint = {0x300 + REMOTE_NODE, 8, {}};
-    put_word(&setpoint.data[4], current_mA);
-    board_frame_t command = {0x200 + REMOTE_NODE, 6, {}};
-    command.data[0] = static_cast<uint8_t>((enable ? 1 : 0) | (clear ? 0x80 : 0));
-    command.data[1] = static_cast<uint8_t>(mode);
-    put_word(&command.data[2], speed_mrad_s);
-    ASSERT_TRUE(board_can_send(board, &setpoint));
-    ASSERT_TRUE(board_can_send(board, &command));
+    drive_command_t command = {};
+    command.enable = enable;
+    command.mode = mode;
+    command.speed_mrad_s = speed_mrad_s;
+    command.current_mA = current_mA;
+    if (!started_) {
+        const drive_params_t p = params();
+        master_ = master_make(board, &p);
+        master_start(&master_);
+        started_ = true;
+    }
+    if (clear) {
+        master_clear_fault(&master_, &command);
+    } else {
+        master_send(&master_, &command);
+    }
 }
 
 void Bench::running()

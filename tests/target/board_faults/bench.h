@@ -16,6 +16,7 @@ extern "C" {
 #include "firmware/app/app.h"
 #include "firmware/params/store.h"
 #include "sim_plant/board/board_inside.h"
+#include "tools/pmsim_board/master.h"
 }
 
 namespace bench
@@ -60,6 +61,8 @@ class Bench
     board_t *board;
 
   private:
+    master_t master_{};
+    bool started_ = false;
     uint32_t patched_ = 0;
 };
 

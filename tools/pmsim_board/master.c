@@ -1,0 +1,92 @@
+#include "tools/pmsim_board/master.h"
+
+#include <math.h>
+
+#include "firmware/can/cia402.h"
+
+/* controlword, mode, velocity; controlword, torque, current */
+#define NODE_ID   1U
+#define NMT_ID    0x000U
+#define RPDO1_ID  (0x200U + NODE_ID)
+#define RPDO2_ID  (0x300U + NODE_ID)
+#define SDO_ID    (0x600U + NODE_ID)
+#define NMT_START 1U
+
+enum { SHUTDOWN = 0x06, SWITCH_ON = 0x07, ENABLE_OPERATION = 0x0F, FAULT_RESET = 0x80 };
+
+static void put_number(uint8_t *bytes, int count, int32_t value)
+{
+    for (int n = 0; n < count; n++) {
+        bytes[n] = (uint8_t)((uint32_t)value >> (8 * n));
+    }
+}
+
+static int mode_number(drive_mode_t mode)
+{
+    switch (mode) {
+    case DRIVE_MODE_TORQUE:
+        return CIA402_MODE_TORQUE;
+    case DRIVE_MODE_CURRENT:
+        return CIA402_MODE_CURRENT;
+    case DRIVE_MODE_SPEED:
+    default:
+        return CIA402_MODE_VELOCITY;
+    }
+}
+
+static void send_control(master_t *master, const drive_command_t *command, int controlword)
+{
+    board_frame_t frame = {.id = RPDO1_ID, .length = 7};
+    put_number(&frame.data[0], 2, controlword);
+    put_number(&frame.data[2], 1, mode_number(command->mode));
+    put_number(&frame.data[3], 4, command->speed_mrad_s);
+    (void)board_can_send(master->board, &frame);
+}
+
+static void send_targets(master_t *master, const drive_command_t *command, int controlword)
+{
+    const double permille = 1e-3 * command->torque_uNm / master->rated_torque_Nm;
+    board_frame_t frame = {.id = RPDO2_ID, .length = 8};
+    put_number(&frame.data[0], 2, controlword);
+    put_number(&frame.data[2], 2, (int32_t)lround(permille));
+    put_number(&frame.data[4], 4, command->current_mA);
+    (void)board_can_send(master->board, &frame);
+}
+
+master_t master_make(board_t *board, const drive_params_t *params)
+{
+    return (master_t){
+        .board = board,
+        .rated_torque_Nm = 1.5 * params->pole_pairs * 1e-9 * params->psi_m * 1e-3 * params->i_rated,
+    };
+}
+
+void master_start(master_t *master)
+{
+    board_frame_t second = {.id = SDO_ID, .length = 8, .data = {0x23, 0x01, 0x14, 0x01}};
+    const board_frame_t start = {.id = NMT_ID, .length = 2, .data = {NMT_START, NODE_ID}};
+    put_number(&second.data[4], 4, RPDO2_ID);
+    (void)board_can_send(master->board, &second);
+    (void)board_can_send(master->board, &start);
+}
+
+/* The targets come first. */
+void master_send(master_t *master, const drive_command_t *command)
+{
+    const bool starts = command->enable && !master->enabled;
+    const int now = master->enabled ? ENABLE_OPERATION : SWITCH_ON;
+    send_targets(master, command, command->enable ? now : SWITCH_ON);
+    if (starts) {
+        send_control(master, command, SHUTDOWN);
+        send_control(master, command, SWITCH_ON);
+    }
+    master->enabled = command->enable;
+    send_control(master, command, master->enabled ? ENABLE_OPERATION : SWITCH_ON);
+}
+
+void master_clear_fault(master_t *master, const drive_command_t *command)
+{
+    master->enabled = false;
+    send_control(master, command, FAULT_RESET);
+    master_send(master, command);
+}

@@ -1,0 +1,34 @@
+/* What a CiA 402 master says to the image over the emulated bus: the node with its default process data, and
+ * the second of them switched on. */
+#ifndef PMSIM_BOARD_MASTER_H
+#define PMSIM_BOARD_MASTER_H
+
+#include "firmware/drive/drive.h"
+#include "sim_plant/board/board.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct {
+    board_t *board;
+    double rated_torque_Nm; /* whose permille the torque is given in */
+    bool enabled;           /* as far as it has asked */
+} master_t;
+
+master_t master_make(board_t *board, const drive_params_t *params);
+
+/* After the image has started: RPDO2 in use, then all of it. */
+void master_start(master_t *master);
+
+/* Targets and controlword, with the steps from off to on; to be repeated before the node's time-out. */
+void master_send(master_t *master, const drive_command_t *command);
+
+/* The edge that clears a fault; the drive is then off. */
+void master_clear_fault(master_t *master, const drive_command_t *command);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
