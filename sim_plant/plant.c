@@ -473,6 +473,11 @@ static void windings_truth(const plant_t *plant, const machine_state_t *state, c
         .v_mean_alpha_V = plant->v_mean_alpha_V,
         .v_mean_beta_V = plant->v_mean_beta_V,
         .omega_load_rad_s = x[OMEGA_LOAD],
+        .e_in_J = x[INT_IN] + circuit->jump_in_J,
+        .e_copper_J = x[INT_COPPER],
+        .e_device_J = x[INT_DEVICE] + circuit->jump_device_J,
+        .e_mech_J = x[INT_MECH] + plant->slip_J,
+        .e_field_J = circuit_field_of_J(circuit, state, point) - plant->field_base_J,
     };
     for (int k = 0; k < circuit->bridge.legs; k++) {
         truth->i_A[k] = leg_A(plant, k);
@@ -490,7 +495,6 @@ void plant_truth_windings(const plant_t *plant, plant_truth_t *truth)
 void plant_truth(const plant_t *plant, plant_truth_t *truth)
 {
     const circuit_t *circuit = &plant->circuit;
-    const double *x = circuit->now.x;
     machine_state_t state = circuit_machine_state(&circuit->now);
     machine_point_t point;
     circuit_nodes_t nodes;
@@ -498,11 +502,6 @@ void plant_truth(const plant_t *plant, plant_truth_t *truth)
     circuit_nodes_of(circuit, &state, &point, &nodes);
     windings_truth(plant, &state, &point, truth);
     truth->i_dc_A = nodes.i_dc_A;
-    truth->e_in_J = x[INT_IN] + circuit->jump_in_J;
-    truth->e_copper_J = x[INT_COPPER];
-    truth->e_device_J = x[INT_DEVICE] + circuit->jump_device_J;
-    truth->e_mech_J = x[INT_MECH] + plant->slip_J;
-    truth->e_field_J = circuit_field_of_J(circuit, &state, &point) - plant->field_base_J;
     memcpy(truth->v_leg_V, nodes.v_leg_V, sizeof truth->v_leg_V);
     memcpy(truth->v_neutral_V, nodes.v_neutral_V, sizeof truth->v_neutral_V);
     memcpy(truth->v_zero_V, nodes.v_zero_V, sizeof truth->v_zero_V);

@@ -146,8 +146,7 @@ int plant_captured(const plant_t *plant, plant_capture_t captured[], int most);
 void plant_run_voltages(plant_t *plant, const double v_leg_V[], double rate_rad_s2, double duration_s);
 void plant_truth(const plant_t *plant, plant_truth_t *truth);
 
-/* The part of windings and rotor, for a third of the cost: voltages of terminals and neutrals, link current
- * and energies are zero. */
+/* The same without what costs most: voltages of terminals and neutrals and the link current are zero. */
 void plant_truth_windings(const plant_t *plant, plant_truth_t *truth);
 
 #ifdef __cplusplus

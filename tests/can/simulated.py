@@ -227,7 +227,7 @@ class SimulatedNode(threading.Thread):
                 self.values[(e.index, e.sub)] = self.kept.get((e.index, e.sub), e.preset)
         self.fault, self.speed = 0, 0
         self.lib.cia402_init(self.profile)
-        self.lib.node_init(self.node, c.byref(self.host), None, 0x1234, self.now_us())
+        self.lib.node_init(self.node, c.byref(self.host), 0x1234, self.now_us())
 
     def trip(self, code):
         self.fault = self.fault or code

@@ -80,29 +80,49 @@ class SerialBus:
 
 
 class Remote:
-    """What a master says to the drive and hears from it: firmware/app/remote.h."""
+    """What a CiA 402 master says to the drive with its default process data, and hears from it."""
 
-    COMMAND, SETPOINT, STATUS = 0x201, 0x301, 0x181
-    PERIOD_S = 0.01  # of the status, in the drive's time
+    NMT, COMMAND, STATUS, HEARTBEAT = 0x000, 0x201, 0x181, 0x701
+    PERIOD_S = 0.5  # of the heartbeat, in the drive's time
     TIMEOUT_S = 0.5  # after which the drive goes off
+    VELOCITY = 3  # mode of operation
+    enabled = False  # as far as it has been said
 
     @classmethod
     def command(cls, enable, speed_rad_s=0.0, clear=False):
-        """The frames of it: (identifier, data)."""
-        bits = (1 if enable else 0) | (0x80 if clear else 0)
-        return [(cls.COMMAND, struct.pack("<BBi", bits, 0, round(1e3 * speed_rad_s)))]
+        """The frames of it: (identifier, data). The steps from off to on are said once."""
+        words = [0x0F] if enable and cls.enabled else [0x06, 0x07, 0x0F] if enable else [0x07]
+        if clear:
+            words = [0x80, *words]
+        cls.enabled = enable
+        speed = round(1e3 * speed_rad_s)
+        return [(cls.NMT, bytes([1, 1]))] + [
+            (cls.COMMAND, struct.pack("<Hbi", word, cls.VELOCITY, speed)) for word in words]
+
+    @classmethod
+    def repeated(cls, frames):
+        """Of a command that has been said: its last word alone."""
+        return frames[-1:]
 
     @classmethod
     def state(cls, frame):
         """Name of the drive's state, None if the frame is of something else."""
         identifier, data = frame
-        known = identifier == cls.STATUS and len(data) == 4 and data[0] < len(STATES)
-        return STATES[data[0]] if known else None
+        if identifier != cls.STATUS or len(data) < 2:
+            return None
+        word = data[0]
+        if word & 0x08:
+            return "fault"
+        return "running" if word & 0x6F == 0x27 else "off"
+
+    @classmethod
+    def is_beat(cls, frame):
+        return frame[0] == cls.HEARTBEAT
 
     @classmethod
     def is_command(cls, identifier, data):
         """Such a frame would be obeyed, by whomever it is sent."""
-        return (identifier, len(data)) in ((cls.COMMAND, 6), (cls.SETPOINT, 8))
+        return identifier in (0x000, 0x201, 0x301, 0x401, 0x501, 0x601, 0x7E5)
 
 
 class Node:
@@ -167,6 +187,7 @@ class Master:
 
     def __init__(self, bus):
         self.bus = bus
+        Remote.enabled = False
         self.frames, self.silent = Remote.command(False), False
         self.state, self.drive_s = None, 0.0  # by its own clock, counted from the first status
         self.entered_s = {}  # state: when it was last entered
@@ -178,8 +199,11 @@ class Master:
     def _speak(self):
         while not self.done:
             if not self.silent:
-                for frame in self.frames:
+                frames = self.frames
+                for frame in frames:
                     self.bus.send(*frame)
+                if self.frames is frames:
+                    self.frames = Remote.repeated(frames)
             time.sleep(self.EVERY_S)
 
     def _listen(self):

@@ -28,7 +28,7 @@ typedef struct {
 } rig_command_t;
 
 typedef struct {
-    plant_truth_t truth;    /* at the sample instant, of windings and rotor */
+    plant_truth_t truth;    /* at the sample instant, without the voltages of nodes */
     int state;              /* RIG_... */
     int fault;              /* code, 0: none */
     uint32_t limits;        /* DRIVE_LIMIT_... */

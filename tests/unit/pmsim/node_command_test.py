@@ -27,12 +27,12 @@ def stop(node, number=signal.SIGINT):
     return summary(node)
 
 
-def statuses(bus, seconds):
-    """Arrival of each status in that time."""
+def beats(bus, seconds):
+    """Arrival of each heartbeat in that time."""
     arrivals, end_s = [], time.monotonic() + seconds
     while time.monotonic() < end_s:
         frame = bus.receive(0.5)
-        if frame and Remote.state(frame):
+        if frame and Remote.is_beat(frame):
             arrivals.append(time.monotonic())
     return arrivals
 
@@ -45,13 +45,13 @@ def drift(arrivals, period_s):
 
 
 def simulated_time_keeps_up_with_the_clock():
-    """The status comes every 10 ms of the drive's time: over 5 s no drift but what the node reports as lost, of which
+    """The heartbeat comes every 500 ms of the drive's time: over 5 s no drift but what the node reports as lost, of which
     some may have been lost when nobody listened yet."""
     node = Node(PMSIM, "slcan:")
-    arrivals = statuses(SerialBus(node.where), 5.0)
+    arrivals = beats(SerialBus(node.where), 5.0)
     _, latest_s, lost_s = stop(node)
     drift_s = drift(arrivals, Remote.PERIOD_S)
-    print(f"      {len(arrivals)} statuses, drift {1e3 * drift_s:.3f} ms, latest {1e3 * latest_s:.1f} ms, "
+    print(f"      {len(arrivals)} beats, drift {1e3 * drift_s:.3f} ms, latest {1e3 * latest_s:.1f} ms, "
           f"lost {1e3 * lost_s:.0f} ms")
     assert -DRIFT_S < drift_s < DRIFT_S + lost_s, drift_s
 
@@ -104,14 +104,14 @@ def a_signal_ends_it():
 
 
 def a_pwm_period_that_does_not_divide_the_slice():
-    """At 15.5 kHz the drive's own millisecond is 15 or 16 periods, and its status comes after a whole number of them;
+    """At 15.5 kHz the drive's own millisecond is 15 or 16 periods, and its heartbeat comes after a whole number of them;
     by the wall just so."""
     options = [word for name, value in (("inverter.f_pwm_Hz", 15500), ("inverter.timer_counts", 5484))
                for word in ("--set", f"{name}={value}")]
     node = Node(PMSIM, "slcan:", *options)
-    arrivals = statuses(SerialBus(node.where), 3.0)
+    arrivals = beats(SerialBus(node.where), 3.0)
     _, _, lost_s = stop(node)
-    periods_s = [-(-0.01 // (n / 15500)) * n / 15500 for n in (15, 16)]
+    periods_s = [Remote.PERIOD_S] + [-(-Remote.PERIOD_S // (n / 15500)) * n / 15500 for n in (15, 16)]
     drifts_s = [drift(arrivals, period_s) for period_s in periods_s]
     assert lost_s > 0.0 or min(map(abs, drifts_s)) < 2 * DRIFT_S, drifts_s
 
