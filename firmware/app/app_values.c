@@ -42,6 +42,16 @@ static unit_t speed_e(const app_t *app)
     return (unit_t){.base = app->drive.config.base.omega, .exponent = 3};
 }
 
+static unit_t speed_mech(const app_t *app)
+{
+    return (unit_t){.base = omega_mech(app), .exponent = 3};
+}
+
+static unit_t share(void)
+{
+    return (unit_t){.base = pm_num(1), .exponent = 3};
+}
+
 typedef enum { IN_CURRENT, IN_VOLTAGE, IN_SPEED_E, IN_SPEED_MECH, IN_SHARE } unit_kind_t;
 
 static unit_t unit_of(const app_t *app, unit_kind_t kind)
@@ -54,10 +64,10 @@ static unit_t unit_of(const app_t *app, unit_kind_t kind)
     case IN_SPEED_E:
         return speed_e(app);
     case IN_SPEED_MECH:
-        return (unit_t){.base = omega_mech(app), .exponent = 3};
+        return speed_mech(app);
     case IN_SHARE:
     default:
-        return (unit_t){.base = pm_num(1), .exponent = 3};
+        return share();
     }
 }
 
