@@ -251,8 +251,13 @@ void rig_command(rig_t *rig, const rig_command_t *command)
     send(rig);
 }
 
+/* The drive refuses while enable is set. The profile would take the reset and the enable anew, one after the
+ * other: a master that keeps to the drive's rule does not ask. */
 bool rig_clear_fault(rig_t *rig)
 {
+    if (rig->sent.enable) {
+        return false;
+    }
     if (!live) {
         master_clear_fault(&rig->master, &rig->sent);
     }
