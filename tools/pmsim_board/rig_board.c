@@ -30,7 +30,8 @@ struct rig {
     plant_t *plant;
     board_t *board;
     const watched_t *image; /* in the processor's memory */
-    drive_t before;         /* at the entry of the interrupt that runs */
+    drive_t before;         /* at the entry of the interrupt that runs, */
+    int entered;            /* which is this one; -1: none seen yet */
     rig_scale_t scale;
     drive_command_t sent;
     master_t master;
@@ -139,9 +140,10 @@ static void trace(void *owner, int exception, bool entry)
     const bool compared = interrupt == FIGURE_CONTROL || interrupt == FIGURE_SLOW;
     if (entry && compared) {
         rig->before = rig->image->drive;
+        rig->entered = interrupt;
     } else if (!entry) {
         count(rig, interrupt, exception);
-        if (compared) {
+        if (compared && rig->entered == interrupt) { /* not one that had begun before the watch */
             compare(rig, interrupt);
         }
     } else {
@@ -158,6 +160,7 @@ static bool boot(rig_t *rig, const drive_params_t *params)
     if (!board_boot(rig->board, BOOT_S)) {
         return false;
     }
+    rig->entered = -1;
     cpu_trace(board_cpu(rig->board), rig, trace);
     return true;
 }
