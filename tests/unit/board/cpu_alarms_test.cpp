@@ -86,7 +86,7 @@ TEST_F(Alarms, MayBeSetFromWithin)
 TEST_F(Alarms, SaysWhenThereAreTooMany)
 {
     std::vector<Owner> owners(ALARMS_MOST + 1);
-    for (int i = 0; i < ALARMS_MOST; i++) {
+    for (size_t i = 0; i < size_t(ALARMS_MOST); i++) {
         EXPECT_TRUE(alarms_set(&alarms, &owners[i], 10, note));
     }
     EXPECT_FALSE(alarms_set(&alarms, &owners[ALARMS_MOST], 10, note));

@@ -7,7 +7,7 @@ namespace
 
 using namespace machine;
 
-constexpr uint32_t ICSR = 0xE000ED04, AIRCR = 0xE000ED0C, SHCSR = 0xE000ED24, CFSR = 0xE000ED28;
+constexpr uint32_t AIRCR = 0xE000ED0C, SHCSR = 0xE000ED24, CFSR = 0xE000ED28;
 
 struct CpuExceptions : Cpu {
     const std::vector<uint16_t> idle = {adds(7, 1), 0xE7FD};

@@ -8,8 +8,7 @@ namespace
 {
 
 constexpr double found_s = 0.06e-6; // halving to 0.05 us, and the integrator
-constexpr double period_s = 100e-6;
-constexpr double short_L_H = 1e-6; // of plant_set_short()
+constexpr double short_L_H = 1e-6;  // of plant_set_short()
 constexpr double short_R_ohm = 0.1;
 
 plant_config_t locked()
