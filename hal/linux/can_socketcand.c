@@ -44,7 +44,7 @@ static bool tcp_open(can_link_t *link, const char *address, char *error, size_t 
                 bind(link->fd, found->ai_addr, found->ai_addrlen) == 0 && listen(link->fd, 1) == 0;
     const int reason = errno;
     freeaddrinfo(found);
-    struct sockaddr_in bound;
+    struct sockaddr_in bound = {0};
     socklen_t size = sizeof bound;
     if (!well || getsockname(link->fd, (struct sockaddr *)&bound, &size) != 0) {
         return refuse(error, error_size, address, strerror(reason));

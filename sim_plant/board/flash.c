@@ -36,6 +36,8 @@ static const board_register_t list[] = {
     {ECCR, "ECCR", 0, 0, 0},
 };
 
+/* It is kept, and written later. */
+/* NOLINTNEXTLINE(readability-non-const-parameter) */
 void flash_init(flash_t *flash, board_chip_t *chip, uint8_t *memory)
 {
     *flash = (flash_t){.chip = chip, .memory = memory};

@@ -104,6 +104,18 @@ static void count(rig_t *rig, int interrupt, int exception)
     *before = *now;
 }
 
+/* Byte by byte, holes included: both have copied the same memory. Returns `size` when all are equal. */
+static size_t first_difference(const void *first, const void *second, size_t size)
+{
+    const uint8_t *a = first;
+    const uint8_t *b = second;
+    size_t at = 0;
+    while (at < size && a[at] == b[at]) {
+        at++;
+    }
+    return at;
+}
+
 /* The same step on the host, from the same memory. */
 static void compare(rig_t *rig, int interrupt)
 {
@@ -115,13 +127,8 @@ static void compare(rig_t *rig, int interrupt)
         const drive_slow_in_t in = {.temperature_dC = rig->image->slow.temperature_dC};
         drive_slow(drive, &in);
     }
-    if (memcmp(drive, &rig->image->drive, sizeof *drive) != 0 ||
-        memcmp(&out, &rig->image->out, sizeof out) != 0) {
-        size_t at = 0;
-        while (at < sizeof *drive &&
-               ((const uint8_t *)drive)[at] == ((const uint8_t *)&rig->image->drive)[at]) {
-            at++;
-        }
+    const size_t at = first_difference(drive, &rig->image->drive, sizeof *drive);
+    if (at < sizeof *drive || first_difference(&out, &rig->image->out, sizeof out) < sizeof out) {
         cpu_fail(board_cpu(rig->board),
                  "image and host differ after the %s interrupt of period %u, from byte %zu of %zu",
                  interrupt == FIGURE_CONTROL ? "control" : "slow", rig->image->drive.period, at,
