@@ -25,6 +25,9 @@ typedef struct {
 
 void circuit_legs(const circuit_t *circuit, const point_t *point, circuit_legs_t *legs);
 
+/* Voltages of all terminals where some float, without what neutrals need beyond. */
+void circuit_terminals(const circuit_t *circuit, const point_t *point, double v_leg_V[PLANT_LEGS]);
+
 /* Currents, torque and rates of any machine, bridge, link and shaft; t_s since the start. */
 void circuit_general(const circuit_t *circuit, double t_s, point_t *point, double rate[ELEMENTS]);
 

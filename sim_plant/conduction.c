@@ -163,19 +163,19 @@ static void catch_swinging(circuit_t *c)
 /* The floating leg furthest beyond a diode's threshold starts to conduct; true when there was one. */
 static bool start_diode(circuit_t *c)
 {
-    circuit_nodes_t nodes;
-    circuit_nodes(c, &c->now, &nodes);
+    double v_leg_V[PLANT_LEGS];
+    circuit_terminals(c, &c->now, v_leg_V);
     int first = -1;
     double most_V = 0.0;
     for (int k = 0; k < c->bridge.legs; k++) {
         if (c->bridge.leg[k] == LEG_FLOATING && !c->bridge.off_wire[k]) {
-            double beyond_V = bridge_beyond_V(&c->bridge, c->now.x[V_DC], nodes.v_leg_V[k]);
+            double beyond_V = bridge_beyond_V(&c->bridge, c->now.x[V_DC], v_leg_V[k]);
             first = beyond_V > most_V ? k : first;
             most_V = fmax(beyond_V, most_V);
         }
     }
     if (first >= 0) {
-        set_leg(c, first, nodes.v_leg_V[first] > 0.5 * c->now.x[V_DC] ? LEG_DIODE_HIGH : LEG_DIODE_LOW);
+        set_leg(c, first, v_leg_V[first] > 0.5 * c->now.x[V_DC] ? LEG_DIODE_HIGH : LEG_DIODE_LOW);
         bridge_summarise(&c->bridge, &c->machine.winding);
     }
     return first >= 0;

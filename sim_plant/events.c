@@ -17,11 +17,11 @@ static double floating_excess(const circuit_t *c, const point_t *p)
 {
     const bridge_t *b = &c->bridge;
     double worst = -1.0;
-    circuit_nodes_t nodes;
-    circuit_nodes(c, p, &nodes);
+    double v_leg_V[PLANT_LEGS];
+    circuit_terminals(c, p, v_leg_V);
     for (int k = 0; k < b->legs; k++) {
         if (b->leg[k] == LEG_FLOATING && !b->off_wire[k]) {
-            double beyond_V = bridge_beyond_V(b, p->x[V_DC], nodes.v_leg_V[k]);
+            double beyond_V = bridge_beyond_V(b, p->x[V_DC], v_leg_V[k]);
             worst = larger(worst, beyond_V / (fabs(p->x[V_DC]) + 1.0));
         }
     }

@@ -64,6 +64,19 @@ static bool has_plain_nodes(const circuit_t *c)
     return circuit_symmetrical(c) && c->machine.plain && w->flux_terms == 0 && w->inductance_terms == 0;
 }
 
+void circuit_terminals(const circuit_t *c, const point_t *p, double v_leg_V[PLANT_LEGS])
+{
+    machine_state_t state = circuit_machine_state(p);
+    machine_point_t point;
+    machine_rate_t moved;
+    circuit_legs_t legs;
+    machine_evaluate(&c->machine, &state, &point);
+    circuit_legs(c, p, &legs);
+    floating_voltages(&c->bridge, &c->machine, &state, &point, c->machine.pole_pairs * p->x[OMEGA_MECH],
+                      p->x[V_DC], legs.v_V, legs.v_leg_V, &moved);
+    memcpy(v_leg_V, legs.v_leg_V, sizeof legs.v_leg_V);
+}
+
 void circuit_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *nodes)
 {
     if (has_plain_nodes(c)) {
