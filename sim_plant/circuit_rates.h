@@ -78,8 +78,8 @@ static inline mechanics_motion_t circuit_motion(const circuit_t *c, const point_
 /* What steps_symmetrical() can do: every leg tied or swinging, and nothing that needs the time. */
 static inline bool circuit_symmetrical(const circuit_t *c)
 {
-    return c->machine.symmetrical && c->machine.winding.branch < 0 && c->bridge.floating == 0 &&
-           c->bridge.both == 0 && mechanics_plain(&c->mech) && dclink_plain(&c->link);
+    return c->machine.symmetrical && c->machine.winding.branch < 0 && c->bridge.floating == 0u &&
+           c->bridge.both == 0u && mechanics_plain(&c->mech) && dclink_plain(&c->link);
 }
 
 #endif

@@ -39,7 +39,7 @@ static void all_nodes(const circuit_t *c, const point_t *p, const machine_state_
     circuit_legs_t legs;
     double omega_e = m->pole_pairs * p->x[OMEGA_MECH];
     circuit_legs(c, p, &legs);
-    if (c->bridge.floating > 0) {
+    if (c->bridge.floating != 0u) {
         floating_voltages(&c->bridge, m, state, point, omega_e, p->x[V_DC], legs.v_V, legs.v_leg_V, &moved);
     } else {
         machine_rates(m, state, point, omega_e, legs.v_V, &moved);

@@ -122,7 +122,7 @@ INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape
 static void retake(const circuit_t *c, const void *start, double h, point_t *to)
 {
     field_t f;
-    bool swings = c->bridge.swinging > 0;
+    bool swings = c->bridge.swinging != 0u;
     *to = c->now;
     switch (c->machine.winding.active) {
     case 2:
@@ -251,7 +251,7 @@ INLINE double take_steps(circuit_t *c, double left_s, shape_t shape, bool swings
 
 WIDER double steps_symmetrical(circuit_t *c, double left_s, bool *event)
 {
-    bool swings = c->bridge.swinging > 0;
+    bool swings = c->bridge.swinging != 0u;
     switch (c->machine.winding.active) {
     case 2:
         return swings ? take_steps(c, left_s, STAR, true, event) : take_steps(c, left_s, STAR, false, event);
