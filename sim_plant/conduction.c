@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-#define SLOPE_MARGIN  4.0   /* of v_dc / L: EMF, saturation */
+#define SLOPE_MARGIN  4.0   /* of v_dc / L of a leg against the others: EMF, saturation */
 #define SMALL_CURRENT 1e-12 /* of the converter's full scale: nothing, for a floating leg */
 
 /* Leg k becomes another kind. What its capacitance holds more or less afterwards has come from the link if
@@ -90,6 +90,12 @@ static bool high_side(leg_t leg)
     return leg == LEG_HIGH || leg == LEG_DIODE_HIGH;
 }
 
+/* Whether a gate leaves leg k at the rail that it is at, whatever its current. */
+static bool keeps_rail(gate_t gate, leg_t leg)
+{
+    return gate == GATE_OFF || (gate == GATE_LOW && low_side(leg)) || (gate == GATE_HIGH && high_side(leg));
+}
+
 bool circuit_switch_early(circuit_t *c, const gates_t *gates, unsigned legs, double within_s)
 {
     const bridge_t *b = &c->bridge;
@@ -97,14 +103,17 @@ bool circuit_switch_early(circuit_t *c, const gates_t *gates, unsigned legs, dou
     if (b->v_diode_V != b->v_switch_V || b->floating != 0u || b->swinging != 0u) {
         return false;
     }
-    double near_A =
-        2.0 * b->zone_A + SLOPE_MARGIN * c->machine.gamma_sum_1_H * fabs(c->now.x[V_DC]) * within_s;
     for (unsigned rest = legs; rest != 0u; rest &= rest - 1u) {
         int k = bridge_first(rest);
+        gate_t gate = gates_conducting(gates, k);
+        if (!keeps_rail(gate, b->leg[k])) {
+            return false;
+        }
         double i_A = circuit_leg_A(c, &c->now, k);
-        to[k] = bridge_commutated(b, k, gates_conducting(gates, k), i_A);
-        bool same = (low_side(to[k]) && low_side(b->leg[k])) || (high_side(to[k]) && high_side(b->leg[k]));
-        if (!same || fabs(i_A) < near_A) {
+        double slope_A_s = SLOPE_MARGIN * c->machine.gamma_leg_1_H * fabs(c->now.x[V_DC]);
+        to[k] = bridge_commutated(b, k, gate, i_A);
+        if (low_side(to[k]) != low_side(b->leg[k]) || high_side(to[k]) != high_side(b->leg[k]) ||
+            fabs(i_A) < 2.0 * b->zone_A + slope_A_s * within_s) {
             return false;
         }
     }
