@@ -103,6 +103,15 @@ typedef bool (*cpu_breakpoint_t)(void *owner, uint8_t number);
 void cpu_on_breakpoint(cpu_t *cpu, void *owner, cpu_breakpoint_t breakpoint);
 void cpu_set_register(cpu_t *cpu, int n, uint32_t value);
 
+/* A debugger is called with the processor at rest, before the instruction at the PC: when asked for, at a
+ * break, after a step. Time stands until it returns; it may change registers and memory. A break within an IT
+ * block is not seen, and a step may go on to its end. A stop costs up to a block's time, no instructions. */
+typedef enum { CPU_GO, CPU_STEP } cpu_debug_t;
+typedef cpu_debug_t (*cpu_debugger_t)(void *owner);
+void cpu_debug(cpu_t *cpu, void *owner, cpu_debugger_t debugger); /* NULL: none, and no breaks */
+bool cpu_break(cpu_t *cpu, uint32_t address, bool set);           /* false: more than 32 */
+void cpu_ask_debugger(cpu_t *cpu);
+
 /* Software reset (AIRCR) or lock-up: the run ends with true, these tell. Both last until cpu_reset(). */
 bool cpu_reset_asked(const cpu_t *cpu);
 bool cpu_locked_up(const cpu_t *cpu);
