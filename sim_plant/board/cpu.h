@@ -77,7 +77,7 @@ void cpu_halt(cpu_t *cpu, bool halted); /* as a debugger does */
 void cpu_stall(cpu_t *cpu, uint32_t base, uint64_t until_cycle);
 uint64_t cpu_now(const cpu_t *cpu);
 uint32_t cpu_pc(const cpu_t *cpu);
-uint32_t cpu_register(const cpu_t *cpu, int n); /* r0 to r15 */
+uint32_t cpu_register(const cpu_t *cpu, int n); /* r0 to r15; 16: xPSR */
 
 /* Interrupt request lines are levels: pending again after return while the line is high. CPU_NMI is one of
  * them. */
@@ -101,7 +101,7 @@ void cpu_watch(cpu_t *cpu, uint32_t address, void *owner, cpu_watch_t watch);
 /* A BKPT is an error without this. True: it has been served, go on behind it; false: the run ends. */
 typedef bool (*cpu_breakpoint_t)(void *owner, uint8_t number);
 void cpu_on_breakpoint(cpu_t *cpu, void *owner, cpu_breakpoint_t breakpoint);
-void cpu_set_register(cpu_t *cpu, int n, uint32_t value);
+void cpu_set_register(cpu_t *cpu, int n, uint32_t value); /* of xPSR, the flags */
 
 /* A debugger is called with the processor at rest, before the instruction at the PC: when asked for, at a
  * break, after a step. Time stands until it returns; it may change registers and memory. A break within an IT
