@@ -23,6 +23,7 @@ struct BoardOptions {
     std::string image, figures, last;
     std::vector<std::string> limits;
     double console_s = 0.0;
+    int gdb_port = -1;
 };
 
 // NAME=MOST: a line like those of the expectations. Returns whether it holds.
@@ -55,7 +56,7 @@ bool check_limit(const std::string &limit, const figures_t &figures)
     throw InputError("--limit " + limit + ": no such figure in this run; there are:" + known);
 }
 
-int run(const RunOptions &options, const BoardOptions &board, NodeOptions node)
+int run(RunOptions options, const BoardOptions &board, NodeOptions node)
 {
     if (board.console_s > 0.0) {
         return board_show_console(board.image.c_str(), board.console_s,
@@ -65,6 +66,10 @@ int run(const RunOptions &options, const BoardOptions &board, NodeOptions node)
         throw InputError("a scenario is wanted, or --console SECONDS");
     }
     rig_board_image(board.image.c_str(), !node.can.empty());
+    if (board.gdb_port >= 0) {
+        rig_board_gdb(static_cast<uint16_t>(board.gdb_port));
+        options.jobs = 1;
+    }
     if (!node.can.empty()) {
         node.scenario = options.scenario;
         node.settings = options.settings;
@@ -107,6 +112,11 @@ int main(int argc, char **argv)
         "no scenario: run the image for so many seconds and print what its UART says; exit 1 when a line "
         "begins with FAIL");
     app.add_option("--until", board.last, "with --console: end at a line that begins with this");
+    app.add_option("--gdb", board.gdb_port,
+                   "wait for gdb on this port of this machine (0: a free one) before the first instruction; "
+                   "time stands while it has stopped the processor")
+        ->check(CLI::Range(0, 65535))
+        ->excludes("--console");
     app.add_option("--figures", board.figures,
                    "write instructions, cycles, stack and load to this file (JSON)");
     app.add_option("--limit", board.limits,

@@ -1,5 +1,6 @@
 #include "tools/pmsim_board/rig_board.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,6 +9,7 @@
 #include "firmware/params/store.h"
 #include "sim_plant/board/board.h"
 #include "tools/pmsim/rig_sample.h"
+#include "tools/pmsim_board/gdb_server.h"
 #include "tools/pmsim_board/master.h"
 #include "tools/pmsim_board/watch.h"
 
@@ -23,15 +25,22 @@ struct rig {
     drive_command_t sent;
     master_t master;
     uint32_t since_sent;
+    gdb_server_t *gdb; /* NULL: none */
 };
 
 static const char *image_path;
 static bool live;
+static int gdb_port = -1;
 
 void rig_board_image(const char *elf_path, bool commands_by_bus)
 {
     image_path = elf_path;
     live = commands_by_bus;
+}
+
+void rig_board_gdb(uint16_t port)
+{
+    gdb_port = port;
 }
 
 static bool boot(rig_t *rig, const drive_params_t *params)
@@ -68,6 +77,14 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         rig_destroy(rig);
         return NULL;
     }
+    if (gdb_port >= 0) {
+        rig->gdb = gdb_server_attach(board_cpu(rig->board), (uint16_t)gdb_port);
+        if (rig->gdb == NULL) {
+            snprintf(error, error_size, "no gdb on port %d: %s", gdb_port, strerror(errno));
+            rig_destroy(rig);
+            return NULL;
+        }
+    }
     if (!boot(rig, params)) {
         snprintf(error, error_size, "%s: %s", image_path, board_error(rig->board));
         rig_destroy(rig);
@@ -90,6 +107,7 @@ void rig_destroy(rig_t *rig)
 {
     if (rig->board != NULL) {
         watch_end(&rig->watch);
+        gdb_server_detach(rig->gdb);
         board_destroy(rig->board);
     }
     plant_destroy(rig->plant);
@@ -181,6 +199,9 @@ void rig_step(rig_t *rig, rig_sample_t *sample)
     plant_truth_windings(rig->plant, &sample->truth);
     if (!live && ++rig->since_sent >= REPEAT_PERIODS) {
         send(rig);
+    }
+    if (rig->gdb != NULL) {
+        gdb_server_poll(rig->gdb);
     }
     if (!board_run_period(rig->board)) {
         fprintf(stderr, "pmsim board: %s at %.6f s\n", board_error(rig->board), sample->truth.t_s);

@@ -7,6 +7,7 @@
 #define PMSIM_BOARD_RIG_BOARD_H
 
 #include <stdbool.h>
+#include <stdint.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -15,6 +16,9 @@ extern "C" {
 /* For all rigs that are created after it. commands_by_bus: rig_command() says nothing, a master is on the
  * bus. */
 void rig_board_image(const char *elf_path, bool commands_by_bus);
+
+/* Each of them waits for gdb on that port before its first instruction; 0: on a free one. */
+void rig_board_gdb(uint16_t port);
 
 #ifdef __cplusplus
 }
