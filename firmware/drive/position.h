@@ -50,10 +50,9 @@ typedef struct {
 void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i,
                    position_out_t *out);
 
-/* While the rotor follows a given vector (align, open-loop start) the step stands between these two:
- * `imposed` takes the place of the loop, and the observer is tied to it. */
+/* While the rotor follows a given vector (align, open-loop start): the loop is opened, the position is
+ * `imposed` and goes on with its speed, and the observer is tied to it. Up to the next position_slow(). */
 void position_lead(position_t *self, const position_config_t *config, const pm_pll_t *imposed);
-void position_follow(position_t *self, const pm_pll_t *imposed);
 
 /* At 1 kHz, with the current of the last step and the same in its frame: weight, carrier, loop gains,
  * quality. */
