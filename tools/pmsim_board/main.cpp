@@ -65,13 +65,10 @@ int run(const RunOptions &options, const BoardOptions &board, NodeOptions node)
         throw InputError("a scenario is wanted, or --console SECONDS");
     }
     rig_board_image(board.image.c_str(), !node.can.empty());
-    if (!node.can.empty()) {
-        node.scenario = options.scenario;
-        node.settings = options.settings;
-        node.quiet = options.quiet;
-        return run_node(node);
-    }
-    int code = run_and_report(options);
+    node.scenario = options.scenario;
+    node.settings = options.settings;
+    node.quiet = options.quiet;
+    int code = node.can.empty() ? run_and_report(options) : run_node(node);
     const figures_t figures = all_figures();
     if (!options.quiet && !options.json) {
         std::cout << figure_table(figures);
@@ -107,6 +104,7 @@ int main(int argc, char **argv)
         "no scenario: run the image for so many seconds and print what its UART says; exit 1 when a line "
         "begins with FAIL");
     app.add_option("--until", board.last, "with --console: end at a line that begins with this");
+    add_node_options(app, node);
     app.add_option("--figures", board.figures,
                    "write instructions, cycles, stack and load to this file (JSON)");
     app.add_option("--limit", board.limits,
@@ -119,8 +117,11 @@ int main(int argc, char **argv)
         "bit for\n"
         "bit, with the same code on the host.\n"
         "Exit code: 0 all pass, 1 an expectation or a limit fails, 2 bad input or the image has failed.\n\n"
-        "Example:\n"
-        "  pmsim board out/build/stm32g431/pmdrive.elf tests/scenario/demo.yaml --out out/board");
+        "With --can it is a live node, as `pmsim node`; commands then come over the bus alone, and the "
+        "figures at its end.\n\n"
+        "Examples:\n"
+        "  pmsim board out/build/stm32g431/pmdrive.elf tests/scenario/demo.yaml --out out/board\n"
+        "  pmsim board out/build/stm32g431/pmdrive.elf tests/scenario/node.yaml --can vcan0");
     try {
         app.parse(argc, argv);
         return run(options, board, node);

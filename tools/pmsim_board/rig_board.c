@@ -35,6 +35,7 @@ struct rig {
     rig_scale_t scale;
     drive_command_t sent;
     master_t master;
+    hal_can_state_t bus; /* as it was told last */
     uint32_t since_sent;
     cpu_exception_stats_t counted[FIGURE_INTERRUPTS]; /* up to the last return */
     figures_t figures;
@@ -311,7 +312,10 @@ bool rig_receive(rig_t *rig, hal_can_frame_t *frame)
 
 void rig_set_can_state(rig_t *rig, hal_can_state_t state)
 {
-    board_can_error(rig->board, state == HAL_CAN_BUS_OFF);
+    if (state != rig->bus && state != HAL_CAN_ACTIVE) { /* which it becomes by itself, frame by frame */
+        board_can_error(rig->board, state == HAL_CAN_BUS_OFF);
+    }
+    rig->bus = state;
 }
 
 /* Nobody reads them in a scenario: the status is read from the memory, where it is complete. */
