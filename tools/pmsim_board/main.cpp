@@ -4,6 +4,7 @@
 #include <exception>
 #include <fstream>
 #include <iostream>
+#include <map>
 
 #include <CLI/CLI.hpp>
 
@@ -22,6 +23,7 @@ using namespace pmsim;
 struct BoardOptions {
     std::string image, figures, last;
     std::vector<std::string> limits;
+    bus_noise_kind_t load = BUS_QUIET;
     double console_s = 0.0;
 };
 
@@ -65,6 +67,7 @@ int run(const RunOptions &options, const BoardOptions &board, NodeOptions node)
         throw InputError("a scenario is wanted, or --console SECONDS");
     }
     rig_board_image(board.image.c_str(), !node.can.empty());
+    rig_board_bus_load(board.load);
     node.scenario = options.scenario;
     node.settings = options.settings;
     node.quiet = options.quiet;
@@ -105,6 +108,10 @@ int main(int argc, char **argv)
         "begins with FAIL");
     app.add_option("--until", board.last, "with --console: end at a line that begins with this");
     add_node_options(app, node);
+    app.add_option("--bus-load", board.load,
+                   "other nodes that fill the bus, at 1 Mbit/s: babble (shortest frames) or garbage (any)")
+        ->transform(CLI::CheckedTransformer(
+            std::map<std::string, bus_noise_kind_t>{{"babble", BUS_BABBLE}, {"garbage", BUS_GARBAGE}}));
     app.add_option("--figures", board.figures,
                    "write instructions, cycles, stack and load to this file (JSON)");
     app.add_option("--limit", board.limits,

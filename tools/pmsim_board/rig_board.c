@@ -8,6 +8,7 @@
 #include "firmware/params/store.h"
 #include "sim_plant/board/board.h"
 #include "tools/pmsim/rig_sample.h"
+#include "tools/pmsim_board/bus_load.h"
 #include "tools/pmsim_board/figures.h"
 #include "tools/pmsim_board/master.h"
 
@@ -37,17 +38,24 @@ struct rig {
     master_t master;
     hal_can_state_t bus; /* as it was told last */
     uint32_t since_sent;
+    bus_load_t load;
     cpu_exception_stats_t counted[FIGURE_INTERRUPTS]; /* up to the last return */
     figures_t figures;
 };
 
 static const char *image_path;
 static bool live;
+static bus_noise_kind_t noise;
 
 void rig_board_image(const char *elf_path, bool commands_by_bus)
 {
     image_path = elf_path;
     live = commands_by_bus;
+}
+
+void rig_board_bus_load(bus_noise_kind_t kind)
+{
+    noise = kind;
 }
 
 static int mode_of(const drive_t *drive)
@@ -162,8 +170,9 @@ static void trace(void *owner, int exception, bool entry)
 static bool boot(rig_t *rig, const drive_params_t *params)
 {
     uint32_t words[STORE_WORDS];
+    /* refused ones too: the image has to refuse them itself */
     const uint32_t used =
-        app_page(params, 1, words); /* refused ones too: the image has to refuse them itself */
+        noise == BUS_QUIET ? app_page(params, 1, words) : bus_load_page(params, 1000, words);
     board_program(rig->board, STORE_ADDRESS, words, used * sizeof words[0]);
     if (!board_boot(rig->board, BOOT_S)) {
         return false;
@@ -210,6 +219,7 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         rig_destroy(rig);
         return NULL;
     }
+    rig->load = bus_load(noise);
     if (!live) {
         rig->master = master_make(rig->board, params);
         master_start(&rig->master);
@@ -228,6 +238,8 @@ static void add_figures(rig_t *rig)
     f->period_cycles = (uint64_t)(board_period_s(rig->board) * (double)f->clock_Hz + 0.5);
     f->stack_most = board_stack_used(rig->board);
     f->resets = board_resets(rig->board);
+    f->bus_frames = rig->load.frames;
+    f->bus_idle = rig->load.idle;
     figures_merge(f);
 }
 
@@ -332,6 +344,7 @@ void rig_step(rig_t *rig, rig_sample_t *sample)
     if (!live && ++rig->since_sent >= REPEAT_PERIODS) {
         send(rig);
     }
+    bus_load_fill(&rig->load, rig->board);
     if (!board_run_period(rig->board)) {
         fprintf(stderr, "pmsim board: %s at %.6f s\n", board_error(rig->board), sample->truth.t_s);
         exit(2);

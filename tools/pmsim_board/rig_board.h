@@ -8,6 +8,8 @@
 
 #include <stdbool.h>
 
+#include "tools/pmsim_board/bus_noise.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -15,6 +17,9 @@ extern "C" {
 /* For all rigs that are created after it. commands_by_bus: rig_command() says nothing, a master is on the
  * bus. */
 void rig_board_image(const char *elf_path, bool commands_by_bus);
+
+/* The same: others keep the bus busy, at 1 Mbit/s. */
+void rig_board_bus_load(bus_noise_kind_t kind);
 
 #ifdef __cplusplus
 }

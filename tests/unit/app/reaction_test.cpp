@@ -2,8 +2,9 @@
 // nothing.
 #include <functional>
 
-#include "tests/support/bus_noise.h"
+#include "tests/support/bus_bits.h"
 #include "tests/unit/app/bench.h"
+#include "tools/pmsim_board/bus_noise.h"
 
 using app_test::Running;
 
@@ -46,7 +47,7 @@ std::function<void(Running &, int)> once(const std::function<void(Running &)> &w
 std::function<void(Running &, int)> babble(uint16_t id, int bytes)
 {
     return [id, bytes](Running &x, int) {
-        for (int n = 0; n <= 1000 / bus_noise::least_bits(bytes); ++n) {
+        for (int n = 0; n <= 1000 / bus_bits::least(bytes); ++n) {
             x.give(id, std::vector<uint8_t>(size_t(bytes), uint8_t(n)));
             app_turn(&x.loop.app); // a processor's goes round for each
         }
@@ -55,12 +56,12 @@ std::function<void(Running &, int)> babble(uint16_t id, int bytes)
 
 void garbage(Running &x, int ms)
 {
-    bus_noise::Source source(unsigned(ms) + 1);
+    bus_noise_t noise = {BUS_GARBAGE, uint32_t(ms)};
     for (int bits = 0; bits < 1000;) {
-        const hal_can_frame_t f = source.garbage();
+        const hal_can_frame_t f = bus_noise_next(&noise);
         x.give(f.id, std::vector<uint8_t>(f.data, f.data + f.length));
         app_turn(&x.loop.app);
-        bits += bus_noise::least_bits(f.length);
+        bits += bus_bits::least(f.length);
     }
 }
 
