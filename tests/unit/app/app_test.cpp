@@ -77,17 +77,17 @@ TEST(App, StoresToThePageThatIsOlder)
     }
 }
 
-// Power lost at every word of the writing: the parameters before still hold.
+// Power lost at every byte of the writing: the parameters before still hold.
 TEST(App, PowerLostInMidWriteKeepsTheOldParameters)
 {
     const drive_params_t old = defaults();
     drive_params_t wanted = old;
     wanted.i_max = 1234;
-    const uint32_t words = 4 + 2 * DRIVE_PARAM_COUNT + 2;
-    for (uint32_t cut = 0; cut < words; ++cut) {
+    const uint32_t bytes = 4 * (4 + 2 * DRIVE_PARAM_COUNT + 2);
+    for (uint32_t cut = 0; cut < bytes; ++cut) {
         Bench x;
         ASSERT_TRUE(app_save(&x.loop.hal, &old));
-        x.loop.hal.store_words_left = cut;
+        x.loop.hal.store_bytes_left = cut;
         EXPECT_FALSE(app_save(&x.loop.hal, &wanted)) << cut;
         drive_params_t back;
         uint32_t unknown;
