@@ -44,7 +44,7 @@ static void know(drive_t *drive)
     const pm_num_t inductance = pm_num_div(base->psi, base->i);
     const pm_num_t R = pm_num_dec(r->R_s_uohm, -6);
     const pm_num_t L_q = pm_num_dec(r->L_q_nH, -9);
-    self->R = drive->config.position.flux.R;
+    self->R = drive->config.position.observer.active_flux.model.R;
     self->L_d = drive->config.current.L_d;
     self->L_q = drive->config.current.L_q;
     if (r->R_s_uohm != 0) {

@@ -36,7 +36,7 @@ static void foresee(const drive_t *drive, square_t *square)
 {
     const pm_q_t flux = 2 * pm_mul(drive->commissioning.L_q, square->wanted);
     const pm_q_t top = pm_mul(drive->status.v_dc, PM_Q(0.3));
-    const pm_q_t step = pm_max(pm_frac(top, drive->config.position.flux.t_s), 1);
+    const pm_q_t step = pm_max(pm_frac(top, drive->config.position.observer.active_flux.model.t_s), 1);
     const uint32_t half = (uint32_t)(flux / step) + 1U;
     square->half = (uint16_t)(half < SHORTEST ? SHORTEST : (half > SQUARE_LONGEST ? SQUARE_LONGEST : half));
     square->voltage = pm_mul(pm_mul(top, pm_div(flux, step * square->half)), PM_Q(0.8));
