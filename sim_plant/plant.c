@@ -24,9 +24,6 @@ struct plant {
     double t_s;            /* within the period */
     double winding_degC, magnet_degC;
     sensor_input_t sampled;
-    double instant_s[PLANT_INSTANTS];
-    int instants;
-    sensor_input_t at_instant[PLANT_INSTANTS];
     probe_t complete;       /* comparator edges of the last period */
     double start[ELEMENTS]; /* of the period */
     double v_mean_alpha_V, v_mean_beta_V;
@@ -34,8 +31,8 @@ struct plant {
     double slip_J;       /* work of plant_turn_rotor() */
     comparator_t comparator;
     bool has_break, broke;
-    double broke_s;         /* when it did, in its period */
-    double break_s, trip_s; /* when comparators and caller open the bridge, in this period */
+    double broke_s; /* when it did, in its period */
+    double break_s; /* when the comparators open the bridge, in this period */
 };
 
 plant_t *plant_create(const plant_config_t *config, double theta_e_rad, const char **error)
@@ -56,7 +53,6 @@ plant_t *plant_create(const plant_config_t *config, double theta_e_rad, const ch
     plant->winding_degC = AMBIENT_DEGC;
     plant->magnet_degC = AMBIENT_DEGC;
     plant->break_s = (double)INFINITY;
-    plant->trip_s = (double)INFINITY;
     noise_seed(&plant->noise, config->sensor.seed);
     circuit_init(&plant->circuit, config, theta_e_rad);
     gates_init(&plant->gates, &config->inverter, plant->circuit.bridge.legs);
@@ -144,15 +140,11 @@ static void run_closed(plant_t *plant, double t_s)
 static void run_until(plant_t *plant, double t_s)
 {
     while (plant->t_s < t_s) {
-        run_closed(plant, fmin(t_s, fmin(plant->break_s, plant->trip_s)));
+        run_closed(plant, fmin(t_s, plant->break_s));
         if (plant->t_s >= plant->break_s) {
             plant->broke = true;
             plant->broke_s = plant->break_s;
             plant->break_s = (double)INFINITY;
-            open_bridge(plant);
-        }
-        if (plant->t_s >= plant->trip_s) {
-            plant->trip_s = (double)INFINITY;
             open_bridge(plant);
         }
     }
@@ -248,18 +240,8 @@ void plant_run_period(plant_t *plant)
 {
     double period_s = plant->gates.period_s;
     double delay_s = plant->config.sensor.delay_s;
-    double early_s = delay_s < 0.0 ? fmax(period_s + delay_s, 0.0) : (double)INFINITY;
-    for (int n = 0; n < plant->instants; n++) {
-        if (early_s <= plant->instant_s[n]) {
-            run_until(plant, early_s);
-            capture(plant, &plant->sampled);
-            early_s = (double)INFINITY;
-        }
-        run_until(plant, plant->instant_s[n]);
-        capture(plant, &plant->at_instant[n]);
-    }
-    if (early_s < period_s) {
-        run_until(plant, early_s);
+    if (delay_s < 0.0) {
+        run_until(plant, fmax(period_s + delay_s, 0.0));
         capture(plant, &plant->sampled);
     }
     run_until(plant, period_s);
@@ -283,22 +265,6 @@ void plant_sample_at(plant_t *plant, double after_s, plant_adc_t *adc)
     sensor_convert(&plant->config.sensor, &plant->noise, &plant->sampled, adc);
 }
 
-void plant_set_instants(plant_t *plant, const double after_s[], int count)
-{
-    assert(count >= 0 && count <= PLANT_INSTANTS);
-    plant->instants = count;
-    for (int n = 0; n < count; n++) {
-        assert(after_s[n] >= (n > 0 ? after_s[n - 1] : 0.0) && after_s[n] <= plant->gates.period_s);
-        plant->instant_s[n] = after_s[n];
-    }
-}
-
-void plant_sampled(plant_t *plant, int n, plant_adc_t *adc)
-{
-    assert(n >= 0 && n < plant->instants);
-    sensor_convert(&plant->config.sensor, &plant->noise, &plant->at_instant[n], adc);
-}
-
 int plant_captured(const plant_t *plant, plant_capture_t captured[], int most)
 {
     const probe_t *probe = &plant->complete;
@@ -315,12 +281,6 @@ void plant_set_pwm(plant_t *plant, const plant_pwm_t *pwm)
 void plant_trip(plant_t *plant)
 {
     open_bridge(plant);
-}
-
-void plant_trip_after(plant_t *plant, double after_s)
-{
-    assert(after_s >= 0.0 && after_s <= plant->gates.period_s);
-    plant->trip_s = after_s;
 }
 
 void plant_drive(plant_t *plant, const bool driven[])
