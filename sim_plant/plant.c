@@ -110,27 +110,34 @@ static void advance_until(plant_t *plant, double t_s)
     }
 }
 
+/* The legs after a change of their gates at that time; false: the circuit must first get there. */
+static bool commutate(plant_t *plant, unsigned changed, double at_s)
+{
+    if (changed != 0u && at_s > plant->t_s) {
+        return circuit_switch_early(&plant->circuit, &plant->gates, changed, at_s - plant->t_s);
+    }
+    if (changed != 0u) {
+        circuit_switch(&plant->circuit, &plant->gates, changed);
+    }
+    return true;
+}
+
 /* Advances to time t of the present period, or to where the bridge opens before. Half of all edges change
  * only whether a switch or the diode across it carries the current; where that makes no difference the
  * circuit need not stop for them. */
 static void run_closed(plant_t *plant, double t_s)
 {
     gates_t *gates = &plant->gates;
-    circuit_t *circuit = &plant->circuit;
-    circuit_settle(circuit);
+    circuit_settle(&plant->circuit);
     double next_s = plant->t_s; /* when the gates change next: they are those of then */
     unsigned changed = gates_update(gates, next_s);
     while (plant->t_s < t_s) {
-        while (next_s < t_s &&
-               (next_s <= plant->t_s || circuit_ignores(circuit, gates, changed, next_s - plant->t_s))) {
-            if (changed != 0u) {
-                circuit_switch(circuit, gates, changed);
-            }
+        while (next_s < t_s && commutate(plant, changed, next_s)) {
             next_s = gates_next_s(gates, next_s);
             changed = next_s < t_s ? gates_update(gates, next_s) : 0u;
         }
         advance_until(plant, next_s < t_s ? next_s : t_s);
-        t_s = fmin(t_s, plant->break_s);
+        t_s = plant->break_s < t_s ? plant->break_s : t_s;
     }
 }
 

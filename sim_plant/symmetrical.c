@@ -16,16 +16,50 @@
 
 /* Of d, where all is smooth: about what the embedded solution of a Runge-Kutta pair of this order misses. */
 #define PART 0.125
-#define KINK 4.0 /* and where it is not, d says less than it should */
+/* While the drop of a closed switch turns over, it is a cubic of the time: of a whole turn d says half, of
+ * parts less. Where the turn begins or ends within the step d says less than it should. */
+#define TURNING   0.5
+#define KINK      4.0
+#define ZONE_EDGE 0.01  /* a step that ends so close to where a turn begins or ends counts as there; */
+#define ZONE_PAST 0.003 /* it aims this far behind an end, so as not to leave a sliver. Units of the zone */
 
-/* Whether the drop of a closed switch has moved: then nothing is smooth. */
-INLINE bool turned_over(const bridge_t *b, const tied_t *from, const tied_t *to, shape_t shape)
+/* What d says of a step over which drops have moved. */
+INLINE double drop_part(const bridge_t *b, const tied_t *from, const tied_t *to, shape_t shape, double part)
 {
-    bool moved = false;
     for (int k = 0; k < shape.legs && b->v_switch_V != 0.0; k++) {
-        moved = moved || from->share[k] != to->share[k];
+        if (from->share[k] != to->share[k]) {
+            double x = fabs(from->i_leg_A[k] * b->inv_zone_1_A[k]);
+            double end = fabs(to->i_leg_A[k] * b->inv_zone_1_A[k]);
+            part = larger(part, larger(x, end) > 1.0 + ZONE_EDGE ? KINK : TURNING);
+        }
     }
-    return moved;
+    return part;
+}
+
+/* Steps end where the drop of a closed switch begins or ceases to turn over, and while it does are as long as
+ * the error of that allows. */
+INLINE double zone_s(const circuit_t *c, const start_t *s, shape_t shape, double h)
+{
+    const bridge_t *b = &c->bridge;
+    for (int k = 0; k < shape.legs && b->v_switch_V != 0.0; k++) {
+        double x = s->tied.i_leg_A[k] * b->inv_zone_1_A[k];
+        double speed = along(&c->machine.winding, shape, k, s->i_A_s) * b->inv_zone_1_A[k];
+        double end = x + speed * h;
+        if (b->inv_zone_1_A[k] == 0.0 || (x >= 1.0 && end >= 1.0) || (x <= -1.0 && end <= -1.0)) {
+            continue;
+        }
+        double ahead = speed > 0.0 ? x : -x; /* towards the end of a turn at 1 */
+        double edge = ahead < -1.0 - ZONE_EDGE ? -1.0 : 1.0 + ZONE_PAST;
+        if (ahead < edge - 2.0 * ZONE_PAST && ahead + fabs(speed) * h > edge) {
+            h = (edge - ahead) / fabs(speed);
+        }
+        if (ahead >= -1.0 - ZONE_EDGE && ahead < 1.0) {
+            double d_Wb = b->v_switch_V / 3.0 * fabs(1.5 * x + 0.5 * speed * h) * speed * speed * h * h * h;
+            double error = TURNING * d_Wb * c->inv_u_scale * c->inv_tolerance;
+            h = error > 0.9 ? h * cbrt(0.9 / error) : h;
+        }
+    }
+    return h;
 }
 
 INLINE double error_norm(const circuit_t *c, const double miss[], const pair_t by[], shape_t shape,
@@ -115,14 +149,14 @@ INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape
         pair_put(&to->i_A[2 * p], f->i_A[p]);
     }
     to->torque_Nm = f->torque_Nm;
-    double part = turned_over(&c->bridge, &s->tied, &tied, shape) ? KINK : swings ? 1.0 : PART;
+    double part = drop_part(&c->bridge, &s->tied, &tied, shape, swings ? 1.0 : PART);
     return part * error_norm(c, miss, by, shape, swings);
 }
 
 static void retake(const circuit_t *c, const void *start, double h, point_t *to)
 {
     field_t f;
-    bool swings = c->bridge.swinging > 0;
+    bool swings = c->bridge.swinging != 0u;
     *to = c->now;
     switch (c->machine.winding.active) {
     case 2:
@@ -204,11 +238,14 @@ INLINE double take_steps(circuit_t *c, double left_s, shape_t shape, bool swings
         double h = swings || c->step_s > left_s ? left_s : c->step_s;
         h = steps_turn_s(c, start.rate[THETA_E], h);
         h = swings ? swing_s(c, &start, shape, h) : h;
+        double zone = zone_s(c, &start, shape, h);
+        bool smooth = zone == h;
+        h = zone;
         h = h > 0.999 * left_s ? left_s : h; /* no sliver at the end */
         double error = step(c, &start, h, shape, swings, to, &field);
         while (!(error <= 1.0) && h > 1e-9 * left_s) {
             h = steps_shorter_s(h, error);
-            c->step_s = swings ? c->step_s : h;
+            c->step_s = swings || !smooth ? c->step_s : h;
             error = step(c, &start, h, shape, swings, to, &field);
         }
         if (!swings) {
@@ -251,7 +288,7 @@ INLINE double take_steps(circuit_t *c, double left_s, shape_t shape, bool swings
 
 WIDER double steps_symmetrical(circuit_t *c, double left_s, bool *event)
 {
-    bool swings = c->bridge.swinging > 0;
+    bool swings = c->bridge.swinging != 0u;
     switch (c->machine.winding.active) {
     case 2:
         return swings ? take_steps(c, left_s, STAR, true, event) : take_steps(c, left_s, STAR, false, event);

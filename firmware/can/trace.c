@@ -2,25 +2,16 @@
 
 #include <stddef.h>
 
-static int32_t limited(int32_t x)
+static inline int32_t limited(int32_t x)
 {
+#if defined(__ARM_FEATURE_SAT)
+    int32_t r;
+    __asm__("ssat %0, #16, %1" : "=r"(r) : "r"(x));
+    return r;
+#else
     const int32_t low = x < -32768 ? -32768 : x;
     return low > 32767 ? 32767 : low;
-}
-
-static bool triggers(const trace_t *trace, int32_t now)
-{
-    const bool rises = trace->previous < trace->level && now >= trace->level;
-    const bool falls = trace->previous >= trace->level && now < trace->level;
-    switch (trace->edge) {
-    case TRACE_RISING:
-        return rises;
-    case TRACE_FALLING:
-        return falls;
-    case TRACE_BOTH:
-    default:
-        return rises || falls;
-    }
+#endif
 }
 
 static void change(trace_t *trace, trace_state_t state, uint32_t samples)
@@ -29,72 +20,67 @@ static void change(trace_t *trace, trace_state_t state, uint32_t samples)
     trace->left = samples;
 }
 
-/* The sample just taken is the first that the trigger saw. */
-static void wait(trace_t *trace, int32_t now)
+static bool triggers(const trace_t *trace, bool crossed)
 {
-    if (trace->trigger == TRACE_SIGNALS || trace->forced || triggers(trace, now)) {
-        change(trace, TRACE_TRIGGERED, trace->after - 1U);
-    }
+    const trace_edge_t edge = trace->side < 0 ? TRACE_FALLING : TRACE_RISING;
+    return trace->forced || (crossed && (trace->edge == TRACE_BOTH || trace->edge == edge));
 }
 
-static void advance(trace_t *trace, int32_t now)
+/* The sample just taken is the first that the trigger saw, has crossed the level, or ends a time. */
+static __attribute__((noinline)) void advance(trace_t *trace, int32_t side)
 {
-    switch (trace->state) {
-    case TRACE_FILLING:
-        trace->left--;
-        if (trace->left == 0U) {
-            change(trace, TRACE_WAITING, 0);
-        }
-        break;
-    case TRACE_WAITING:
-        wait(trace, now);
-        break;
-    case TRACE_TRIGGERED:
-        trace->left--;
-        break;
-    case TRACE_OFF:
-    case TRACE_COMPLETE:
-    default:
-        break;
+    const bool crossed = (side ^ trace->side) < 0;
+    trace->side = side;
+    trace->poked = false;
+    if (trace->state == TRACE_FILLING && trace->left == 0U) {
+        change(trace, trace->forced ? TRACE_TRIGGERED : TRACE_WAITING, trace->after);
+    } else if (trace->state == TRACE_WAITING) {
+        change(trace, triggers(trace, crossed) ? TRACE_TRIGGERED : TRACE_WAITING, trace->after - 1U);
+    } else {
+        /* goes on */
     }
     if (trace->state == TRACE_TRIGGERED && trace->left == 0U) {
-        trace->active = 0;
+        trace->countdown = 0;
         trace->state = TRACE_COMPLETE;
     }
 }
 
 void trace_record(trace_t *trace)
 {
-    trace->countdown--;
-    if (trace->countdown != 0U) {
-        return;
-    }
     trace->countdown = trace->divider;
-    int16_t *to = &trace->ring[trace->next];
-    const trace_signal_t *end = &trace->signal[trace->count];
-    for (const trace_signal_t *signal = trace->signal; signal < end; signal++) {
-        *to = (int16_t)limited(*signal->source >> signal->shift);
+    const trace_channel_t *channel = trace->channel;
+    const int16_t *sample = trace->next;
+    int16_t *to = trace->next;
+    const int16_t *end = &to[trace->count];
+    do {
+        *to = (int16_t)limited(*channel->source >> channel->shift);
+        channel++;
         to++;
+    } while (to != end);
+    trace->next = to == trace->end ? trace->ring : to;
+    const int32_t side = sample[trace->trigger] - trace->level;
+    trace->left--;
+    if (trace->left == 0U || (side ^ trace->side) < 0 || trace->poked) {
+        advance(trace, side);
     }
-    const int32_t now = trace->trigger < TRACE_SIGNALS ? trace->ring[trace->next + trace->trigger] : 0;
-    trace->next += trace->count;
-    if (trace->next == trace->end) {
-        trace->next = 0;
-    }
-    advance(trace, now);
-    trace->previous = now;
+}
+
+static uint32_t numbers(const trace_t *trace)
+{
+    return (uint32_t)(trace->end - trace->ring);
 }
 
 uint32_t trace_size(const trace_t *trace)
 {
-    return trace->state == TRACE_COMPLETE ? trace->end * 2U : 0U;
+    return trace->state == TRACE_COMPLETE ? numbers(trace) * 2U : 0U;
 }
 
 /* The oldest sample is where the next would go. */
 void trace_read(const trace_t *trace, uint32_t offset, uint8_t bytes[], uint32_t count)
 {
+    const uint32_t oldest = (uint32_t)(trace->next - trace->ring);
     for (uint32_t n = 0; n < count; n++) {
-        const uint32_t place = (trace->next + (offset + n) / 2U) % trace->end;
+        const uint32_t place = (oldest + (offset + n) / 2U) % numbers(trace);
         const uint32_t number = (uint32_t)trace->ring[place];
         bytes[n] = (uint8_t)(((offset + n) % 2U == 0U ? number : number >> 8) & 0xFFU);
     }

@@ -8,9 +8,8 @@
  *   division.
  * pm_ratio(num, den): num / den in Q31 for 0 <= num <= den, den > 0; error -2^-16 ... 2^-15. One 32-bit
  *   division.
- * pm_counts_per_unit(counts, v): 16 counts / v, so that pm_mulh(x, .) gives counts for a voltage x;
- *   v >= 1/16, of which 16 bits count; relative error <= (v + 1 / v) 2^-16, or one below the exact value when
- *   that is more. One 32-bit division. pm_counts_make() prepares the dividend; 0 < counts < 2^15.
+ * pm_per_volt(v): 1 / v in Q24, so that pm_mulh(x, .) gives x / v as a share (Q20); v >= 1/16, of which 16
+ *   bits count; relative error <= (v + 1 / v) 2^-16. One 32-bit division.
  * Cost: docs/decisions/001-signal-format.md. Tests: tests/unit/math/root_test.cpp. */
 #ifndef PM_MATH_ROOT_H
 #define PM_MATH_ROOT_H
@@ -30,24 +29,43 @@ pm_unit_t pm_ratio(pm_q_t num, pm_q_t den);
 }
 #endif
 
-typedef struct {
-    uint32_t dividend; /* counts, lifted as far as 32 bits and the quotient allow */
-    uint32_t lift;     /* what the quotient lacks, bits */
-} pm_counts_t;
-
-static inline pm_counts_t pm_counts_make(uint32_t counts)
+/* sqrt(m 2^30) for m >= 2^30, that is the root of m / 2^32 in Q31, within 1e-8 of it.
+ * A cubic gives 1 / sqrt within 0.7 %, one Newton step makes that 8e-5. The root made from it is cut to 16
+ * bits, so that its remainder is exact in 32 bits, and corrected by remainder / (2 root). */
+static inline uint32_t pm_root_q31(uint32_t m)
 {
-    const uint32_t free = (uint32_t)__builtin_clz(counts | 1U);
-    const uint32_t lift = free < 20U ? 20U - free : 0U;
-    pm_counts_t r;
-    r.dividend = counts << (20U - lift);
-    r.lift = lift;
-    return r;
+    enum {
+        C0 = 208867893,
+        C1 = -793348095,
+        C2 = 1672337219,
+        C3 = -1309134214
+    };                                   /* Q26, times 2^n for Horner */
+    const int32_t v = (int32_t)(m >> 1); /* Q31 */
+    int32_t y = pm_mulh_add(C2, C3, v);
+    y = pm_mulh_add(C1, y, v);
+    y = pm_shl(pm_mulh_add(C0, y, v), 3); /* 1 / sqrt(v), Q29 */
+    const int32_t miss = (1 << 25) - pm_mulh(v, pm_mulh(y, y));
+    y = pm_mulh_add(y, y, pm_shl(miss, 6));
+
+    const uint32_t s = ((uint32_t)pm_mulh(v, y) + (1U << 11)) >> 12; /* Q16 */
+    const int32_t rest = (int32_t)(m - s * s);                       /* Q32 */
+    return (s << 15) + (uint32_t)pm_mulh(pm_shl(rest, 1), y);
 }
 
-static inline int32_t pm_counts_per_unit(pm_counts_t counts, pm_q_t v)
+/* pm_sqrt() without a call. */
+static inline pm_q_t pm_sqrt_in_place(pm_q_t x)
 {
-    return (int32_t)((counts.dividend / ((uint32_t)v >> 12)) << counts.lift);
+    if (x <= 0) {
+        return 0;
+    }
+    const unsigned n = (unsigned)__builtin_clz((uint32_t)x) >> 1;
+    const uint32_t root = pm_root_q31((uint32_t)x << (2U * n));
+    return (pm_q_t)((root + (1U << n)) >> (n + 1U));
+}
+
+static inline int32_t pm_per_volt(pm_q_t v)
+{
+    return (int32_t)((UINT32_MAX / ((uint32_t)v >> 12)) << 8);
 }
 
 #endif

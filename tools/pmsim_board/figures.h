@@ -41,6 +41,7 @@ typedef struct {
     uint64_t period_cycles;
     uint32_t stack_most;
     uint32_t resets;
+    uint64_t bus_frames, bus_idle; /* of --bus-load: frames, and looks that found the bus idle */
     double simulated_s;
 } figures_t;
 

@@ -62,6 +62,10 @@ std::vector<std::pair<std::string, double>> figure_values(const figures_t &figur
     values.emplace_back("latency_cycles", double(figures.latency_most));
     values.emplace_back("stack_bytes", double(figures.stack_most));
     values.emplace_back("resets", double(figures.resets));
+    if (figures.bus_frames > 0) {
+        values.emplace_back("bus_frames", double(figures.bus_frames));
+        values.emplace_back("bus_idle", double(figures.bus_idle));
+    }
     values.emplace_back("identical", double(figures.identical));
     return values;
 }
@@ -90,7 +94,15 @@ std::string figure_table(const figures_t &figures)
         "interrupts\n",
         percent, static_cast<unsigned long long>(figures.latency_most), load, 1e-6 * double(figures.clock_Hz),
         figures.stack_most, figures.resets, static_cast<unsigned long long>(figures.identical));
-    return text + line;
+    text += line;
+    if (figures.bus_frames > 0) {
+        std::snprintf(line, sizeof line, "bus: %llu frames of others, %.0f a second; found idle %llu times\n",
+                      static_cast<unsigned long long>(figures.bus_frames),
+                      double(figures.bus_frames) / figures.simulated_s,
+                      static_cast<unsigned long long>(figures.bus_idle));
+        text += line;
+    }
+    return text;
 }
 
 std::string figure_json(const figures_t &figures)

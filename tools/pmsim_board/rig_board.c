@@ -9,6 +9,7 @@
 #include "firmware/params/store.h"
 #include "sim_plant/board/board.h"
 #include "tools/pmsim/rig_sample.h"
+#include "tools/pmsim_board/bus_load.h"
 #include "tools/pmsim_board/gdb_server.h"
 #include "tools/pmsim_board/master.h"
 #include "tools/pmsim_board/watch.h"
@@ -24,18 +25,26 @@ struct rig {
     rig_scale_t scale;
     drive_command_t sent;
     master_t master;
+    hal_can_state_t bus; /* as it was told last */
     uint32_t since_sent;
+    bus_load_t load;
     gdb_server_t *gdb; /* NULL: none */
 };
 
 static const char *image_path;
 static bool live;
 static int gdb_port = -1;
+static bus_noise_kind_t noise;
 
 void rig_board_image(const char *elf_path, bool commands_by_bus)
 {
     image_path = elf_path;
     live = commands_by_bus;
+}
+
+void rig_board_bus_load(bus_noise_kind_t kind)
+{
+    noise = kind;
 }
 
 void rig_board_gdb(uint16_t port)
@@ -46,8 +55,9 @@ void rig_board_gdb(uint16_t port)
 static bool boot(rig_t *rig, const drive_params_t *params)
 {
     uint32_t words[STORE_WORDS];
+    /* refused ones too: the image has to refuse them itself */
     const uint32_t used =
-        app_page(params, 1, words); /* refused ones too: the image has to refuse them itself */
+        noise == BUS_QUIET ? app_page(params, 1, words) : bus_load_page(params, 1000, words);
     board_program(rig->board, STORE_ADDRESS, words, used * sizeof words[0]);
     return board_boot(rig->board, BOOT_S);
 }
@@ -96,6 +106,7 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         rig_destroy(rig);
         return NULL;
     }
+    rig->load = bus_load(noise);
     if (!live) {
         rig->master = master_make(rig->board, params);
         master_start(&rig->master);
@@ -106,6 +117,8 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
 void rig_destroy(rig_t *rig)
 {
     if (rig->board != NULL) {
+        rig->watch.figures.bus_frames = rig->load.frames;
+        rig->watch.figures.bus_idle = rig->load.idle;
         watch_end(&rig->watch);
         gdb_server_detach(rig->gdb);
         board_destroy(rig->board);
@@ -183,7 +196,10 @@ bool rig_receive(rig_t *rig, hal_can_frame_t *frame)
 
 void rig_set_can_state(rig_t *rig, hal_can_state_t state)
 {
-    board_can_error(rig->board, state == HAL_CAN_BUS_OFF);
+    if (state != rig->bus && state != HAL_CAN_ACTIVE) { /* which it becomes by itself, frame by frame */
+        board_can_error(rig->board, state == HAL_CAN_BUS_OFF);
+    }
+    rig->bus = state;
 }
 
 /* Nobody reads them in a scenario: the status is read from the memory, where it is complete. */
@@ -200,6 +216,7 @@ void rig_step(rig_t *rig, rig_sample_t *sample)
     if (!live && ++rig->since_sent >= REPEAT_PERIODS) {
         send(rig);
     }
+    bus_load_fill(&rig->load, rig->board);
     if (rig->gdb != NULL) {
         gdb_server_poll(rig->gdb);
     }

@@ -9,6 +9,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "tools/pmsim_board/bus_noise.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -19,6 +21,9 @@ void rig_board_image(const char *elf_path, bool commands_by_bus);
 
 /* Each of them waits for gdb on that port before its first instruction; 0: on a free one. */
 void rig_board_gdb(uint16_t port);
+
+/* Others keep the bus busy, at 1 Mbit/s. */
+void rig_board_bus_load(bus_noise_kind_t kind);
 
 #ifdef __cplusplus
 }
