@@ -6,6 +6,7 @@ import contextlib
 import csv
 import io
 import json
+import os
 import sys
 import tempfile
 import threading
@@ -368,6 +369,73 @@ class Trace(Bench):
         self.node._trace = lambda command: None
         _, err = self.command("trace", "i_d", "--wait", "0.1", code=1)
         self.assertIn("nothing was recorded in 0.1 s", err)
+
+
+class Flash(Bench):
+    """OpenOCD is a stand-in on PATH; the drive that it is said to have written is on the bus."""
+
+    def setUp(self):
+        super().setUp()
+        with self.connect() as drive:
+            self.image = Path(self.path("an image.elf"))
+            self.image.write_bytes(b"\x7fELF" + drive.read("stored_eds") + b"rest")
+        self.openocd("exit 0")
+        path = mock.patch.dict("os.environ", {"PATH": f"{self.folder.name}:/usr/bin:/bin"})
+        path.start()
+        self.addCleanup(path.stop)
+
+    def openocd(self, script):
+        path = Path(self.path("openocd"))
+        path.write_text(f'#!/bin/sh\necho "$@" >>{self.folder.name}/said\n{script}\n', encoding="ascii")
+        path.chmod(0o755)
+
+    def said(self):
+        path = Path(self.path("said"))
+        return path.read_text(encoding="ascii") if path.exists() else ""
+
+    def test_writes_and_verifies_on_the_bus(self):
+        out, _ = self.command("flash", str(self.image))
+        self.assertIn(f"program {{{self.image}}} verify reset exit", self.said())
+        self.assertIn("interface/stlink.cfg", self.said())
+        self.assertIn("software_version", out)
+        self.assertIn(f"node {NODE} runs it", out)
+
+    def test_another_runs(self):
+        self.image.write_bytes(b"\x7fELF")
+        _, err = self.command("flash", str(self.image), code=1)
+        self.assertIn("its data sheet is another", err)
+
+    def test_without_a_bus(self):
+        out = io.StringIO()
+        with mock.patch.dict("os.environ"), contextlib.redirect_stdout(out):
+            os.environ.pop("PMDRIVE_CAN", None)
+            self.assertEqual(cli.main(["flash", str(self.image)]), 0)
+        self.assertIn("written and verified; with --can", out.getvalue())
+
+    def test_no_probe(self):
+        self.openocd("echo 'Error: open failed' >&2; exit 1")
+        out, err = self.command("flash", str(self.image), code=1)
+        self.assertIn("Error: open failed", out)
+        self.assertIn("no debug probe was found", err)
+        self.assertIn("ST-LINK", err)
+        self.assertNotIn("runs it", out)
+
+    def test_no_openocd(self):
+        _, err = self.command("flash", "--openocd", "no-such-program", str(self.image), code=1)
+        self.assertIn("apt-get install openocd", err)
+
+    def test_not_while_the_motor_runs(self):
+        with self.connect() as drive, motion.Motion(drive, "speed", speed=20000):
+            _, err = self.command("flash", str(self.image), code=1)
+        self.assertIn("the motor runs: nothing was written", err)
+        self.assertEqual(self.said(), "")
+
+    def test_usage(self):
+        self.assertIn("cannot read", self.command("flash", "missing.elf", code=2)[1])
+        self.assertIn("not both", self.command("flash", code=2)[1])
+        out, _ = self.command("flash", str(self.image), "--dry-run")
+        self.assertIn("target/stm32g4x.cfg", out)
+        self.assertEqual(self.said(), "")
 
 
 class Shell(Bench):

@@ -161,8 +161,11 @@ class Drive:
     def reset(self, communication=False, seconds=3.0):
         """Restart of the drive, or of its communication alone; returns when it answers again."""
         self.network.send_message(0, bytes([130 if communication else 129, self.node_id]))
-        end = time.monotonic() + seconds
         time.sleep(0.05)
+        self.await_answer(seconds)
+
+    def await_answer(self, seconds=3.0):
+        end = time.monotonic() + seconds
         while True:
             try:
                 self.read("device_type")
