@@ -7,6 +7,7 @@ import csv
 import io
 import json
 import os
+import subprocess
 import sys
 import tempfile
 import threading
@@ -151,6 +152,33 @@ class Values(Bench):
         self.assertIn("i_max (2200h:01), by i_trip (2600h:01)", err)
         self.assertIn("0604 0043h", err)
 
+    def test_what_is_still_to_be_done(self):
+        self.node["parameters_ready"] = 3
+        out, _ = self.command("set", "R_s=6.2")
+        self.assertIn("`pmdrive save`, then `pmdrive reset`", out)
+
+    def test_a_record_by_its_index(self):
+        self.assertEqual(self.command("get", "2100"), self.command("get", "machine"))
+
+    def test_list(self):
+        out, _ = self.command("list", "machine")
+        self.assertIn("0.0001 ohm to 100 ohm", out)
+        self.assertNotIn("store.machine", out)
+        self.assertIn("v_injection", self.command("list", "inject")[0])
+        self.assertEqual(len(self.json("list")), len(dictionary.ENTRIES))
+        self.assertIn("no name has `nix` in it", self.command("list", "nix", code=2)[1])
+
+    def test_codes_have_words(self):
+        with self.node.gate:
+            self.node.trip(1)
+        out, _ = self.command("get", "drive_fault", "error_code")
+        self.assertIn("1 (over-current)", out)
+        self.assertIn("2310h (over-current)", out)
+
+    def test_help(self):
+        self.assertIn("NAME=VALUE", self.command("help", "set")[0])
+        self.assertIn("examples:", self.command("help")[0])
+
     def test_nobody_there(self):
         _, err = self.command("get", "R_s", code=1, node=SILENT)
         self.assertIn(f"node {SILENT} does not answer to R_s (2100h:02)", err)
@@ -278,6 +306,43 @@ class Motion(Bench):
             _, err = self.command("run", "speed", "200rpm", code=2)
         self.assertIn("--for SECONDS", err)
         self.command("run", "speed", "200rpm", "--for", "1e9", code=2)
+        self.assertEqual(self.node.lib.cia402_on(self.node.profile), 0)
+
+    def held(self, *keys, code=0):
+        """Of `run` at a terminal where these come, one every 50 ms: what was seen, and how long it ran after the last."""
+        master, slave = os.openpty()
+        last_s = []
+
+        def press():
+            for key in keys:
+                time.sleep(0.05)
+                os.write(master, key)
+                last_s.append(time.monotonic())
+
+        thread = threading.Thread(target=press)
+        with open(slave, encoding="ascii") as terminal, mock.patch.object(sys, "stdin", terminal):
+            thread.start()
+            seen = self.json("run", "speed", "200rpm", code=code)
+            ended_s = time.monotonic()
+            thread.join()
+        os.close(master)
+        return seen, ended_s - last_s[-1]
+
+    def test_while_a_key_is_held(self):
+        seen, after_s = self.held(*[b" "] * 30)
+        self.assertAlmostEqual(max(x["velocity_actual"]["value"] for x in seen), 20.944, places=3)
+        self.assertGreater(after_s, 0.5)  # a keyboard needs so long until it repeats
+        self.wait(lambda: self.node["velocity_actual"] == 0)
+        self.assertIsNone(self.node.enabled_at)
+
+    def test_another_key_ends_it(self):
+        _, after_s = self.held(*[b" "] * 10, b"q", *[b" "] * 100)
+        self.assertIsNone(self.node.enabled_at)
+        self.assertLess(after_s, 0.0)
+
+    def test_no_other_key_begins(self):
+        seen, _ = self.held(b"x", code=1)
+        self.assertIn("was not pressed", seen[0]["error"])
         self.assertEqual(self.node.lib.cia402_on(self.node.profile), 0)
 
     def test_stops_on_interrupt(self):
@@ -455,8 +520,18 @@ class Shell(Bench):
         self.assertEqual(prompt.completenames("fau"), ["faults"])
 
     def test_completion(self):
-        out, _ = self.command("completion")
-        self.assertIn(" psi_m ", out)
+        script, _ = self.command("completion")
+
+        def completed(*words):
+            typed = " ".join(f"'{word}'" for word in ("pmdrive", *words))
+            line = f"{script}\nCOMP_WORDS=({typed}); COMP_CWORD={len(words)}; _pmdrive 2>/dev/null; echo ${{COMPREPLY[*]}}"
+            return subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=True).stdout.split()
+
+        self.assertEqual(completed("fau"), ["faults"])
+        self.assertEqual(completed("--node", "5", "get", "psi_"), ["psi_m"])
+        self.assertEqual(completed("set", "psi_"), ["psi_m="])
+        self.assertEqual(completed("trace", "i_d", "--ed"), ["--edge"])
+        self.assertEqual(completed("save", "mach"), ["machine"])
 
     def test_interface(self):
         self.assertIn("is no CAN interface", str(self.error("socketcand:host")))

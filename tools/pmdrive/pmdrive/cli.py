@@ -1,6 +1,7 @@
 """The command line. Every command is a call of the Python interface and a way to show what it gives."""
 import argparse
 import json
+import logging
 import os
 import sys
 
@@ -38,6 +39,8 @@ def parser():
     add("scan", "find the nodes on the bus", commands.scan, connects=False)
     sub = add("info", "what the drive is and how it does; with names: what they mean", commands.info, connects=None)
     sub.add_argument("names", nargs="*", help="objects or records")
+    sub = add("list", "the names of objects, with range and meaning", commands.list_names, connects=False)
+    sub.add_argument("names", nargs="*", help="records or parts of names (all)")
     sub = add("get", "read values", commands.get)
     sub.add_argument("names", nargs="+", help="objects or records, by name or index:sub")
     sub = add("set", "write values", commands.set_values)
@@ -86,7 +89,13 @@ def parser():
     add("shell", "commands without `pmdrive`, with completion, over one connection", commands.shell)
     sub = add("completion", "print the completion for bash: source <(pmdrive completion)", commands.completion,
               connects=False)
+    sub = add("help", "what a command takes", lambda wanted, *_: helped(top, kinds, wanted.topic), connects=False)
+    sub.add_argument("topic", nargs="?", choices=sorted(kinds.choices), metavar="COMMAND")
     return top
+
+
+def helped(top, kinds, command):
+    (kinds.choices[command] if command else top).print_help()
 
 
 def run(arguments, drive=None, out=None):
@@ -103,8 +112,11 @@ def run(arguments, drive=None, out=None):
 
 
 def main(words=None):
+    words = sys.argv[1:] if words is None else words
+    for library in ("can", "canopen"):  # what they complain of, our own errors say
+        logging.getLogger(library).setLevel(logging.CRITICAL)
     try:
-        arguments = parser().parse_args(words)
+        arguments = parser().parse_args(words or ["help"])
     except ValueError:
         print("pmdrive: PMDRIVE_NODE is not a node id", file=sys.stderr)
         return 2

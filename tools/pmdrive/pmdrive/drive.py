@@ -31,6 +31,11 @@ def error_text(code):
     return fault.text if fault else dictionary.ERRORS.get(code & 0xFFFF, "unknown error")
 
 
+def fault_text(code):
+    """Of drive_fault."""
+    return dictionary.FAULTS[code - 1].text if 0 < code <= len(dictionary.FAULTS) else "unknown" if code else "none"
+
+
 class Drive:
     """Closes its network. Names may be those of the dictionary or index:sub."""
 
