@@ -240,7 +240,8 @@ class Sets(Bench):
 
     def test_refused_together_is_undone(self):
         _, err = self.command("load", self.write("R_s: 7 ohm\ni_max: 40 A\ni_trip: 30 A\n"), "--yes", code=1)
-        self.assertIn("by i_trip (2600h:01)", err)
+        self.assertIn("i_trip (2600h:01), of all together", err)
+        self.assertIn("nothing was changed", err)
         self.assertEqual((self.node["R_s"], self.node["i_max"], self.node["i_trip"]), (6000000, 5000, 9000))
         self.assertEqual(self.node["parameter_batch"], 0)
 
@@ -511,11 +512,12 @@ class Shell(Bench):
             prompt = Prompt(cli.parser().parse_args(["shell"]), drive)
             out = io.StringIO()
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
-                for line in ("set R_s=6.3", "get R_s", "get R_z", "nonsense", "", "set 'R_s"):
+                for line in ("set R_s=6.3", "get R_s", "get R_z", "nonsense", "", "set 'R_s", "help set"):
                     self.assertFalse(prompt.onecmd(line))
             self.assertTrue(prompt.onecmd("quit"))
         self.assertEqual(out.getvalue().count("6.3 ohm"), 2)
         self.assertIn("did you mean R_s?", out.getvalue())
+        self.assertIn("NAME=VALUE", out.getvalue())
         self.assertEqual(prompt.completedefault("psi_"), ["psi_m"])
         self.assertEqual(prompt.completenames("fau"), ["faults"])
 

@@ -94,6 +94,9 @@ class Drive:
             culprit = names.BY_PLACE.get(divmod(self.read("parameter_refused"), 256))
             if culprit is None:
                 raise
+            if entry.name == "parameter_batch":
+                raise Refused(f"{culprit.label}, of all together", error.code, culprit.index, culprit.sub,
+                              f"nothing was changed: mend {culprit.name}, or those that it has to fit") from None
             raise Refused(f"{entry.label}, by {culprit.label}", error.code, entry.index, entry.sub) from None
 
     def get(self, name):

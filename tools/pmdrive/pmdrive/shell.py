@@ -34,10 +34,8 @@ class Shell(cmd.Cmd):
             pass
         return None
 
-    def do_help(self, _):
-        from . import cli
-
-        cli.parser().print_help()
+    def do_help(self, topic):
+        self.default(f"help {topic}")
 
     def emptyline(self):
         pass
