@@ -17,6 +17,7 @@ from pathlib import Path
 from unittest import mock
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "pmdrive"))
+import can  # noqa: E402
 import canopen  # noqa: E402
 import pmdrive  # noqa: E402
 from pmdrive import cli, dictionary, files, motion, names  # noqa: E402
@@ -382,6 +383,17 @@ class Motion(Bench):
         with self.node.gate:
             self.node.trip(3)
         self.assertIn("DC-link over-voltage", self.command("run", "speed", "200rpm", "--for", "1", code=1)[1])
+
+    def test_another_has_the_same_id(self):
+        other = can.Bus(interface="virtual", channel=self.channel)
+        self.addCleanup(other.shutdown)
+        other.send(can.Message(arbitration_id=0x700 + NODE, data=[5], is_extended_id=False))
+        with self.connect() as drive:
+            self.wait(lambda: drive.read("error_register"))
+            running = motion.Motion(drive, "speed", speed=1000)
+            with self.assertRaisesRegex(pmdrive.NotDone, "two nodes use the same identifier"):
+                running.start(seconds=1.0)
+            running.stop()
 
     def test_mapping_of_another(self):
         with self.connect() as drive:
