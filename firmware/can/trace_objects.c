@@ -93,7 +93,6 @@ static uint32_t arm(trace_t *trace)
     trace->end = &trace->ring[length * trace->count];
     trace->next = trace->ring;
     trace->left = before;
-    trace->side = -trace->level;
     trace->edge = (trace_edge_t)trace->set_edge;
     trace->divider = trace->set_divider;
     trace->poked = false;

@@ -23,6 +23,7 @@ struct BoardOptions {
     std::string image, figures, last;
     std::vector<std::string> limits;
     double console_s = 0.0;
+    bool busy = false;
 };
 
 // NAME=MOST: a line like those of the expectations. Returns whether it holds.
@@ -65,6 +66,9 @@ int run(const RunOptions &options, const BoardOptions &board, NodeOptions node)
         throw InputError("a scenario is wanted, or --console SECONDS");
     }
     rig_board_image(board.image.c_str(), !node.can.empty());
+    if (board.busy) {
+        rig_board_busy();
+    }
     if (!node.can.empty()) {
         node.scenario = options.scenario;
         node.settings = options.settings;
@@ -107,6 +111,10 @@ int main(int argc, char **argv)
         "no scenario: run the image for so many seconds and print what its UART says; exit 1 when a line "
         "begins with FAIL");
     app.add_option("--until", board.last, "with --console: end at a line that begins with this");
+    app.add_flag(
+        "--busy", board.busy,
+        "beside the scenario, the bus keeps the image busy: a trace of four signals in every period, "
+        "armed again and again, and a parameter written now and then");
     app.add_option("--figures", board.figures,
                    "write instructions, cycles, stack and load to this file (JSON)");
     app.add_option("--limit", board.limits,

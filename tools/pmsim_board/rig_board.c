@@ -8,6 +8,7 @@
 #include "firmware/params/store.h"
 #include "sim_plant/board/board.h"
 #include "tools/pmsim/rig_sample.h"
+#include "tools/pmsim_board/load.h"
 #include "tools/pmsim_board/master.h"
 #include "tools/pmsim_board/watch.h"
 
@@ -22,16 +23,22 @@ struct rig {
     rig_scale_t scale;
     drive_command_t sent;
     master_t master;
+    load_t load;
     uint32_t since_sent;
 };
 
 static const char *image_path;
-static bool live;
+static bool live, busy;
 
 void rig_board_image(const char *elf_path, bool commands_by_bus)
 {
     image_path = elf_path;
     live = commands_by_bus;
+}
+
+void rig_board_busy(void)
+{
+    busy = true;
 }
 
 static bool boot(rig_t *rig, const drive_params_t *params)
@@ -82,6 +89,7 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
     if (!live) {
         rig->master = master_make(rig->board, params);
         master_start(&rig->master);
+        rig->load = load_make(rig->board, params);
     }
     return rig;
 }
@@ -89,6 +97,7 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
 void rig_destroy(rig_t *rig)
 {
     if (rig->board != NULL) {
+        rig->watch.figures.refused = rig->load.refused;
         watch_end(&rig->watch);
         board_destroy(rig->board);
     }
@@ -168,11 +177,12 @@ void rig_set_can_state(rig_t *rig, hal_can_state_t state)
     board_can_error(rig->board, state == HAL_CAN_BUS_OFF);
 }
 
-/* Nobody reads them in a scenario: the status is read from the memory, where it is complete. */
-static void drop_frames(rig_t *rig)
+/* Hardly any is read in a scenario: the status is read from the memory, where it is complete. */
+static void take_frames(rig_t *rig)
 {
-    hal_can_frame_t frame;
-    while (rig_receive(rig, &frame)) {
+    board_frame_t frame;
+    while (board_can_receive(rig->board, &frame)) {
+        load_take(&rig->load, &frame);
     }
 }
 
@@ -182,12 +192,15 @@ void rig_step(rig_t *rig, rig_sample_t *sample)
     if (!live && ++rig->since_sent >= REPEAT_PERIODS) {
         send(rig);
     }
+    if (busy && !live) {
+        load_step(&rig->load);
+    }
     if (!board_run_period(rig->board)) {
         fprintf(stderr, "pmsim board: %s at %.6f s\n", board_error(rig->board), sample->truth.t_s);
         exit(2);
     }
     if (!live) {
-        drop_frames(rig);
+        take_frames(rig);
     }
     rig->watch.figures.simulated_s += board_period_s(rig->board);
     rig_fill_sample(&rig->scale, &rig->watch.image->drive, &rig->watch.image->out, sample);

@@ -16,6 +16,9 @@ extern "C" {
  * bus. */
 void rig_board_image(const char *elf_path, bool commands_by_bus);
 
+/* The same: beside the scenario the bus keeps the image busy (load.h). */
+void rig_board_busy(void);
+
 #ifdef __cplusplus
 }
 #endif
