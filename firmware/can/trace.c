@@ -20,11 +20,11 @@ static inline void put(const trace_t *trace, int16_t *sample, uint32_t n)
     sample[n] = (int16_t)limited(*channel->source >> channel->shift);
 }
 
-/* Straight, as deep as there are signals. */
+/* Straight, as deep as there are signals; eight are none beside eight, so that every number is a case. */
 static inline void take(const trace_t *trace, int16_t *sample)
 {
-    switch (trace->count) {
-    case 8:
+    switch (trace->count % TRACE_SIGNALS) {
+    case 0:
         put(trace, sample, 7);
         __attribute__((fallthrough));
     case 7:
@@ -45,15 +45,14 @@ static inline void take(const trace_t *trace, int16_t *sample)
     case 2:
         put(trace, sample, 1);
         __attribute__((fallthrough));
-    case 1:
+    default:
         put(trace, sample, 0);
         break;
-    default:
-        __builtin_unreachable();
     }
 }
 
-static int32_t side_of(const trace_t *trace, const int16_t *sample)
+/* Not negative: the trigger signal has reached the level. */
+static inline int32_t above(const trace_t *trace, const int16_t *sample)
 {
     return sample[trace->trigger] - trace->level;
 }
@@ -64,18 +63,15 @@ static __attribute__((noinline)) void advance(trace_t *trace, const int16_t *sam
     if (trace->state == TRACE_TRIGGERED) {
         trace->countdown = 0;
         trace->state = TRACE_COMPLETE;
-    } else {
-        trace->left = trace->after;
-        trace->side = side_of(trace, sample);
-        trace->state = trace->forced ? TRACE_TRIGGERED : TRACE_WAITING;
+        return;
     }
-}
-
-/* The level was crossed, or the thread wants something. */
-static inline bool triggers(trace_t *trace, int32_t side)
-{
-    trace->side = side;
-    return trace->edge == TRACE_BOTH || (trace->edge == TRACE_FALLING) == (side < 0) || trace->forced;
+    const int32_t now = above(trace, sample);
+    if (trace->edge == TRACE_BOTH) { /* the one that can come next */
+        trace->falling = now < 0 ? 0 : -1;
+    }
+    trace->before = now ^ trace->falling;
+    trace->left = trace->after;
+    trace->state = TRACE_WAITING;
 }
 
 void trace_record(trace_t *trace)
@@ -86,8 +82,10 @@ void trace_record(trace_t *trace)
     int16_t *next = &sample[trace->count];
     trace->next = next == trace->end ? trace->ring : next;
     if (trace->state == TRACE_WAITING) {
-        const int32_t side = side_of(trace, sample);
-        if (((side ^ trace->side) >= 0 && !trace->poked) || !triggers(trace, side)) {
+        const int32_t now = above(trace, sample) ^ trace->falling;
+        const int32_t passed = trace->before & ~now;
+        trace->before = now;
+        if (passed >= 0 && !trace->forced) {
             return;
         }
         trace->state = TRACE_TRIGGERED;

@@ -57,9 +57,9 @@ typedef struct {
     uint32_t left; /* samples up to the next state; while waiting, those from the trigger on */
     volatile trace_state_t state;
     uint32_t trigger;     /* signal */
+    int32_t falling;      /* -1: the edge that counts is falling */
     int32_t level;        /* raw */
-    int32_t side;         /* negative: the last sample that counts was below the level */
-    volatile bool poked;  /* by the thread: look at `forced` */
+    int32_t before;       /* the last sample: negative, the edge can come */
     volatile bool forced; /* trigger as soon as there is enough before */
     trace_channel_t channel[TRACE_SIGNALS];
     trace_edge_t edge;

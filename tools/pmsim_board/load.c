@@ -27,7 +27,7 @@ static const request_t setup[] = {
     {TRACE_SIGNALS, 1, 4, SIGNALS * 0x10000 + 0x100},
     {TRACE_SIGNALS, 2, 4, SIGNALS * 0x10000 + 0x200},
     {TRACE_SIGNALS, 3, 4, SIGNALS * 0x10000 + 0x500},
-    {TRACE_SIGNALS, 4, 4, SIGNALS * 0x10000 + 0x800},
+    {TRACE_SIGNALS, 4, 4, SIGNALS * 0x10000 + 0xB00},
     {TRACE, TRIGGER, 1, 2},
     {TRACE, EDGE, 1, 0},
     {TRACE, LEVEL, 4, 0},
