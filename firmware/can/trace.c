@@ -58,7 +58,7 @@ static inline int32_t above(const trace_t *trace, const int16_t *sample)
 }
 
 /* There is enough before the trigger, or after it. */
-static __attribute__((noinline)) void advance(trace_t *trace, const int16_t *sample)
+static inline void advance(trace_t *trace, const int16_t *sample)
 {
     if (trace->state == TRACE_TRIGGERED) {
         trace->countdown = 0;
@@ -91,7 +91,7 @@ void trace_record(trace_t *trace)
         trace->state = TRACE_TRIGGERED;
     }
     trace->left--;
-    if (trace->left == 0U) {
+    if (__builtin_expect(trace->left == 0U, 0) != 0) {
         advance(trace, sample);
     }
 }

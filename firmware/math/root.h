@@ -29,28 +29,27 @@ pm_unit_t pm_ratio(pm_q_t num, pm_q_t den);
 }
 #endif
 
-/* sqrt(m 2^30) for m >= 2^30, that is the root of m / 2^32 in Q31, within 1e-8 of it.
+/* Root of m / 2^32 in Q29 for m >= 2^30, within 1e-8 of it.
  * Two steps of Heron from a line that is 13 % off give 4e-5; the remainder, exact in 32 bits because the root
  * is cut to 16, corrects it. Three short divisions take no longer than the constants of a polynomial. */
-static inline uint32_t pm_root_q31(uint32_t m)
+static inline uint32_t pm_root_q29(uint32_t m)
 {
     uint32_t s = (m >> 17) + 0x7000U; /* Q16 */
     s = (s + m / s) >> 1;
     s = (s + m / s) >> 1;
     const int32_t rest = (int32_t)(m - s * s); /* Q32 */
     const int32_t more = pm_shl(rest, 12) / (int32_t)s;
-    return ((s << 13) + (uint32_t)more) << 2;
+    return (s << 13) + (uint32_t)more;
 }
 
-/* pm_sqrt() without a call. */
-static inline pm_q_t pm_sqrt_in_place(pm_q_t x)
+/* Root of a square from pm_mulh(), cut to a wide number: x in Q24. */
+static inline pm_wide_t pm_sqrt_wide(int32_t x)
 {
     if (x <= 0) {
         return 0;
     }
     const unsigned n = (unsigned)__builtin_clz((uint32_t)x) >> 1;
-    const uint32_t root = pm_root_q31((uint32_t)x << (2U * n));
-    return (pm_q_t)((root + (1U << n)) >> (n + 1U));
+    return (pm_wide_t)(pm_root_q29((uint32_t)x << (2U * n)) >> (n + 3U));
 }
 
 static inline int32_t pm_per_volt(pm_q_t v)
