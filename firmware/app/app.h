@@ -5,7 +5,8 @@
  * parameters are those that were stored: an image without stored parameters says so and stays off.
  *
  *   app_boot(a, hal)   parameters from the store, hardware, drive; then interrupts run
- *   app_turn(a)        one round of the main loop; never blocks, but for a store that was asked for
+ *   app_turn(a)        one round of the main loop, cheap when nothing has changed and no timer of the bus can
+ *                      have run out; never blocks, but for a store that was asked for
  *   app_control(), app_slow(), app_monitor(): called up by the port (hal.h)
  *
  * drive_slow() runs in app_slow() between two control interrupts and is never interrupted by one: were it
@@ -54,6 +55,8 @@ struct app {
     volatile uint32_t turn_age_ms; /* since the main loop's last round */
 
     drive_fault_t shown_fault; /* on the console and the bus */
+    drive_state_t seen_state;  /* by the last full round of the main loop, */
+    uint32_t round_us;         /* which was then */
     bool hardware;             /* configured: control interrupts come */
 
     /* parameters */

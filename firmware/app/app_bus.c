@@ -210,15 +210,18 @@ static void profile(app_t *app)
     }
 }
 
-static void take_frames(app_t *app)
+bool app_bus_take(app_t *app)
 {
     hal_can_frame_t in;
-    for (uint32_t n = 0; n < FRAMES_MOST && hal_can_receive(app->hal, &in); n++) {
+    uint32_t n = 0;
+    while (n < FRAMES_MOST && hal_can_receive(app->hal, &in)) {
         node_frame_t frame = {.id = in.id, .length = in.length};
         (void)memcpy(frame.data, in.data, sizeof frame.data);
         node_receive(&app->node, &frame, hal_time_us(app->hal));
         profile(app); /* two controlwords in one round are two */
+        n++;
     }
+    return n > 0U;
 }
 
 static void watch_bus(app_t *app)
@@ -264,7 +267,6 @@ void app_bus_init(app_t *app)
 
 void app_bus_run(app_t *app)
 {
-    take_frames(app);
     watch_bus(app);
     profile(app);
     tell_fault(app);

@@ -10,6 +10,7 @@ void app_trip(app_t *app, drive_fault_t fault);
 
 /* app_bus.c: the node and the drive profile */
 void app_bus_init(app_t *app);
+bool app_bus_take(app_t *app); /* the frames that have come; false: none */
 void app_bus_run(app_t *app);
 bool app_is_on(const app_t *app); /* the bridge is on, or about to be */
 

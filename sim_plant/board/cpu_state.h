@@ -14,18 +14,28 @@
 #include "sim_plant/board/nvic.h"
 #include "sim_plant/board/system_block.h"
 
-enum { CPU_MEMORIES = 8, CPU_RUNS = 64, CPU_PAGE = 1024, CPU_WATCHES = 32, CPU_FLASH_WRITES = 64 };
+enum {
+    CPU_MEMORIES = 8,
+    CPU_RUNS = 64,
+    CPU_PAGE = 1024,
+    CPU_WATCHES = 32,
+    CPU_FLASH_WRITES = 64,
+    CPU_LINE = 64
+};
 
 typedef struct cpu_region cpu_region_t;
 
-/* A run of instructions that the processor executes as one; from its address to the first branch. */
-typedef struct {
+/* A run of instructions that the processor executes as one; from its address to the first branch. It is
+ * within one line of the host's cache: these lines are much of what a block costs. */
+typedef struct cpu_block cpu_block_t;
+struct cpu_block {
     uint32_t address, size;
     cycles_block_t cost;
     cpu_region_t *region;
+    cpu_block_t *after; /* the one that was executed after it, the last time */
     uint64_t hits;
     bool attention; /* look before executing: new, watched, or the MPU has changed */
-} cpu_block_t;
+};
 
 typedef struct {
     cpu_block_t *at; /* NULL: none begins here */
@@ -36,6 +46,7 @@ struct cpu_region {
     uint8_t *host;
     cpu_region_t *original; /* of an alias; else itself */
     cpu_slot_t *block;      /* by half-word; of its own addresses alone */
+    bool *holds_code;       /* by page: a block there has been executed, or was about to be */
     cycles_flash_t fetch;
     uint64_t stalled_until;
     struct {
@@ -67,6 +78,7 @@ typedef struct {
 
 struct cpu {
     uc_engine *uc;
+    void *engine; /* unicorn's own name of it; NULL: not known */
     nvic_t nvic;
     bus_t bus;
     alarms_t alarms;
@@ -89,7 +101,8 @@ struct cpu {
     bool close_again; /* a read was allowed in a page that is not all open */
     char error[256];
 
-    cpu_block_t *block; /* present or last */
+    cpu_block_t *block;          /* present or last */
+    cpu_region_t *executes_from; /* the last block's */
     uint32_t block_end;
     uint32_t hooked[256]; /* divisions with a hook */
     unsigned hooks;
@@ -131,7 +144,13 @@ extern const int cpu_core_register[16]; /* unicorn's names of r0 to r15 */
 uint32_t cpu_get(const cpu_t *cpu, int unicorn_register);
 void cpu_set(cpu_t *cpu, int unicorn_register, uint32_t value);
 void cpu_get_core(const cpu_t *cpu, uint32_t registers[16]);
-void cpu_spend(cpu_t *cpu, cycles_t cycles);
+static inline void cpu_spend(cpu_t *cpu, cycles_t cycles)
+{
+    cpu->total.low += cycles.low;
+    cpu->total.typical += cycles.typical;
+    cpu->total.high += cycles.high;
+}
+
 bool cpu_hook(cpu_t *cpu, uc_hook *hook, int type, void (*call)(void), uint64_t begin, uint64_t end);
 __attribute__((format(printf, 3, 4))) void cpu_fail_at(cpu_t *cpu, uint32_t pc, const char *format, ...);
 
@@ -139,6 +158,12 @@ __attribute__((format(printf, 3, 4))) void cpu_fail_at(cpu_t *cpu, uint32_t pc, 
 void cpu_on_block(uc_engine *uc, uint64_t where, uint32_t size, void *user);
 void cpu_on_interrupt(uc_engine *uc, uint32_t number, void *user);
 void cpu_serve_attention(cpu_t *cpu, cpu_block_t *block); /* with the processor at rest */
+
+/* cpu_stores.c: between begin and end of a run this processor's pages without code take stores the fast way
+ */
+void cpu_stores_begin(cpu_t *cpu);
+void cpu_stores_end(void);
+void cpu_stores_meet_code(cpu_t *cpu, cpu_region_t *region, uint32_t first, uint32_t last); /* pages */
 
 /* cpu_window.c */
 bool cpu_open_windows(cpu_t *cpu);

@@ -9,14 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpedantic"
-#pragma GCC diagnostic ignored "-Wc++20-extensions"
-extern "C" {
-#include "firmware/params/store.h"
-#include "hal/sim/sim_loop.h"
-}
-#pragma GCC diagnostic pop
+#include "tests/support/application.h"
 #include "tests/support/plants.h"
 
 namespace app_test
