@@ -7,7 +7,8 @@ namespace pmsim
 namespace
 {
 
-const char *const mode_names[FIGURE_MODES] = {"off", "calibrate", "pulses", "open_loop", "injection", "flux"};
+const char *const mode_names[FIGURE_MODES] = {"off",       "calibrate", "pulses", "identify",
+                                              "open_loop", "injection", "flux"};
 const char *const interrupt_names[FIGURE_INTERRUPTS] = {"control", "monitor", "slow", "can", "console"};
 
 double mean(uint64_t sum, uint64_t count)

@@ -172,7 +172,7 @@ TEST(App, WithoutAMasterTheDriveIsLeftAlone)
     Bench x;
     const drive_params_t params = defaults();
     x.boot(&params);
-    const drive_command_t command = {true, DRIVE_MODE_SPEED, 30000, 0, 0, false};
+    const drive_command_t command = {true, DRIVE_MODE_SPEED, 30000, 0, 0, 0, false};
     drive_command(&x.loop.app.drive, &command);
     x.run_ms(700);
     EXPECT_EQ(std::memcmp(&x.loop.app.drive.command, &command, sizeof command), 0);

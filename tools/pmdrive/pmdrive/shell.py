@@ -6,7 +6,7 @@ from . import dictionary, names
 from .errors import PmdriveError
 
 WORDS = ("scan", "info", "get", "set", "dump", "load", "diff", "save", "restore", "reset", "faults", "monitor", "run",
-         "stop", "trace", "eds", "shell", "completion")
+         "identify", "tune", "stop", "trace", "eds", "shell", "completion")
 OBJECTS = sorted([*(e.name for e in dictionary.ENTRIES), *names.RECORDS])
 
 
