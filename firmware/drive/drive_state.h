@@ -49,11 +49,14 @@ struct drive {
     pm_ab_t v_next;    /* commanded at k: acts over [k+1, k+2) */
     modulator_t modulator;
 
-    position_t position;
-    union { /* a start, or identification */
-        initial_pulses_t pulses;
-        commissioning_t commissioning;
+    union { /* while it identifies, nothing estimates the position */
+        position_t position;
+        struct {
+            pm_pll_t pll; /* of position: stays */
+            commissioning_t work;
+        } identify;
     };
+    initial_pulses_t pulses;
     pm_procedure_t pulses_state;
     commissioning_report_t commissioning_report;
     current_control_t current;

@@ -35,7 +35,7 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         rig_destroy(rig);
         return NULL;
     }
-    rig->scale = rig_scale(&rig->loop.app.drive.config.base, params->pole_pairs);
+    rig->scale = rig_scale(&rig->loop.app.drive.config.base, params->pole_pairs, rig->loop.app.slow_divider);
     return rig;
 }
 

@@ -54,7 +54,7 @@ typedef struct {
     uint32_t stack_most;
     uint32_t resets;
     uint64_t bus_frames, bus_idle; /* of --bus-load: frames, and looks that found the bus idle */
-    uint32_t refused; /* requests that the node did not do */
+    uint32_t refused;              /* requests that the node did not do */
     double simulated_s;
 } figures_t;
 

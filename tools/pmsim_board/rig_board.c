@@ -88,7 +88,7 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         rig_destroy(rig);
         return NULL;
     }
-    rig->scale = rig_scale(&drive.config.base, params->pole_pairs);
+    rig->scale = rig_scale(&drive.config.base, params->pole_pairs, drive.config.slow_divider);
     rig->board = board_create(image_path, rig->plant, error, error_size);
     if (rig->board == NULL) {
         rig_destroy(rig);

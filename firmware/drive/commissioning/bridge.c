@@ -22,30 +22,27 @@ pm_q_t commissioning_mean(const commissioning_t *self, uint32_t n)
 
 void commissioning_start_current(drive_t *drive)
 {
-    const pm_dq_t v = {.d = drive->commissioning.v.alpha, .q = drive->commissioning.v.beta};
+    const pm_dq_t v = {.d = drive->identify.work.v.alpha, .q = drive->identify.work.v.beta};
     current_control_reset(&drive->current, v);
     drive->i_ref = (pm_dq_t){0, 0};
     drive->omega_open = 0;
-    drive->commissioning.kind = KIND_CURRENT;
+    drive->identify.work.kind = KIND_CURRENT;
 }
 
-void commissioning_set_gains(drive_t *drive, pm_num_t R_ohm, pm_num_t L_H)
+/* A bandwidth of f_pwm / 50: kp = 0.1257 L / T_s, ki = 0.1257 R. */
+void commissioning_set_gains(drive_t *drive)
 {
-    const drive_base_t *b = &drive->config.base;
-    pm_pi_config_t *pi = &drive->commissioning.pi;
-    const pm_num_t impedance = pm_num_div(b->v, b->i);
-    /* a bandwidth of f_pwm / 50 */
-    const pm_num_t per_period = pm_num_ratio(1257, 10000);
-    const pm_num_t kp = pm_num_div(pm_num_mul(pm_num_div(per_period, b->t_s), L_H), impedance);
-    const pm_num_t ki = pm_num_div(pm_num_mul(per_period, R_ohm), impedance);
-    (void)pm_num_to_fixed(kp, 26, &pi->kp);
-    (void)pm_num_to_fixed(ki, 26, &pi->ki);
-    (void)pm_num_to_fixed(pm_num_div(ki, kp), 31, &pi->kb);
+    const commissioning_t *self = &drive->identify.work;
+    const pm_q_t per_period = pm_div(self->L_d, 4 * commissioning_period(drive)); /* of L / T_s, a quarter */
+    const pm_gain_t kp = pm_mul_sat(per_period, PM_Q(0.1257));
+    const pm_gain_t ki = pm_mul(self->R, PM_Q(0.1257)) / 4;
+    const pm_q_t ratio = pm_sat(pm_div(ki, kp), PM_Q_BITS - 1);
+    drive->identify.work.pi = (pm_pi_config_t){.kp = kp, .ki = ki, .kb = pm_shl(ratio, 31 - PM_Q_BITS)};
 }
 
 static void write_legs(drive_t *drive, pm_ab_t v, drive_out_t *out)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     const modulator_config_t *m = &drive->config.modulator;
     const pm_abc_t u = pm_clarke_inverse(v);
     const pm_q_t leg[DRIVE_LEGS] = {u.a, u.b, u.c};
@@ -55,7 +52,7 @@ static void write_legs(drive_t *drive, pm_ab_t v, drive_out_t *out)
         const int32_t share = pm_shl(pm_sat(pm_mulh(leg[x], per_volt), PM_SHARE_BITS), 31 - PM_SHARE_BITS);
         const int32_t wanted = m->counts * (PART / 2) + pm_mulh(share, parts) + self->rest[x];
         const int32_t on = pm_clamp(wanted, 0, m->counts * PART) / PART;
-        self->rest[x] = pm_clamp(wanted - on * PART, 0, PART);
+        self->rest[x] = (uint8_t)pm_clamp(wanted - on * PART, 0, PART);
         out->compare[x][0] = (uint16_t)on;
         out->compare[x][1] = (uint16_t)on;
         out->driven[x] = true;
@@ -66,7 +63,7 @@ static void write_legs(drive_t *drive, pm_ab_t v, drive_out_t *out)
 
 static int32_t axis_voltage(drive_t *drive, pm_pi_t *pi, pm_q_t error)
 {
-    const pm_pi_config_t *c = &drive->commissioning.pi;
+    const pm_pi_config_t *c = &drive->identify.work.pi;
     const pm_wide_t top = pm_widen(pm_mul(drive->status.v_dc, PM_Q(0.4)));
     const pm_wide_t u = pm_pi_output(pi, c, error, 0);
     const pm_wide_t limited = pm_clamp(u, -top, top);
@@ -78,7 +75,7 @@ static int32_t axis_voltage(drive_t *drive, pm_pi_t *pi, pm_q_t error)
 static pm_ab_t regained(const drive_t *drive, pm_dir_t dir)
 {
     const pm_abc_t i = pm_clarke_inverse((pm_ab_t){.alpha = dir.cos / 8, .beta = dir.sin / 8}); /* Q28 */
-    const pm_q_t lost = drive->commissioning.lost;
+    const pm_q_t lost = drive->identify.work.lost;
     const pm_abc_t v = {
         .a = pm_mul(lost, pm_clamp(8 * i.a, -PM_ONE, PM_ONE)),
         .b = pm_mul(lost, pm_clamp(8 * i.b, -PM_ONE, PM_ONE)),
@@ -92,7 +89,7 @@ static pm_ab_t regained(const drive_t *drive, pm_dir_t dir)
  */
 static void turn(drive_t *drive)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     const int32_t step = pm_omega_to_angle(drive->omega_open, drive->config.k_theta);
     drive->theta_open += (pm_angle_t)step;
     const pm_dq_t i = pm_park(drive->i_ab, pm_dir(drive->theta_open));
@@ -116,7 +113,7 @@ static void turn(drive_t *drive)
 
 static void hold_voltage(drive_t *drive)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     self->sum[0] += drive->i_ab.alpha;
     self->sum[1] += drive->i_ab.beta;
     self->sum[2] += drive->v_acting.alpha;
@@ -127,7 +124,7 @@ static void hold_voltage(drive_t *drive)
 /* For the d-axis voltage beside a square wave on q. */
 static void bias(drive_t *drive)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     const square_t *square = &self->of.square;
     if (square->on_q && square->bias != 0) {
         const pm_q_t wanted = square->found ? -square->bias : square->bias;
@@ -137,7 +134,7 @@ static void bias(drive_t *drive)
 
 void commissioning_step(drive_t *drive, pm_ab_t v_past, drive_out_t *out)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     switch (self->kind) {
     case KIND_CURRENT:
         turn(drive);

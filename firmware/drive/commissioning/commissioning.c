@@ -1,9 +1,16 @@
 /* The sequence of the identification. */
 #include "firmware/drive/commissioning/commissioning.h"
 
+#include <stddef.h>
+
 #include "firmware/drive/commissioning/commissioning_parts.h"
 
 #define HOLD_MS 500U
+
+/* What others read of the position stays as it was. */
+_Static_assert(offsetof(drive_t, identify.work) + sizeof(commissioning_t) <=
+                   offsetof(drive_t, position.weight),
+               "fits beside the loop's speed and the quality");
 
 enum {
     SWEEP,
@@ -26,38 +33,25 @@ pm_q_t commissioning_current(const drive_t *drive)
     return pm_clamp(pm_abs(drive->i_target), drive->config.i_max / 16, drive->config.i_max);
 }
 
-int32_t commissioning_decimal(pm_num_t si, int exponent)
+/* k_theta is 16 / (2 pi) of it, Q30. */
+pm_q_t commissioning_period(const drive_t *drive)
 {
-    int32_t x;
-    (void)pm_num_to_fixed(pm_num_mul(si, pm_num_dec(1, exponent)), 0, &x);
-    return x;
+    return pm_frac(drive->config.k_theta, PM_FRAC(0.0981747704));
 }
 
 /* What the parts need that is not to be identified is taken from the last results, else from the parameters.
  */
 static void know(drive_t *drive)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     const commissioning_result_t *r = &drive->commissioning_report.result;
-    const drive_base_t *base = &drive->config.base;
-    const pm_num_t impedance = pm_num_div(base->v, base->i);
-    const pm_num_t inductance = pm_num_div(base->psi, base->i);
-    const pm_num_t R = pm_num_dec(r->R_s_uohm, -6);
-    const pm_num_t L_q = pm_num_dec(r->L_q_nH, -9);
-    self->R = drive->config.position.observer.active_flux.model.R;
-    self->L_d = drive->config.current.L_d;
-    self->L_q = drive->config.current.L_q;
-    if (r->R_s_uohm != 0) {
-        (void)pm_num_to_fixed(pm_num_div(R, impedance), PM_Q_BITS, &self->R);
-        (void)pm_num_to_fixed(pm_num_div(pm_num_dec(r->lost_mV, -3), base->v), PM_Q_BITS, &self->lost);
-    }
-    pm_num_t L_d = pm_num_mul(pm_num_from_fixed(drive->config.current.L_d, PM_Q_BITS), inductance);
-    if (r->L_q_nH != 0) {
-        (void)pm_num_to_fixed(pm_num_div(L_q, inductance), PM_Q_BITS, &self->L_q);
-        L_d = pm_num_dec(r->L_d_nH, -9);
-        (void)pm_num_to_fixed(pm_num_div(L_d, inductance), PM_Q_BITS, &self->L_d);
-    }
-    commissioning_set_gains(drive, pm_num_mul(pm_num_from_fixed(self->R, PM_Q_BITS), impedance), L_d);
+    const current_control_config_t *c = &drive->config.current;
+    self->L_d = r->L_d != 0 ? r->L_d : c->L_d;
+    self->L_q = r->L_q != 0 ? r->L_q : c->L_q;
+    self->lost = r->lost;
+    /* of the current control: kb = R T_s / L */
+    self->R = r->R != 0 ? r->R : pm_div(pm_unit(c->L_d, c->d.kb), commissioning_period(drive));
+    commissioning_set_gains(drive);
 }
 
 static bool is_wanted(uint8_t routines, uint32_t phase)
@@ -86,7 +80,7 @@ static bool is_wanted(uint8_t routines, uint32_t phase)
 
 static void enter(drive_t *drive, uint8_t phase)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     self->phase = phase;
     self->part = 0;
     self->ms = 0;
@@ -125,7 +119,7 @@ static void enter(drive_t *drive, uint8_t phase)
 /* With the vector, the rotor goes back to phase A; then it has time to come to rest. */
 static phase_result_t hold(drive_t *drive, bool full)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     const pm_q_t i = full ? commissioning_current(drive) : commissioning_current(drive) / 2;
     const int32_t left = pm_angle_diff(0U, drive->theta_open);
     const int32_t most = (int32_t)(PM_TURN(0.5) / HOLD_MS);
@@ -137,7 +131,7 @@ static phase_result_t hold(drive_t *drive, bool full)
 
 static phase_result_t phase_slow(drive_t *drive)
 {
-    switch (drive->commissioning.phase) {
+    switch (drive->identify.work.phase) {
     case SWEEP:
         return sweep_slow(drive);
     case LEVELS:
@@ -179,7 +173,7 @@ void commissioning_start(drive_t *drive)
     report->state = (uint8_t)COMMISSIONING_RUNNING;
     report->reason = (uint8_t)COMMISSIONING_NO_REASON;
     report->progress = 0;
-    drive->commissioning = (commissioning_t){.kind = KIND_VOLTAGE};
+    drive->identify.work = (commissioning_t){.kind = KIND_VOLTAGE};
     drive->omega_open = 0;
     know(drive);
     enter(drive, SWEEP);
@@ -188,7 +182,7 @@ void commissioning_start(drive_t *drive)
 
 void commissioning_slow(drive_t *drive)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     if (drive->stage != STAGE_IDENTIFY) {
         return;
     }

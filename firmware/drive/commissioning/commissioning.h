@@ -43,15 +43,20 @@ typedef enum {
     COMMISSIONING_ABORTED,     /* enable was taken away, or a fault came */
 } commissioning_reason_t;
 
-/* Integers in the units of the dictionary's results; 0: not measured yet. */
+/* Per-unit of the drive's bases; 0: not measured yet. */
 typedef struct {
-    int32_t R_s_uohm, lost_mV;            /* lost_mV: of a leg, by dead time and drops */
-    int32_t L_d_nH, L_q_nH, L_q_rated_nH; /* at zero current; psi_q / i_q at the test current */
-    int32_t L_dq_rated_nH;                /* incremental cross inductance there */
-    int32_t psi_m_nWb;
-    int32_t J_nkgm2;
-    int32_t viscous_nNms, coulomb_uNm;
+    pm_q_t R;          /* v / i */
+    pm_q_t lost;       /* v; of a leg, by dead time and drops */
+    pm_q_t L_d, L_q;   /* psi / i; at zero current */
+    pm_q_t L_q_rated;  /* psi_q / i_q at the test current */
+    pm_q_t L_dq_rated; /* incremental cross inductance there */
+    pm_q_t psi_m;      /* psi */
+    pm_q_t J;          /* torque per COMMISSIONING_J_STEPS times omega mechanical in one slow step */
+    pm_q_t viscous;    /* torque per omega mechanical */
+    pm_q_t coulomb;    /* torque */
 } commissioning_result_t;
+
+#define COMMISSIONING_J_STEPS 1024
 
 typedef struct {
     uint16_t half;   /* periods of half a wave */
@@ -64,17 +69,17 @@ typedef struct {
     pm_q_t bias;   /* i_d meanwhile: positive while the amplitude is sought, negative while it is measured */
 } square_t;
 
-/* At work; shares its place with what a start needs. */
+/* At work; shares its place with the estimators of the position. */
 typedef struct {
     int64_t sum[5];
     int32_t taken;
     pm_ab_t v;       /* what the bridge is to give next */
     pm_abc_t i_last; /* currents of the last period */
-    int32_t rest[3]; /* of the timer's counts, 128ths */
     pm_pi_config_t pi;
-    pm_q_t R, lost, L_d, L_q; /* as far as they are known */
+    pm_q_t R, lost, L_d, L_q; /* per-unit, as far as they are known */
     uint16_t ms;              /* in this phase */
     uint8_t phase, part, kind;
+    uint8_t rest[3]; /* of the timer's counts, 128ths */
     union {
         square_t square;
         struct {
@@ -83,7 +88,7 @@ typedef struct {
             pm_q_t slope_v, slope_i, v, i; /* over the levels: weighted with 3, 1, -1, -3, and plain */
         } resistance;
         struct {
-            pm_q_t omega, slope;
+            pm_q_t omega;
             int32_t count;           /* of the torques in the sum */
             pm_q_t tau_up, tau_even; /* u_d / omega while speeding up, at speed */
         } rotation;

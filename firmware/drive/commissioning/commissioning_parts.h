@@ -3,14 +3,13 @@
 #define DRIVE_COMMISSIONING_COMMISSIONING_PARTS_H
 
 #include "firmware/drive/drive_parts.h"
-#include "firmware/math/num.h"
 
 /* What a period does with the bridge. */
 enum { KIND_VOLTAGE, KIND_CURRENT, KIND_SQUARE };
 
 /* bridge.c */
 void commissioning_start_current(drive_t *drive); /* current control in the frame of theta_open */
-void commissioning_set_gains(drive_t *drive, pm_num_t R_ohm, pm_num_t L_H);
+void commissioning_set_gains(drive_t *drive);     /* by R and L_d */
 void commissioning_clear_sums(commissioning_t *self);
 pm_q_t commissioning_mean(const commissioning_t *self, uint32_t n); /* of sum n over what was taken */
 
@@ -43,9 +42,9 @@ phase_result_t rotation_full(drive_t *drive);
 phase_result_t rotation_less(drive_t *drive);
 phase_result_t rotation_down(drive_t *drive);
 
-/* The current of the test, and a result as an integer of 10^-exponent SI. */
+/* The current of the test; a period in radians of the base speed. */
 pm_q_t commissioning_current(const drive_t *drive);
-int32_t commissioning_decimal(pm_num_t si, int exponent);
+pm_q_t commissioning_period(const drive_t *drive);
 
 static inline pm_q_t commissioning_approach(pm_q_t x, pm_q_t target, pm_q_t step)
 {

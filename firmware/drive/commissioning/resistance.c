@@ -19,14 +19,14 @@ static pm_q_t top_voltage(const drive_t *drive)
 
 static void set_voltage(drive_t *drive, pm_q_t U)
 {
-    drive->commissioning.of.resistance.U = U;
+    drive->identify.work.of.resistance.U = U;
     const pm_ab_t v = pm_park_inverse((pm_dq_t){.d = U, .q = 0}, pm_dir(drive->theta_open));
-    drive->commissioning.v = v;
+    drive->identify.work.v = v;
 }
 
 void sweep_enter(drive_t *drive)
 {
-    drive->commissioning.kind = KIND_VOLTAGE;
+    drive->identify.work.kind = KIND_VOLTAGE;
     drive->theta_open = PM_TURN(0.75);
     set_voltage(drive, 0);
 }
@@ -34,7 +34,7 @@ void sweep_enter(drive_t *drive)
 /* A quarter turn from where the vector began, so that a rotor that stood against it has been moved. */
 phase_result_t sweep_slow(drive_t *drive)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     const pm_q_t wanted = commissioning_current(drive);
     const pm_q_t step = drive->status.v_dc / 4096 + 1;
     const pm_q_t i = pm_hypot(commissioning_mean(self, 0), commissioning_mean(self, 1));
@@ -64,7 +64,7 @@ phase_result_t sweep_slow(drive_t *drive)
 
 void levels_enter(drive_t *drive)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     self->of.resistance.slope_v = 0;
     self->of.resistance.slope_i = 0;
     self->of.resistance.v = 0;
@@ -73,21 +73,18 @@ void levels_enter(drive_t *drive)
 
 static phase_result_t conclude(drive_t *drive)
 {
-    commissioning_t *self = &drive->commissioning;
-    const drive_base_t *base = &drive->config.base;
+    commissioning_t *self = &drive->identify.work;
     commissioning_result_t *r = &drive->commissioning_report.result;
-    const pm_num_t slope = pm_num_ratio(self->of.resistance.slope_v, self->of.resistance.slope_i);
-    const pm_num_t drop = pm_num_mul(slope, pm_num_from_fixed(self->of.resistance.i, PM_Q_BITS));
-    const pm_num_t gap = pm_num_sub(pm_num_from_fixed(self->of.resistance.v, PM_Q_BITS), drop);
-    const pm_num_t lost = pm_num_mul(gap, pm_num_ratio(3, 4 * (int32_t)LEVELS));
-    (void)pm_num_to_fixed(slope, PM_Q_BITS, &self->R);
-    (void)pm_num_to_fixed(lost, PM_Q_BITS, &self->lost);
-    self->lost = pm_max(self->lost, 0);
-    r->R_s_uohm = commissioning_decimal(pm_num_mul(slope, pm_num_div(base->v, base->i)), 6);
-    r->lost_mV = commissioning_decimal(pm_num_mul(pm_num_from_fixed(self->lost, PM_Q_BITS), base->v), 3);
-    const bool plausible = self->of.resistance.slope_i > 0 && r->R_s_uohm > 0;
-    return (phase_result_t){.done = true,
-                            .failed = plausible ? COMMISSIONING_NO_REASON : COMMISSIONING_IMPLAUSIBLE};
+    if (self->of.resistance.slope_i <= 0 || self->of.resistance.slope_v <= 0) {
+        return (phase_result_t){.failed = COMMISSIONING_IMPLAUSIBLE};
+    }
+    const pm_q_t R = pm_div(self->of.resistance.slope_v, self->of.resistance.slope_i);
+    const pm_q_t gap = self->of.resistance.v - pm_mul(R, self->of.resistance.i); /* of all levels */
+    r->R = R;
+    r->lost = pm_max(pm_mul(gap, PM_Q(0.75 / LEVELS)), 0);
+    self->R = R;
+    self->lost = r->lost;
+    return (phase_result_t){.done = true};
 }
 
 static void take_level(commissioning_t *self)
@@ -104,7 +101,7 @@ static void take_level(commissioning_t *self)
 /* Integral control with 50 ms: the slope of the current per volt is known to a factor of two only. */
 phase_result_t levels_slow(drive_t *drive)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     const pm_q_t full = commissioning_current(drive);
     const pm_q_t wanted = full - (pm_q_t)self->part * (full / 5);
     const bool even = pm_abs(commissioning_mean(self, 1)) < full / 4;

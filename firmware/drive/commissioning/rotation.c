@@ -22,11 +22,15 @@ typedef struct {
 
 void rotation_enter(drive_t *drive)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     self->of.rotation.omega =
         pm_clamp(drive->omega_target, -drive->config.omega_max, drive->config.omega_max);
-    self->of.rotation.slope = self->of.rotation.omega / RAMP_MS;
     self->of.rotation.count = 0;
+}
+
+static pm_q_t ramp_step(const commissioning_t *self)
+{
+    return pm_abs(self->of.rotation.omega) / RAMP_MS + 1;
 }
 
 /* Torque over 1.5 P i, with what R takes: power over omega. i_q is what ramps leave of it. */
@@ -40,7 +44,7 @@ static pm_q_t torque_voltage(const commissioning_t *self, pm_q_t omega)
 /* Between half the speed and nine tenths. */
 static void take_torque(drive_t *drive)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     const pm_q_t top = pm_abs(self->of.rotation.omega);
     const pm_q_t omega = pm_abs(drive->omega_open);
     if (omega > top / 2 && omega < top - top / 10) {
@@ -60,17 +64,16 @@ static pm_q_t mean_torque(const commissioning_t *self)
 
 phase_result_t rotation_up(drive_t *drive)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     take_torque(drive);
-    const pm_q_t step = pm_abs(self->of.rotation.slope) + 1;
-    drive->omega_open = commissioning_approach(drive->omega_open, self->of.rotation.omega, step);
+    drive->omega_open = commissioning_approach(drive->omega_open, self->of.rotation.omega, ramp_step(self));
     self->of.rotation.tau_up = mean_torque(self);
     return (phase_result_t){.done = drive->omega_open == self->of.rotation.omega};
 }
 
 static active_t active_flux(const drive_t *drive)
 {
-    const commissioning_t *self = &drive->commissioning;
+    const commissioning_t *self = &drive->identify.work;
     const pm_q_t omega = self->of.rotation.omega;
     const pm_q_t speed = pm_abs(omega);
     const pm_q_t i = commissioning_mean(self, I_D);
@@ -96,7 +99,7 @@ static const phase_result_t stuck = {.failed = COMMISSIONING_NOT_TURNING};
 
 phase_result_t rotation_full(drive_t *drive)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     if (!is_measured(self)) {
         return running;
     }
@@ -111,7 +114,7 @@ phase_result_t rotation_full(drive_t *drive)
 /* At a quarter of the current, where what the saliency and its saturation take is small. */
 phase_result_t rotation_less(drive_t *drive)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     commissioning_result_t *r = &drive->commissioning_report.result;
     const pm_q_t half = commissioning_current(drive) / 4;
     drive->i_ref.d = commissioning_approach(drive->i_ref.d, half, half / 64 + 1);
@@ -123,47 +126,29 @@ phase_result_t rotation_less(drive_t *drive)
         return stuck;
     }
     const pm_q_t psi = active.length + pm_mul(self->L_q - self->L_d, active.i_d);
-    r->psi_m_nWb =
-        commissioning_decimal(pm_num_mul(pm_num_from_fixed(psi, PM_Q_BITS), drive->config.base.psi), 9);
+    r->psi_m = psi;
     return (phase_result_t){.done = true};
-}
-
-static pm_num_t torque_of(const drive_t *drive, pm_q_t tau, pm_q_t i)
-{
-    return pm_num_mul(pm_num_mul(pm_num_from_fixed(tau, PM_Q_BITS), drive->config.base.torque),
-                      pm_num_from_fixed(i, PM_Q_BITS));
 }
 
 static void conclude_mechanics(drive_t *drive, pm_q_t tau_down, pm_q_t i)
 {
-    commissioning_t *self = &drive->commissioning;
+    const commissioning_t *self = &drive->identify.work;
     commissioning_result_t *r = &drive->commissioning_report.result;
-    const drive_base_t *base = &drive->config.base;
-    const pm_num_t unit = pm_num_div(base->omega, drive->config.pole_pairs);
     const pm_q_t tau_up = self->of.rotation.tau_up;
-    const pm_num_t per_ms = pm_num_from_fixed(pm_abs(self->of.rotation.slope) + 1, PM_Q_BITS);
-    const pm_num_t t_slow = pm_num_mul(pm_num((int32_t)drive->config.slow_divider), base->t_s);
-    const pm_num_t acceleration = pm_num_div(pm_num_mul(per_ms, unit), t_slow);
-    const pm_num_t difference = torque_of(drive, tau_up - tau_down, i);
-    r->J_nkgm2 = commissioning_decimal(pm_num_div(difference, pm_num_mul(pm_num(2), acceleration)), 9);
+    r->J = pm_div(pm_mul(tau_up - tau_down, i) / 2, ramp_step(self) * COMMISSIONING_J_STEPS);
 
     /* what R takes, over the speeds of the window (mean of 1 / omega: 1.469) and at the top */
-    const pm_q_t taken = pm_mul(self->R, i);
     const pm_q_t top = pm_abs(self->of.rotation.omega);
-    const pm_q_t at_top = pm_div(taken, top);
+    const pm_q_t at_top = pm_div(pm_mul(self->R, i), top);
     const pm_q_t even = self->of.rotation.tau_even - at_top;
     const pm_q_t middle = pm_mean(tau_up, tau_down) - pm_mul(at_top, PM_Q(1.46947));
-    const pm_num_t speed = pm_num_mul(pm_num_from_fixed(top, PM_Q_BITS), unit);
-    const pm_num_t viscous =
-        pm_num_div(torque_of(drive, even - middle, i), pm_num_mul(speed, pm_num_ratio(3, 10)));
-    const pm_num_t rest = pm_num_sub(torque_of(drive, even, i), pm_num_mul(viscous, speed));
-    r->viscous_nNms = commissioning_decimal(viscous, 9);
-    r->coulomb_uNm = commissioning_decimal(rest, 6);
+    r->viscous = pm_div(pm_mul(even - middle, i), pm_mul(top, PM_Q(0.3)));
+    r->coulomb = pm_mul(even, i) - pm_mul(r->viscous, top);
 }
 
 phase_result_t rotation_down(drive_t *drive)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     const pm_q_t full = commissioning_current(drive) / 2;
     if (self->ms < SETTLE_MS) {
         drive->i_ref.d = commissioning_approach(drive->i_ref.d, full, full / 64 + 1);
@@ -172,8 +157,7 @@ phase_result_t rotation_down(drive_t *drive)
         return running;
     }
     take_torque(drive);
-    const pm_q_t step = pm_abs(self->of.rotation.slope) + 1;
-    drive->omega_open = commissioning_approach(drive->omega_open, 0, step);
+    drive->omega_open = commissioning_approach(drive->omega_open, 0, ramp_step(self));
     if (drive->omega_open != 0) {
         return running;
     }
@@ -181,7 +165,7 @@ phase_result_t rotation_down(drive_t *drive)
     const bool wanted = (drive->commissioning_report.routines & (uint8_t)COMMISSIONING_MECHANICS) != 0U;
     if (wanted) {
         conclude_mechanics(drive, tau_down, full);
-        if (drive->commissioning_report.result.J_nkgm2 <= 0) {
+        if (drive->commissioning_report.result.J <= 0) {
             return (phase_result_t){.failed = COMMISSIONING_NOT_TURNING};
         }
     }

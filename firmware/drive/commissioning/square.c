@@ -7,7 +7,7 @@
 /* Currents below tell no sign: four steps of a 12-bit converter. */
 #define NO_SIGN PM_Q(8.0 / 4096.0)
 /* Of products, so that the sum of thousands fits. */
-#define FINE 4096
+#define FINE 65536
 
 static int32_t sign_of(pm_q_t i)
 {
@@ -45,10 +45,11 @@ static pm_ab_t lost(const drive_t *drive, const commissioning_t *self, pm_ab_t v
 
 static void take(drive_t *drive, pm_ab_t v)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     const pm_ab_t last = pm_clarke(self->i_last);
     const pm_ab_t di = {.alpha = drive->i_ab.alpha - last.alpha, .beta = drive->i_ab.beta - last.beta};
     const pm_ab_t mean = {.alpha = last.alpha + di.alpha / 2, .beta = last.beta + di.beta / 2};
+    self->taken++;
     const pm_ab_t gone = lost(drive, self, v);
     const pm_ab_t w = {.alpha = v.alpha - pm_mul(self->R, mean.alpha) - gone.alpha,
                        .beta = v.beta - pm_mul(self->R, mean.beta) - gone.beta};
@@ -80,7 +81,7 @@ static void judge(drive_t *drive, square_t *square)
         square->done = square->cycles >= settling(square) + cycles;
     } else if (square->peak >= square->wanted) {
         square->found = true;
-        commissioning_clear_sums(&drive->commissioning);
+        commissioning_clear_sums(&drive->identify.work);
     } else {
         square->voltage += square->voltage / 8;
         if (square->voltage > pm_mul(drive->status.v_dc, PM_Q(0.4))) {
@@ -94,7 +95,7 @@ static void judge(drive_t *drive, square_t *square)
 
 void square_step(drive_t *drive, pm_ab_t v_past)
 {
-    commissioning_t *self = &drive->commissioning;
+    commissioning_t *self = &drive->identify.work;
     square_t *square = &self->of.square;
     const pm_q_t i = pm_abs(square->on_q ? drive->i_ab.beta : drive->i_ab.alpha);
     if (!square->begun) { /* what flowed before goes first */
