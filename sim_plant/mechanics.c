@@ -146,14 +146,3 @@ void mechanics_rates(const mechanics_t *mech, const mechanics_motion_t *m, doubl
         rate->twist_rad_s = m->omega_mech_rad_s - m->omega_load_rad_s;
     }
 }
-
-double mechanics_energy_J(const mechanics_t *mech, const mechanics_motion_t *m)
-{
-    const plant_mech_t *p = &mech->parameters;
-    double energy_J = 0.5 * p->J_kgm2 * m->omega_mech_rad_s * m->omega_mech_rad_s;
-    if (two_masses(mech)) {
-        energy_J += 0.5 * p->J_load_kgm2 * m->omega_load_rad_s * m->omega_load_rad_s +
-                    0.5 * p->k_shaft_Nm * m->twist_rad * m->twist_rad;
-    }
-    return energy_J;
-}

@@ -93,9 +93,6 @@ static inline double mechanics_rate(const mechanics_t *m, double omega_mech_rad_
 void mechanics_rates(const mechanics_t *mech, const mechanics_motion_t *motion, double torque_Nm,
                      mechanics_motion_rate_t *rate);
 
-/* Of both masses and the shaft. */
-double mechanics_energy_J(const mechanics_t *mech, const mechanics_motion_t *motion);
-
 #ifdef __cplusplus
 }
 #endif

@@ -14,54 +14,85 @@ static inline int32_t limited(int32_t x)
 #endif
 }
 
-static void change(trace_t *trace, trace_state_t state, uint32_t samples)
+static inline void put(const trace_t *trace, int16_t *sample, uint32_t n)
 {
-    trace->state = state;
-    trace->left = samples;
+    const trace_channel_t *channel = &trace->channel[n];
+    sample[n] = (int16_t)limited(*channel->source >> channel->shift);
 }
 
-static bool triggers(const trace_t *trace, bool crossed)
+/* Straight, as deep as there are signals; eight are none beside eight, so that every number is a case. */
+static inline void take(const trace_t *trace, int16_t *sample)
 {
-    const trace_edge_t edge = trace->side < 0 ? TRACE_FALLING : TRACE_RISING;
-    return trace->forced || (crossed && (trace->edge == TRACE_BOTH || trace->edge == edge));
-}
-
-/* The sample just taken is the first that the trigger saw, has crossed the level, or ends a time. */
-static __attribute__((noinline)) void advance(trace_t *trace, int32_t side)
-{
-    const bool crossed = (side ^ trace->side) < 0;
-    trace->side = side;
-    trace->poked = false;
-    if (trace->state == TRACE_FILLING && trace->left == 0U) {
-        change(trace, trace->forced ? TRACE_TRIGGERED : TRACE_WAITING, trace->after);
-    } else if (trace->state == TRACE_WAITING) {
-        change(trace, triggers(trace, crossed) ? TRACE_TRIGGERED : TRACE_WAITING, trace->after - 1U);
-    } else {
-        /* goes on */
+    switch (trace->count % TRACE_SIGNALS) {
+    case 0:
+        put(trace, sample, 7);
+        __attribute__((fallthrough));
+    case 7:
+        put(trace, sample, 6);
+        __attribute__((fallthrough));
+    case 6:
+        put(trace, sample, 5);
+        __attribute__((fallthrough));
+    case 5:
+        put(trace, sample, 4);
+        __attribute__((fallthrough));
+    case 4:
+        put(trace, sample, 3);
+        __attribute__((fallthrough));
+    case 3:
+        put(trace, sample, 2);
+        __attribute__((fallthrough));
+    case 2:
+        put(trace, sample, 1);
+        __attribute__((fallthrough));
+    default:
+        put(trace, sample, 0);
+        break;
     }
-    if (trace->state == TRACE_TRIGGERED && trace->left == 0U) {
+}
+
+/* Not negative: the trigger signal has reached the level. */
+static inline int32_t above(const trace_t *trace, const int16_t *sample)
+{
+    return sample[trace->trigger] - trace->level;
+}
+
+/* There is enough before the trigger, or after it. */
+static inline void advance(trace_t *trace, const int16_t *sample)
+{
+    if (trace->state == TRACE_TRIGGERED) {
         trace->countdown = 0;
         trace->state = TRACE_COMPLETE;
+        return;
     }
+    const int32_t now = above(trace, sample);
+    if (trace->edge == TRACE_BOTH) { /* the one that can come next */
+        trace->falling = now < 0 ? 0 : -1;
+    }
+    trace->before = now ^ trace->falling;
+    trace->left = trace->after;
+    trace->state = TRACE_WAITING;
 }
 
 void trace_record(trace_t *trace)
 {
+    int16_t *sample = trace->next;
     trace->countdown = trace->divider;
-    const trace_channel_t *channel = trace->channel;
-    const int16_t *sample = trace->next;
-    int16_t *to = trace->next;
-    const int16_t *end = &to[trace->count];
-    do {
-        *to = (int16_t)limited(*channel->source >> channel->shift);
-        channel++;
-        to++;
-    } while (to != end);
-    trace->next = to == trace->end ? trace->ring : to;
-    const int32_t side = sample[trace->trigger] - trace->level;
+    take(trace, sample);
+    int16_t *next = &sample[trace->count];
+    trace->next = next == trace->end ? trace->ring : next;
+    if (trace->state == TRACE_WAITING) {
+        const int32_t now = above(trace, sample) ^ trace->falling;
+        const int32_t passed = trace->before & ~now;
+        trace->before = now;
+        if (passed >= 0 && !trace->forced) {
+            return;
+        }
+        trace->state = TRACE_TRIGGERED;
+    }
     trace->left--;
-    if (trace->left == 0U || (side ^ trace->side) < 0 || trace->poked) {
-        advance(trace, side);
+    if (__builtin_expect(trace->left == 0U, 0) != 0) {
+        advance(trace, sample);
     }
 }
 

@@ -47,22 +47,21 @@ typedef struct {
     int32_t shift;
 } trace_channel_t;
 
-/* A comparison, a wrap and a count for every sample, whatever the state: so none costs more than another. */
 typedef struct {
     volatile uint32_t countdown; /* periods up to the next sample; 0: not armed */
     uint32_t divider;
     uint32_t count; /* signals */
     int16_t *next;  /* where the next sample goes */
+    int16_t *end;   /* of what is used of the ring: whole samples */
     int16_t *ring;
-    int16_t *end;         /* of what is used of the ring: whole samples */
+    uint32_t left; /* samples up to the next state; while waiting, those from the trigger on */
+    volatile trace_state_t state;
     uint32_t trigger;     /* signal */
+    int32_t falling;      /* -1: the edge that counts is falling */
     int32_t level;        /* raw */
-    int32_t side;         /* negative: the last sample was below the level */
-    uint32_t left;        /* samples until the state changes; while waiting it means nothing */
-    volatile bool poked;  /* by the thread: look at `forced` */
+    int32_t before;       /* the last sample: negative, the edge can come */
     volatile bool forced; /* trigger as soon as there is enough before */
     trace_channel_t channel[TRACE_SIGNALS];
-    volatile trace_state_t state;
     trace_edge_t edge;
     uint32_t after; /* samples from the trigger on */
 
@@ -82,9 +81,10 @@ static inline void trace_sample(trace_t *trace)
 {
     const uint32_t countdown = trace->countdown;
     if (countdown != 0U) {
-        trace->countdown = countdown - 1U;
         if (countdown == 1U) {
             trace_record(trace);
+        } else {
+            trace->countdown = countdown - 1U;
         }
     }
 }

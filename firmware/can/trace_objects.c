@@ -93,10 +93,9 @@ static uint32_t arm(trace_t *trace)
     trace->end = &trace->ring[length * trace->count];
     trace->next = trace->ring;
     trace->left = before;
-    trace->side = -trace->level;
     trace->edge = (trace_edge_t)trace->set_edge;
+    trace->falling = trace->edge == TRACE_FALLING ? -1 : 0;
     trace->divider = trace->set_divider;
-    trace->poked = false;
     trace->state = TRACE_FILLING;
     __atomic_signal_fence(__ATOMIC_RELEASE); /* the interrupt looks at this alone, so it comes last */
     trace->countdown = 1;
@@ -118,7 +117,6 @@ static uint32_t command(trace_t *trace, int32_t value)
             return STATE;
         }
         trace->forced = true;
-        trace->poked = true;
         return OK;
     }
 }

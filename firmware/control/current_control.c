@@ -17,7 +17,7 @@ static inline pm_dq_t limited(pm_dq_t u, pm_wide_t top)
     const pm_q_t v_max = pm_narrow(top);
     const pm_q_t v_d = pm_narrow(d);
     const int32_t room = pm_mulh(v_max, v_max) - pm_mulh(v_d, v_d);
-    const pm_wide_t left = pm_widen(pm_sqrt_in_place(pm_shl(room, 32 - PM_Q_BITS)));
+    const pm_wide_t left = pm_sqrt_wide(room);
     return (pm_dq_t){.d = d, .q = pm_clamp(u.q, -left, left)};
 }
 

@@ -41,14 +41,13 @@ static inline pm_abc_t lost_by(const modulator_config_t *config, pm_ab_t i)
 void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
                     pm_ab_t i_quarter, modulator_out_t *out)
 {
-    const int32_t per_volt = pm_per_volt(v_dc);
-    centred_t u = centred(v);
+    const centred_t u = centred(v);
+    /* beyond the hexagon the span becomes the whole period: the vector is shortened on its own direction */
+    const int32_t per_volt = pm_per_volt(pm_max(u.span, v_dc));
     out->limited = u.span > v_dc;
     if (pm_rarely(out->limited)) {
-        /* on the same direction to the hexagon, where the span of the phases is the link voltage */
-        const pm_unit_t ratio = pm_ratio(v_dc, u.span);
+        const pm_unit_t ratio = pm_share_to_unit(pm_mulh(v_dc, per_volt));
         v = (pm_ab_t){.alpha = pm_unit(v.alpha, ratio), .beta = pm_unit(v.beta, ratio)};
-        u.leg = (pm_abc_t){pm_unit(u.leg.a, ratio), pm_unit(u.leg.b, ratio), pm_unit(u.leg.c, ratio)};
         self->limited = true;
     }
     const pm_abc_t i = lost_by(config, i_quarter);

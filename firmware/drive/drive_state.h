@@ -2,6 +2,7 @@
 #ifndef DRIVE_DRIVE_STATE_H
 #define DRIVE_DRIVE_STATE_H
 
+#include "firmware/drive/commissioning/commissioning.h"
 #include "firmware/drive/drive.h"
 
 /* What drive_step() does; drive_slow() moves it on. */
@@ -9,6 +10,7 @@ typedef enum {
     STAGE_OFF,
     STAGE_CALIBRATE,
     STAGE_PULSES,
+    STAGE_IDENTIFY,
     STAGE_OPEN_LOOP, /* current vector at an imposed angle */
     STAGE_VECTOR,    /* field-oriented control at the estimated angle */
 } drive_stage_t;
@@ -48,8 +50,12 @@ struct drive {
     modulator_t modulator;
 
     position_t position;
-    initial_pulses_t pulses;
+    union { /* a start, or identification */
+        initial_pulses_t pulses;
+        commissioning_t commissioning;
+    };
     pm_procedure_t pulses_state;
+    commissioning_report_t commissioning_report;
     current_control_t current;
     speed_control_t speed;
     field_weakening_t field_weakening;

@@ -249,6 +249,11 @@ static inline int32_t pm_zone_sub(int32_t sum, int32_t x, int32_t height)
 #define PM_SHARE_BITS 20
 #define PM_SHARE_HALF ((int32_t)1 << (PM_SHARE_BITS - 1))
 
+static inline pm_unit_t pm_share_to_unit(int32_t share) /* below 1 */
+{
+    return pm_shl(share, 31 - PM_SHARE_BITS);
+}
+
 static inline int32_t pm_share_of(int32_t share, int32_t whole)
 {
     return pm_mulh(pm_sat_positive(share, PM_SHARE_BITS), pm_shl(whole, 32 - PM_SHARE_BITS));

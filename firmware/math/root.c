@@ -2,7 +2,12 @@
 
 pm_q_t pm_sqrt(pm_q_t x)
 {
-    return pm_sqrt_in_place(x);
+    if (x <= 0) {
+        return 0;
+    }
+    const unsigned n = (unsigned)__builtin_clz((uint32_t)x) >> 1;
+    const uint32_t root = pm_root_q29((uint32_t)x << (2U * n)) << 2;
+    return (pm_q_t)((root + (1U << n)) >> (n + 1U));
 }
 
 pm_q_t pm_hypot(pm_q_t x, pm_q_t y)
@@ -25,7 +30,7 @@ pm_q_t pm_hypot(pm_q_t x, pm_q_t y)
         return PM_Q_MAX;
     }
     const uint32_t root =
-        pm_root_q31(m) + ((1U << (n - 1U)) >> 1); /* twice the scaled length, to be rounded */
+        (pm_root_q29(m) << 2) + ((1U << (n - 1U)) >> 1); /* twice the scaled length, to be rounded */
     const uint32_t length = root >> (n - 1U);
     return length > (uint32_t)PM_Q_MAX ? PM_Q_MAX : (pm_q_t)length;
 }

@@ -120,13 +120,14 @@ static uint32_t legs_of(const bool driven[])
 
 void hal_bridge_write(hal_t *hal, const drive_out_t *out)
 {
+    (void)hal; /* the address of the one there is costs less than keeping it */
     TIM1.CCR1 = out->compare[0][0];
     TIM1.CCR2 = out->compare[1][0];
     TIM1.CCR3 = out->compare[2][0];
-    hal->legs = legs_of(out->driven);
+    port_hal.legs = legs_of(out->driven);
     if (out->trip) {
-        TIM1.BDTR = hal->bridge;
-        hal->legs = 0U;
+        TIM1.BDTR = port_hal.bridge;
+        port_hal.legs = 0U;
     }
 }
 

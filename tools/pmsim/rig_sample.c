@@ -9,7 +9,8 @@ _Static_assert((int)RIG_OFF == (int)DRIVE_OFF && (int)RIG_CALIBRATING == (int)DR
                    (int)RIG_STOPPING == (int)DRIVE_STOPPING && (int)RIG_FAULT == (int)DRIVE_FAULT,
                "states");
 _Static_assert((int)RIG_SPEED == (int)DRIVE_MODE_SPEED && (int)RIG_TORQUE == (int)DRIVE_MODE_TORQUE &&
-                   (int)RIG_CURRENT == (int)DRIVE_MODE_CURRENT,
+                   (int)RIG_CURRENT == (int)DRIVE_MODE_CURRENT &&
+                   (int)RIG_IDENTIFY == (int)DRIVE_MODE_IDENTIFY,
                "modes");
 
 static const double two_pi = 6.283185307179586;
@@ -53,6 +54,25 @@ static drive_fault_t fault_now(rig_scale_t *scale, const drive_t *drive)
     return record->period != scale->fault_seen ? record->fault : DRIVE_FAULT_NONE;
 }
 
+static rig_identified_t identified(const commissioning_report_t *report)
+{
+    const commissioning_result_t *r = &report->result;
+    return (rig_identified_t){
+        .state = report->state,
+        .reason = report->reason,
+        .R_s_ohm = 1e-6 * r->R_s_uohm,
+        .lost_V = 1e-3 * r->lost_mV,
+        .L_d_H = 1e-9 * r->L_d_nH,
+        .L_q_H = 1e-9 * r->L_q_nH,
+        .L_q_rated_H = 1e-9 * r->L_q_rated_nH,
+        .L_dq_rated_H = 1e-9 * r->L_dq_rated_nH,
+        .psi_m_Wb = 1e-9 * r->psi_m_nWb,
+        .J_kgm2 = 1e-9 * r->J_nkgm2,
+        .viscous_Nms = 1e-9 * r->viscous_nNms,
+        .coulomb_Nm = 1e-6 * r->coulomb_uNm,
+    };
+}
+
 void rig_fill_sample(rig_scale_t *scale, const drive_t *drive, const drive_out_t *out, rig_sample_t *sample)
 {
     const drive_status_t *status = drive_status(drive);
@@ -74,6 +94,7 @@ void rig_fill_sample(rig_scale_t *scale, const drive_t *drive, const drive_out_t
     sample->weight = (double)status->weight / PM_ONE;
     sample->quality = (double)status->quality / PM_ONE;
     sample->driven = out->driven[0] || out->driven[1] || out->driven[2];
+    sample->identified = identified(&drive->commissioning_report);
 }
 
 void rig_record_legs(const drive_in_t *in, const drive_out_t *out, record_period_t *record)

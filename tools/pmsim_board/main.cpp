@@ -26,6 +26,7 @@ struct BoardOptions {
     bus_noise_kind_t load = BUS_QUIET;
     double console_s = 0.0;
     int gdb_port = -1;
+    bool busy = false;
 };
 
 // NAME=MOST: a line like those of the expectations. Returns whether it holds.
@@ -69,6 +70,9 @@ int run(RunOptions options, const BoardOptions &board, NodeOptions node)
     }
     rig_board_image(board.image.c_str(), !node.can.empty());
     rig_board_bus_load(board.load);
+    if (board.busy) {
+        rig_board_busy();
+    }
     if (board.gdb_port >= 0) {
         rig_board_gdb(static_cast<uint16_t>(board.gdb_port));
         options.jobs = 1;
@@ -122,6 +126,10 @@ int main(int argc, char **argv)
                    "other nodes that fill the bus, at 1 Mbit/s: babble (shortest frames) or garbage (any)")
         ->transform(CLI::CheckedTransformer(
             std::map<std::string, bus_noise_kind_t>{{"babble", BUS_BABBLE}, {"garbage", BUS_GARBAGE}}));
+    app.add_flag(
+        "--busy", board.busy,
+        "beside the scenario, the bus keeps the image busy: a trace of four signals in every period, "
+        "armed again and again, and a parameter written now and then");
     app.add_option("--figures", board.figures,
                    "write instructions, cycles, stack and load to this file (JSON)");
     app.add_option("--limit", board.limits,

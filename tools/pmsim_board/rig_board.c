@@ -11,6 +11,7 @@
 #include "tools/pmsim/rig_sample.h"
 #include "tools/pmsim_board/bus_load.h"
 #include "tools/pmsim_board/gdb_server.h"
+#include "tools/pmsim_board/load.h"
 #include "tools/pmsim_board/master.h"
 #include "tools/pmsim_board/watch.h"
 
@@ -25,14 +26,15 @@ struct rig {
     rig_scale_t scale;
     drive_command_t sent;
     master_t master;
+    load_t load;
     hal_can_state_t bus; /* as it was told last */
     uint32_t since_sent;
-    bus_load_t load;
+    bus_load_t others;
     gdb_server_t *gdb; /* NULL: none */
 };
 
 static const char *image_path;
-static bool live;
+static bool live, busy;
 static int gdb_port = -1;
 static bus_noise_kind_t noise;
 
@@ -45,6 +47,11 @@ void rig_board_image(const char *elf_path, bool commands_by_bus)
 void rig_board_bus_load(bus_noise_kind_t kind)
 {
     noise = kind;
+}
+
+void rig_board_busy(void)
+{
+    busy = true;
 }
 
 void rig_board_gdb(uint16_t port)
@@ -106,10 +113,11 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         rig_destroy(rig);
         return NULL;
     }
-    rig->load = bus_load(noise);
+    rig->others = bus_load(noise);
     if (!live) {
         rig->master = master_make(rig->board, params);
         master_start(&rig->master);
+        rig->load = load_make(rig->board, params);
     }
     return rig;
 }
@@ -117,8 +125,9 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
 void rig_destroy(rig_t *rig)
 {
     if (rig->board != NULL) {
-        rig->watch.figures.bus_frames = rig->load.frames;
-        rig->watch.figures.bus_idle = rig->load.idle;
+        rig->watch.figures.bus_frames = rig->others.frames;
+        rig->watch.figures.bus_idle = rig->others.idle;
+        rig->watch.figures.refused = rig->load.refused;
         watch_end(&rig->watch);
         gdb_server_detach(rig->gdb);
         board_destroy(rig->board);
@@ -202,11 +211,12 @@ void rig_set_can_state(rig_t *rig, hal_can_state_t state)
     rig->bus = state;
 }
 
-/* Nobody reads them in a scenario: the status is read from the memory, where it is complete. */
-static void drop_frames(rig_t *rig)
+/* Hardly any is read in a scenario: the status is read from the memory, where it is complete. */
+static void take_frames(rig_t *rig)
 {
-    hal_can_frame_t frame;
-    while (rig_receive(rig, &frame)) {
+    board_frame_t frame;
+    while (board_can_receive(rig->board, &frame)) {
+        load_take(&rig->load, &frame);
     }
 }
 
@@ -216,7 +226,10 @@ void rig_step(rig_t *rig, rig_sample_t *sample)
     if (!live && ++rig->since_sent >= REPEAT_PERIODS) {
         send(rig);
     }
-    bus_load_fill(&rig->load, rig->board);
+    bus_load_fill(&rig->others, rig->board);
+    if (busy && !live) {
+        load_step(&rig->load);
+    }
     if (rig->gdb != NULL) {
         gdb_server_poll(rig->gdb);
     }
@@ -225,7 +238,7 @@ void rig_step(rig_t *rig, rig_sample_t *sample)
         exit(2);
     }
     if (!live) {
-        drop_frames(rig);
+        take_frames(rig);
     }
     rig->watch.figures.simulated_s += board_period_s(rig->board);
     rig_fill_sample(&rig->scale, &rig->watch.image->drive, &rig->watch.image->out, sample);

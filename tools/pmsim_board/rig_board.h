@@ -22,8 +22,11 @@ void rig_board_image(const char *elf_path, bool commands_by_bus);
 /* Each of them waits for gdb on that port before its first instruction; 0: on a free one. */
 void rig_board_gdb(uint16_t port);
 
-/* Others keep the bus busy, at 1 Mbit/s. */
+/* Others keep the bus busy, at 1 Mbit/s (bus_noise.h). */
 void rig_board_bus_load(bus_noise_kind_t kind);
+
+/* Beside the scenario, requests to the image keep it busy (load.h). */
+void rig_board_busy(void);
 
 #ifdef __cplusplus
 }

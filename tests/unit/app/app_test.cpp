@@ -238,7 +238,10 @@ TEST(App, WithoutAMasterTheDriveIsLeftAlone)
     Bench x;
     const drive_params_t params = defaults();
     x.boot(&params);
-    const drive_command_t command = {true, DRIVE_MODE_SPEED, 30000, 0, 0, false};
+    drive_command_t command = {};
+    command.enable = true;
+    command.mode = DRIVE_MODE_SPEED;
+    command.speed_mrad_s = 30000;
     drive_command(&x.loop.app.drive, &command);
     x.run_ms(700);
     EXPECT_EQ(std::memcmp(&x.loop.app.drive.command, &command, sizeof command), 0);

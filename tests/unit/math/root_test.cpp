@@ -55,6 +55,18 @@ TEST(MathRoot, SquareRootOfSquares)
     EXPECT_NEAR(pm_sqrt(PM_Q(0.25)), PM_Q(0.5), 4);
 }
 
+TEST(MathRoot, WideRootOfASquare)
+{
+    for (int64_t x = 0; x <= INT32_MAX; x += 1021) {
+        const double exact = std::sqrt(static_cast<double>(x) * 0x1p-24);
+        const double actual = pm_sqrt_wide(static_cast<int32_t>(x)) * 0x1p-22;
+        ASSERT_LE(actual, exact * (1 + 1e-8)) << x;
+        ASSERT_GE(actual, exact * (1 - 1e-8) - 0x1p-22) << x;
+    }
+    EXPECT_EQ(pm_sqrt_wide(-1), 0);
+    EXPECT_EQ(pm_sqrt_wide(1), 1 << 10);
+}
+
 double hypot_excess(int32_t x, int32_t y)
 {
     const double exact = std::min(std::hypot(real(x), real(y)), kLargest);
