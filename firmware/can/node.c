@@ -222,6 +222,11 @@ void node_run(node_t *node, uint32_t now_us)
     }
 }
 
+bool node_busy(const node_t *node)
+{
+    return node->ring_count > 0U || node->sdo.state == SDO_BLOCK_UPLOAD;
+}
+
 void node_bus(node_t *node, node_bus_t state)
 {
     if (state == node->bus) {

@@ -14,6 +14,7 @@ examples:
   pmdrive get machine velocity_actual           a whole record, and a value
   pmdrive set R_s=6.2ohm current_bandwidth=800  units and prefixes are understood
   pmdrive dump >motor.yaml; pmdrive diff motor.yaml; pmdrive load motor.yaml
+  pmdrive identify; pmdrive tune; pmdrive save  from a new motor to one that runs
   pmdrive run speed 300rpm --for 5              never longer than someone attends
   pmdrive trace i_d i_q theta --trigger i_q --level 2A --out start.csv
   pmdrive --can can0 flash pmdrive.elf          writes the firmware, then looks on the bus whether it runs
@@ -72,6 +73,20 @@ def parser():
     sub.add_argument("--speed", default="0", help="of the vector in current mode")
     sub.add_argument("--for", dest="seconds", type=float, help="seconds; without it the space bar must be held")
     add("stop", "switch the bridge off now", commands.stop)
+    sub = add("identify", "measure the machine: the motor turns; shows what would change, asks, writes",
+              commands.identify_machine)
+    sub.add_argument("--only", help="some of resistance,inductance,flux,mechanics (all)")
+    sub.add_argument("--current", help="2A; the rated one unless given")
+    sub.add_argument("--speed", help="20rad/s, 300rpm; 30%% of speed_max unless given; negative: the other way round")
+    sub.add_argument("--rated-current", help="name plate: 4A, peak of a phase. With the next three: values to begin with")
+    sub.add_argument("--pole-pairs", help="name plate")
+    sub.add_argument("--max-speed", help="name plate: 3000rpm")
+    sub.add_argument("--dc-link", help="voltage of the link: 24V")
+    sub.add_argument("--yes", action="store_true", help="do not ask")
+    sub = add("tune", "controllers, position loop and start from the machine's parameters; shows, asks, writes",
+              commands.tune_controllers)
+    sub.add_argument("--bandwidth", type=float, help="of the current control, Hz (f_pwm / 20)")
+    sub.add_argument("--yes", action="store_true", help="do not ask")
     sub = add("trace", "record signals as an oscilloscope does", commands.trace)
     sub.add_argument("signals", nargs="+", help="objects marked t in docs/object-dictionary.md")
     sub.add_argument("--divider", type=int, default=1, help="control periods per sample (%(default)s)")

@@ -4,7 +4,7 @@ import sys
 import time
 from pathlib import Path
 
-from . import attend, bus, dictionary, files, flash, motion, names
+from . import attend, bus, dictionary, files, flash, identify, motion, names, tune
 from . import trace as scope
 from .drive import error_text, fault_text, state_of
 from .errors import NoAnswer, NotDone, UsageError
@@ -194,6 +194,62 @@ def load(arguments, drive, out):
     drive.load(values, progress=out.progress)
     out.line(f"{len(changes)} values written and read back; `pmdrive save` keeps them over a reset")
     _hint([entry for entry, _, _ in changes], drive, out)
+
+
+def _take(arguments, drive, out, values, what):
+    """Shows what would change, asks, writes, reads back. Whether anything was written."""
+    changes = drive.load(values, dry_run=True)
+    show_changes(changes, out, ("before", "after"))
+    if not changes:
+        out.line(f"{what}: nothing to change")
+        return False
+    if not (arguments.yes or out.as_json) and not attend.confirm(f"write these {len(changes)} values?"):
+        raise NotDone("nothing was written")
+    drive.load(values)
+    out.line(f"{len(changes)} values written and read back")
+    return True
+
+
+def _name_plate(arguments, drive, out):
+    given = (arguments.rated_current, arguments.pole_pairs, arguments.max_speed, arguments.dc_link)
+    if all(value is None for value in given):
+        return
+    if any(value is None for value in given):
+        raise UsageError("a name plate has all four", "--rated-current --pole-pairs --max-speed --dc-link")
+    numbers = [float(names.find(name).physical(names.find(name).parse(text)))
+               for name, text in zip(("i_rated", "pole_pairs", "speed_max", "v_dc_nominal"), given)]
+    current, pole_pairs, speed, dc_link = numbers
+    out.line("to begin with, from the name plate; what is not written there is a guess:")
+    values = identify.name_plate(drive, current, int(pole_pairs), speed, dc_link)
+    if _take(arguments, drive, out, values, "name plate") and drive.read("parameters_ready") in (1, 3):
+        drive.save()  # over-current comparators take their level at the start
+        drive.reset()
+
+
+def _entry_or_zero(name, text):
+    return 0 if text is None else names.find(name).parse(text)
+
+
+def identify_machine(arguments, drive, out):
+    wanted = identify.routines(arguments.only)
+    current = _entry_or_zero("target_current", arguments.current)
+    speed = _entry_or_zero("target_velocity", arguments.speed)
+    turning = "turns" if {"flux", "mechanics"} & set(wanted) else "moves"
+    if not (arguments.yes or out.as_json) and not attend.confirm(
+            f"THE MOTOR {turning.upper()} for some 15 s, with its rated current. Is it free to?"):
+        raise NotDone("nothing was done")
+    _name_plate(arguments, drive, out)
+    found = identify.run(drive, wanted, current, speed, out.progress)
+    for group in found.values():
+        show(out, {names.find(f"identification.{name}"): raw for name, raw in group.items()})
+    if _take(arguments, drive, out, identify.parameters(drive, found), "identification"):
+        out.line("next: `pmdrive tune`, then `pmdrive save`")
+
+
+def tune_controllers(arguments, drive, out):
+    bandwidth = arguments.bandwidth
+    if _take(arguments, drive, out, tune.changes(drive, bandwidth), "tuning"):
+        out.line("`pmdrive save` keeps them over a reset")
 
 
 def save(arguments, drive, out):

@@ -12,9 +12,9 @@ from .errors import FaultError, NotDone, UsageError
 
 PERIOD_S = 0.1
 WATCH_MS = 500
-MODES = {"speed": 3, "torque": 4, "current": -1}
+MODES = {"speed": 3, "torque": 4, "current": -1, "identify": -2}
 MAPPED = (0x60400010, 0x60600008, 0x60FF0020)
-SHUTDOWN, SWITCH_ON, ENABLE = 0x06, 0x07, 0x0F
+SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP = 0x06, 0x07, 0x0F, 0x0B
 
 
 class Motion:
@@ -94,6 +94,9 @@ class Motion:
     def set_speed(self, speed):
         self.speed = speed
         self._send(self.controlword)
+
+    def quick_stop(self):
+        self._send(QUICK_STOP)
 
     def stop(self, seconds=30.0):
         """Slows down, then off; the commands go on until it is off."""

@@ -6,7 +6,7 @@ from . import dictionary, names
 from .errors import PmdriveError
 
 WORDS = ("scan", "info", "list", "get", "set", "dump", "load", "diff", "save", "restore", "reset", "faults", "monitor", "run",
-         "stop", "trace", "flash", "eds", "shell", "completion", "help")
+         "identify", "tune", "stop", "trace", "flash", "eds", "shell", "completion", "help")
 OBJECTS = sorted([*(e.name for e in dictionary.ENTRIES), *names.RECORDS])
 
 
