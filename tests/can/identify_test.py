@@ -34,8 +34,10 @@ MACHINES = {
 # What the drive was used for before: another motor, on the same board.
 OTHER = {"pole_pairs": 5, "mtpa": 1, "dead_time_comp": 1, "t_align": 0.1, "flux_bandwidth": 20, "flux_gain": 0.3,
          "speed_bandwidth": 3, "injection_bandwidth": 25, "current_bandwidth": 300}
-WRONG = {"R_s": 3.0, "L_d": 0.3, "L_q": 0.35, "psi_m": 0.4, "J": 4.0, "L_q_rated": 0.33, "L_dh_rated": 0.29,
-         "L_qh_rated": 0.3}  # times the truth
+WRONG = (  # times the truth
+    {"R_s": 3.0, "L_d": 0.3, "L_q": 0.35, "psi_m": 0.4, "J": 3.0, "L_q_rated": 0.33, "L_dh_rated": 0.29, "L_qh_rated": 0.3},
+    {"R_s": 0.4, "L_d": 2.5, "L_q": 3.0, "psi_m": 2.0, "J": 0.3, "L_q_rated": 2.9, "L_dh_rated": 2.5, "L_qh_rated": 2.8},
+)
 
 NODE = """\
 title: A motor that nobody knows
@@ -119,7 +121,8 @@ def run_live(name, folder):
     R, L_d, L_q, psi, J = machine["truth"]
     true = {"R_s": R, "L_d": L_d, "L_q": L_q, "psi_m": psi, "J": J, "L_q_rated": L_q, "L_dh_rated": L_d,
             "L_qh_rated": L_q}
-    wrong = {**OTHER, **{key: factor * true[key] for key, factor in WRONG.items()}, "L_dqh_rated": 0, "cross_half": 0}
+    factors = WRONG[0 if machine["salient"] else 1]
+    wrong = {**OTHER, **{key: factor * true[key] for key, factor in factors.items()}, "L_dqh_rated": 0, "cross_half": 0}
     path = Path(folder) / f"{name}.yaml"
     path.write_text(NODE.format(machine=ROOT / f"sim_plant/machines/{name}.yaml", seed=len(name),
                                 offset=0.005 * current, drive=yaml_map(wrong)), encoding="utf-8")
