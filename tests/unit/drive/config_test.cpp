@@ -165,7 +165,7 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
     const double full = Ldq / Lq, half = -0.0378;
     const double per_period = 2.0 / 3 * 300 * T, exact = 4 * L_d / per_period;
     return {
-        {"dead_counts", c.modulator.dead_counts, 0, 2e-6 * 10e3 * 8500},
+        {"dead", c.modulator.dead, 20, 2e-6 * 10e3},
         {"drop", c.modulator.drop, 28, 1 / V},
         {"zone_alpha", c.modulator.zone_alpha, 20, I / 0.03},
         {"zone_beta", c.modulator.zone_beta, 20, std::sqrt(0.75) * I / 0.03},
