@@ -70,6 +70,7 @@ struct app {
     bool stored, refused, restart, batch;
     drive_param_id_t refused_param; /* that the last check named */
     uint16_t dropped;               /* stored pairs that this version does not know */
+    uint8_t routines;               /* what to identify: COMMISSIONING_... */
 
     /* bus */
     node_t node;

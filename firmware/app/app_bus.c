@@ -84,7 +84,8 @@ uint32_t node_host_put(void *context, const od_entry_t *entry, int32_t value)
     if (entry->slot == (uint16_t)OD_LIVE_PARAMETER_BATCH) {
         return app_put_batch(app, value != 0);
     }
-    const bool done = cia402_put(&app->cia402, entry->slot, value, &code) ||
+    const bool done = app_identify_put(app, entry->slot, value) ||
+                      cia402_put(&app->cia402, entry->slot, value, &code) ||
                       trace_put(&app->trace, entry->slot, value, &code);
     return done ? code : SDO_UNSUPPORTED;
 }
@@ -177,6 +178,8 @@ static drive_command_t command_of(const app_t *app, const cia402_out_t *out)
         command.mode = DRIVE_MODE_TORQUE;
     } else if (out->mode == CIA402_MODE_CURRENT) {
         command.mode = DRIVE_MODE_CURRENT;
+    } else if (out->mode == CIA402_MODE_IDENTIFY) {
+        app_identify_command(app, &command);
     } else {
         /* speed, also while there is none */
     }

@@ -52,6 +52,9 @@ void drive_command(drive_t *drive, const drive_command_t *command)
     const drive_mode_t mode = drive->state == DRIVE_OFF ? command->mode : drive->command.mode;
     drive->command = *command;
     drive->command.mode = mode;
+    if (!command->enable && drive->stage == STAGE_IDENTIFY) {
+        drive->stage = STAGE_OFF; /* nothing to slow down: the period that comes is without voltage */
+    }
 }
 
 bool drive_clear_fault(drive_t *drive)
@@ -134,12 +137,15 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
 {
     drive->hw_fault = in->hw_fault;
     protection_step(drive);
+    const pm_ab_t v_past = drive->v_acting;
     drive->v_acting = drive->v_next;
     drive->v_next = (pm_ab_t){0, 0};
     drive->status.theta = drive->position.pll.theta;
     out->trip = drive->fault != DRIVE_FAULT_NONE;
     if (drive->stage == STAGE_PULSES) {
         pulses(drive, out);
+    } else if (drive->stage == STAGE_IDENTIFY) {
+        commissioning_step(drive, v_past, out);
     } else {
         off(out);
         if (drive->stage == STAGE_CALIBRATE) {

@@ -28,12 +28,12 @@ typedef struct {
     pm_pll_config_t gains; /* between pll_low and pll_high */
     observer_t observer;
     pulsating_square_t square;
-    pm_q_t weight;                   /* 0: injection, 1: observer */
     bool inject;                     /* carrier on */
     pm_q_t omega_mean;               /* filtered for the weight */
     pm_q_t observer_eps, square_eps; /* without noise, for the quality */
     pm_q_t eps_mean;
     pm_q_t misfit_mean;
+    pm_q_t weight; /* 0: injection, 1: observer */
     pm_q_t quality;
 } position_t;
 

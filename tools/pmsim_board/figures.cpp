@@ -60,6 +60,8 @@ void figures_merge(const figures_t *figures)
     total.period_cycles = figures->period_cycles;
     total.stack_most = std::max(total.stack_most, figures->stack_most);
     total.resets += figures->resets;
+    total.bus_frames += figures->bus_frames;
+    total.bus_idle += figures->bus_idle;
     total.refused += figures->refused;
     total.simulated_s += figures->simulated_s;
 }

@@ -14,6 +14,7 @@ enum {
     FIGURE_OFF,
     FIGURE_CALIBRATE,
     FIGURE_PULSES,
+    FIGURE_IDENTIFY,
     FIGURE_ALIGN,
     FIGURE_OPEN_LOOP,
     FIGURE_INJECTION,
@@ -52,7 +53,8 @@ typedef struct {
     uint64_t period_cycles;
     uint32_t stack_most;
     uint32_t resets;
-    uint32_t refused; /* requests that the node did not do */
+    uint64_t bus_frames, bus_idle; /* of --bus-load: frames, and looks that found the bus idle */
+    uint32_t refused;              /* requests that the node did not do */
     double simulated_s;
 } figures_t;
 

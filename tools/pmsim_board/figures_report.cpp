@@ -7,8 +7,8 @@ namespace pmsim
 namespace
 {
 
-const char *const mode_names[FIGURE_MODES] = {"off",       "calibrate", "pulses", "align",    "open_loop",
-                                              "injection", "blend",     "flux",   "weakening"};
+const char *const mode_names[FIGURE_MODES] = {"off",       "calibrate", "pulses", "identify", "align",
+                                              "open_loop", "injection", "blend",  "flux",     "weakening"};
 const char *const event_names[FIGURE_EVENTS] = {"limited", "fault", "swap"};
 const char *const interrupt_names[FIGURE_INTERRUPTS] = {"control", "monitor", "slow", "can", "console"};
 
@@ -68,6 +68,10 @@ std::vector<std::pair<std::string, double>> figure_values(const figures_t &figur
     values.emplace_back("stack_bytes", double(figures.stack_most));
     values.emplace_back("resets", double(figures.resets));
     values.emplace_back("refused", double(figures.refused));
+    if (figures.bus_frames > 0) {
+        values.emplace_back("bus_frames", double(figures.bus_frames));
+        values.emplace_back("bus_idle", double(figures.bus_idle));
+    }
     values.emplace_back("identical", double(figures.identical));
     return values;
 }
@@ -99,7 +103,15 @@ std::string figure_table(const figures_t &figures)
         "interrupts\n",
         percent, static_cast<unsigned long long>(figures.latency_most), load, 1e-6 * double(figures.clock_Hz),
         figures.stack_most, figures.resets, static_cast<unsigned long long>(figures.identical));
-    return text + line;
+    text += line;
+    if (figures.bus_frames > 0) {
+        std::snprintf(line, sizeof line, "bus: %llu frames of others, %.0f a second; found idle %llu times\n",
+                      static_cast<unsigned long long>(figures.bus_frames),
+                      double(figures.bus_frames) / figures.simulated_s,
+                      static_cast<unsigned long long>(figures.bus_idle));
+        text += line;
+    }
+    return text;
 }
 
 std::string figure_json(const figures_t &figures)

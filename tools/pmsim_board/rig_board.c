@@ -1,5 +1,6 @@
 #include "tools/pmsim_board/rig_board.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,6 +9,8 @@
 #include "firmware/params/store.h"
 #include "sim_plant/board/board.h"
 #include "tools/pmsim/rig_sample.h"
+#include "tools/pmsim_board/bus_load.h"
+#include "tools/pmsim_board/gdb_server.h"
 #include "tools/pmsim_board/load.h"
 #include "tools/pmsim_board/master.h"
 #include "tools/pmsim_board/watch.h"
@@ -24,11 +27,16 @@ struct rig {
     drive_command_t sent;
     master_t master;
     load_t load;
+    hal_can_state_t bus; /* as it was told last */
     uint32_t since_sent;
+    bus_load_t others;
+    gdb_server_t *gdb; /* NULL: none */
 };
 
 static const char *image_path;
 static bool live, busy;
+static int gdb_port = -1;
+static bus_noise_kind_t noise;
 
 void rig_board_image(const char *elf_path, bool commands_by_bus)
 {
@@ -36,16 +44,27 @@ void rig_board_image(const char *elf_path, bool commands_by_bus)
     live = commands_by_bus;
 }
 
+void rig_board_bus_load(bus_noise_kind_t kind)
+{
+    noise = kind;
+}
+
 void rig_board_busy(void)
 {
     busy = true;
 }
 
+void rig_board_gdb(uint16_t port)
+{
+    gdb_port = port;
+}
+
 static bool boot(rig_t *rig, const drive_params_t *params)
 {
     uint32_t words[STORE_WORDS];
+    /* refused ones too: the image has to refuse them itself */
     const uint32_t used =
-        app_page(params, 1, words); /* refused ones too: the image has to refuse them itself */
+        noise == BUS_QUIET ? app_page(params, 1, words) : bus_load_page(params, 1000, words);
     board_program(rig->board, STORE_ADDRESS, words, used * sizeof words[0]);
     return board_boot(rig->board, BOOT_S);
 }
@@ -69,11 +88,19 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         rig_destroy(rig);
         return NULL;
     }
-    rig->scale = rig_scale(&drive.config.base, params->pole_pairs);
+    rig->scale = rig_scale(&drive.config.base, params->pole_pairs, drive.config.slow_divider);
     rig->board = board_create(image_path, rig->plant, error, error_size);
     if (rig->board == NULL) {
         rig_destroy(rig);
         return NULL;
+    }
+    if (gdb_port >= 0) {
+        rig->gdb = gdb_server_attach(board_cpu(rig->board), (uint16_t)gdb_port);
+        if (rig->gdb == NULL) {
+            snprintf(error, error_size, "no gdb on port %d: %s", gdb_port, strerror(errno));
+            rig_destroy(rig);
+            return NULL;
+        }
     }
     if (!boot(rig, params)) {
         snprintf(error, error_size, "%s: %s", image_path, board_error(rig->board));
@@ -86,6 +113,7 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         rig_destroy(rig);
         return NULL;
     }
+    rig->others = bus_load(noise);
     if (!live) {
         rig->master = master_make(rig->board, params);
         master_start(&rig->master);
@@ -97,8 +125,11 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
 void rig_destroy(rig_t *rig)
 {
     if (rig->board != NULL) {
+        rig->watch.figures.bus_frames = rig->others.frames;
+        rig->watch.figures.bus_idle = rig->others.idle;
         rig->watch.figures.refused = rig->load.refused;
         watch_end(&rig->watch);
+        gdb_server_detach(rig->gdb);
         board_destroy(rig->board);
     }
     plant_destroy(rig->plant);
@@ -174,7 +205,10 @@ bool rig_receive(rig_t *rig, hal_can_frame_t *frame)
 
 void rig_set_can_state(rig_t *rig, hal_can_state_t state)
 {
-    board_can_error(rig->board, state == HAL_CAN_BUS_OFF);
+    if (state != rig->bus && state != HAL_CAN_ACTIVE) { /* which it becomes by itself, frame by frame */
+        board_can_error(rig->board, state == HAL_CAN_BUS_OFF);
+    }
+    rig->bus = state;
 }
 
 /* Hardly any is read in a scenario: the status is read from the memory, where it is complete. */
@@ -192,8 +226,12 @@ void rig_step(rig_t *rig, rig_sample_t *sample)
     if (!live && ++rig->since_sent >= REPEAT_PERIODS) {
         send(rig);
     }
+    bus_load_fill(&rig->others, rig->board);
     if (busy && !live) {
         load_step(&rig->load);
+    }
+    if (rig->gdb != NULL) {
+        gdb_server_poll(rig->gdb);
     }
     if (!board_run_period(rig->board)) {
         fprintf(stderr, "pmsim board: %s at %.6f s\n", board_error(rig->board), sample->truth.t_s);

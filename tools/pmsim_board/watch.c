@@ -14,6 +14,8 @@ static int mode_of(const drive_t *drive)
         return FIGURE_CALIBRATE;
     case STAGE_PULSES:
         return FIGURE_PULSES;
+    case STAGE_IDENTIFY:
+        return FIGURE_IDENTIFY;
     case STAGE_OPEN_LOOP:
         return drive->state == DRIVE_FINDING ? FIGURE_ALIGN : FIGURE_OPEN_LOOP;
     case STAGE_VECTOR:

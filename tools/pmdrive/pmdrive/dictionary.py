@@ -240,7 +240,7 @@ ENTRIES = (
     Entry(0x2700, 3, "i_noise", "sensors", "i32", "live", "A", -6, 0, 0, 10000000, 5000, False, True, "application", "none", {}, 'rms noise of a current sample, for the quality limits', "5.8.1 #65"),
     Entry(0x2800, 0, "reference.count", "reference", "u8", "const", "", 0, 0, None, None, 1, False, False, "none", "none", {}, 'highest sub-index', ""),
     Entry(0x2800, 1, "target_current", "reference", "i32", "live", "A", -3, 0, 0, 1000000, 0, False, False, "none", "rx", {}, ('amplitude of the current vector in open-loop current mode, which turns at '
- 'target_velocity'), ""),
+ 'target_velocity, and in identification'), ""),
     Entry(0x2900, 0, "measured.count", "measured", "u8", "const", "", 0, 0, None, None, 17, False, False, "none", "none", {}, 'highest sub-index', ""),
     Entry(0x2900, 1, "i_d", "measured", "i32", "read", "A", -3, 0, None, None, None, False, False, "none", "tx", {}, 'd-axis current', ""),
     Entry(0x2900, 2, "i_q", "measured", "i32", "read", "A", -3, 0, None, None, None, False, False, "none", "tx", {}, 'q-axis current', ""),
@@ -270,13 +270,14 @@ ENTRIES = (
     Entry(0x2A00, 7, "fault_record.theta", "fault_record", "u32", "read", "turn", 0, -32, None, None, None, False, False, "none", "none", {}, 'estimated angle, electrical', ""),
     Entry(0x2A00, 8, "fault_record.temperature", "fault_record", "i16", "read", "degC", -1, 0, None, None, None, False, False, "none", "none", {}, 'temperature of the hottest sensor', ""),
     Entry(0x2A00, 9, "fault_record.period", "fault_record", "u32", "read", "", 0, 0, None, None, None, False, False, "none", "none", {}, 'control periods since start', ""),
-    Entry(0x3000, 0, "identification.count", "identification", "u8", "const", "", 0, 0, None, None, 16, False, False, "none", "none", {}, 'highest sub-index', ""),
-    Entry(0x3000, 1, "identification.command", "identification", "u8", "off", "", 0, 0, 0, 6, 0, False, False, "none", "none", {0: 'stop', 1: 'current offsets', 2: 'resistance and dead time', 3: 'inductances', 4: 'magnet flux', 5: 'inertia and friction', 6: 'all in turn'}, 'starts a routine; while one runs only 0 is taken, at any time', ""),
-    Entry(0x3000, 2, "identification.state", "identification", "u8", "read", "", 0, 0, None, None, None, False, False, "none", "none", {0: 'idle', 1: 'running', 2: 'done', 3: 'failed'}, 'of the routine', ""),
-    Entry(0x3000, 3, "identification.progress", "identification", "u8", "read", "1", -2, 0, None, None, None, False, False, "none", "none", {}, 'of the routine', ""),
-    Entry(0x3000, 4, "identification.reason", "identification", "u8", "read", "", 0, 0, None, None, None, False, False, "none", "none", {}, 'why it failed', ""),
+    Entry(0x3000, 0, "identification.count", "identification", "u8", "const", "", 0, 0, None, None, 17, False, False, "none", "none", {}, 'highest sub-index', ""),
+    Entry(0x3000, 1, "identification.command", "identification", "u8", "off", "", 0, 0, 0, 15, 0, False, False, "none", "none", {0: 'all', 1: 'resistance and dead time', 2: 'inductances', 4: 'magnet flux', 8: 'inertia and friction'}, ('what to identify, a sum; the offsets of the current sensors are measured at '
+ 'each start'), ""),
+    Entry(0x3000, 2, "identification.state", "identification", "u8", "read", "", 0, 0, None, None, None, False, False, "none", "none", {0: 'idle', 1: 'running', 2: 'done', 3: 'failed'}, 'of the identification', ""),
+    Entry(0x3000, 3, "identification.progress", "identification", "u8", "read", "1", -2, 0, None, None, None, False, False, "none", "none", {}, 'of the identification', ""),
+    Entry(0x3000, 4, "identification.reason", "identification", "u8", "read", "", 0, 0, None, None, None, False, False, "none", "none", {0: 'none', 1: 'no current at the highest voltage', 2: 'uneven currents of the phases', 3: 'implausible result', 4: 'the rotor does not follow', 5: 'aborted'}, 'why it failed', ""),
     Entry(0x3000, 5, "identification.R_s", "identification", "i32", "read", "ohm", -6, 0, None, None, None, False, False, "none", "none", {}, 'phase resistance', ""),
-    Entry(0x3000, 6, "identification.dead_voltage", "identification", "i32", "read", "V", -3, 0, None, None, None, False, False, "none", "none", {}, 'voltage lost by dead time and drops', "5.6.1.1 #57"),
+    Entry(0x3000, 6, "identification.dead_voltage", "identification", "i32", "read", "V", -3, 0, None, None, None, False, False, "none", "none", {}, 'voltage that a leg loses by dead time and drops', "5.6.1.1 #57"),
     Entry(0x3000, 7, "identification.L_d", "identification", "i32", "read", "H", -9, 0, None, None, None, False, False, "none", "none", {}, 'd-axis inductance at zero current', ""),
     Entry(0x3000, 8, "identification.L_q", "identification", "i32", "read", "H", -9, 0, None, None, None, False, False, "none", "none", {}, 'q-axis inductance at zero current', ""),
     Entry(0x3000, 9, "identification.L_q_rated", "identification", "i32", "read", "H", -9, 0, None, None, None, False, False, "none", "none", {}, 'apparent q-axis inductance at rated current', ""),
@@ -287,6 +288,7 @@ ENTRIES = (
     Entry(0x3000, 14, "identification.psi_m", "identification", "i32", "read", "Wb", -9, 0, None, None, None, False, False, "none", "none", {}, 'magnet flux linkage', ""),
     Entry(0x3000, 15, "identification.J", "identification", "i32", "read", "kg m2", -9, 0, None, None, None, False, False, "none", "none", {}, 'inertia of rotor and load', ""),
     Entry(0x3000, 16, "identification.friction", "identification", "i32", "read", "N m s", -9, 0, None, None, None, False, False, "none", "none", {}, 'viscous friction', ""),
+    Entry(0x3000, 17, "identification.coulomb", "identification", "i32", "read", "N m", -6, 0, None, None, None, False, False, "none", "none", {}, 'dry friction', ""),
     Entry(0x3100, 0, "trace.count", "trace", "u8", "const", "", 0, 0, None, None, 9, False, False, "none", "none", {}, 'highest sub-index', ""),
     Entry(0x3100, 1, "trace.command", "trace", "u8", "live", "", 0, 0, 0, 2, 0, False, False, "none", "none", {0: 'off', 1: 'arm', 2: 'trigger now'}, 'starts and ends recording', ""),
     Entry(0x3100, 2, "trace.state", "trace", "u8", "read", "", 0, 0, None, None, None, False, False, "none", "none", {0: 'off', 1: 'fills the time before the trigger', 2: 'waits for the trigger', 3: 'triggered', 4: 'complete'}, 'of the recording', ""),
@@ -334,8 +336,8 @@ ENTRIES = (
     Entry(0x605C, 0, "disable_option", "disable_option", "i16", "live", "", 0, 0, 0, 1, 1, False, True, "application", "none", {0: 'bridge off at once', 1: 'slow down then off'}, 'from operation enabled to switched on', ""),
     Entry(0x605D, 0, "halt_option", "halt_option", "i16", "live", "", 0, 0, 1, 1, 1, False, True, "application", "none", {1: 'slow down and stay'}, 'at a halt', ""),
     Entry(0x605E, 0, "fault_option", "fault_option", "i16", "live", "", 0, 0, 0, 0, 0, False, True, "application", "none", {0: 'bridge off at once'}, 'at a fault', ""),
-    Entry(0x6060, 0, "mode", "mode", "i8", "live", "", 0, 0, -1, 4, 3, False, False, "none", "rx", {-1: 'open-loop current', 0: 'none', 3: 'profile velocity', 4: 'profile torque'}, 'mode of operation; taken when the drive starts', ""),
-    Entry(0x6061, 0, "mode_display", "mode_display", "i8", "read", "", 0, 0, None, None, None, False, False, "none", "tx", {-1: 'open-loop current', 0: 'none', 3: 'profile velocity', 4: 'profile torque'}, 'mode of operation at work', ""),
+    Entry(0x6060, 0, "mode", "mode", "i8", "live", "", 0, 0, -2, 4, 3, False, False, "none", "rx", {-2: 'identification', -1: 'open-loop current', 0: 'none', 3: 'profile velocity', 4: 'profile torque'}, 'mode of operation; taken when the drive starts', ""),
+    Entry(0x6061, 0, "mode_display", "mode_display", "i8", "read", "", 0, 0, None, None, None, False, False, "none", "tx", {-2: 'identification', -1: 'open-loop current', 0: 'none', 3: 'profile velocity', 4: 'profile torque'}, 'mode of operation at work', ""),
     Entry(0x606B, 0, "velocity_demand", "velocity_demand", "i32", "read", "rad/s", -3, 0, None, None, None, False, False, "none", "tx", {}, 'reference of the speed after its ramp', ""),
     Entry(0x606C, 0, "velocity_actual", "velocity_actual", "i32", "read", "rad/s", -3, 0, None, None, None, False, False, "none", "tx", {}, 'estimated speed, mechanical', ""),
     Entry(0x606D, 0, "velocity_window", "velocity_window", "u16", "live", "rad/s", -3, 0, None, None, 1000, False, True, "application", "none", {}, 'target reached within this distance', ""),
@@ -349,7 +351,8 @@ ENTRIES = (
     Entry(0x6083, 0, "profile_acceleration", "profile_acceleration", "u32", "live", "rad/s2", -3, 0, 100, 1000000000, 200000, False, False, "none", "none", {}, 'slope of the speed reference: the parameter `acceleration`', ""),
     Entry(0x60A9, 0, "si_unit_velocity", "si_unit_velocity", "u32", "const", "", 0, 0, None, None, 4245684992, False, False, "none", "none", {}, 'unit of the velocities: 0.001 rad/s', ""),
     Entry(0x60FF, 0, "target_velocity", "target_velocity", "i32", "live", "rad/s", -3, 0, -20000000, 20000000, 0, False, False, "none", "rx", {}, 'reference of the speed, mechanical', ""),
-    Entry(0x6502, 0, "supported_modes", "supported_modes", "u32", "const", "", 0, 0, None, None, 65548, False, False, "none", "none", {}, 'profile velocity, profile torque, open-loop current (bit 16)', ""),
+    Entry(0x6502, 0, "supported_modes", "supported_modes", "u32", "const", "", 0, 0, None, None, 196620, False, False, "none", "none", {}, ('profile velocity, profile torque, open-loop current (bit 16), identification '
+ '(bit 17)'), ""),
 )
 
 # By the code of drive_fault, from 1
