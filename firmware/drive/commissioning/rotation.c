@@ -26,6 +26,8 @@ void rotation_enter(drive_t *drive)
     self->of.rotation.omega =
         pm_clamp(drive->omega_target, -drive->config.omega_max, drive->config.omega_max);
     self->of.rotation.count = 0;
+    self->of.rotation.omega_ref = 0;
+    self->of.rotation.u_d = drive->u.d;
 }
 
 static pm_q_t ramp_step(const commissioning_t *self)
@@ -46,7 +48,7 @@ static void take_torque(drive_t *drive)
 {
     commissioning_t *self = &drive->identify.work;
     const pm_q_t top = pm_abs(self->of.rotation.omega);
-    const pm_q_t omega = pm_abs(drive->omega_open);
+    const pm_q_t omega = pm_abs(self->of.rotation.omega_ref);
     if (omega > top / 2 && omega < top - top / 10) {
         self->sum[TORQUE] += torque_voltage(self, omega);
         self->of.rotation.count++;
@@ -62,13 +64,32 @@ static pm_q_t mean_torque(const commissioning_t *self)
     return count == 0 ? 0 : (pm_q_t)(self->sum[TORQUE] / count);
 }
 
+/* A rotor on a vector that turns by itself swings like a pendulum. u_d rises by u_q per radian that it falls
+ * behind; the vector then waits for it: 30 rad/s per radian. */
+static void turn_on(drive_t *drive, pm_q_t target)
+{
+    commissioning_t *self = &drive->identify.work;
+    const pm_q_t ref = commissioning_approach(self->of.rotation.omega_ref, target, ramp_step(self));
+    const pm_q_t off = drive->u.d - self->of.rotation.u_d;
+    self->of.rotation.u_d += off / 256;
+    self->of.rotation.omega_ref = ref;
+    drive->omega_open = ref;
+    if (pm_abs(ref) > pm_abs(self->of.rotation.omega) / 4) {
+        const pm_q_t behind = pm_clamp(pm_div(off, pm_abs(drive->u.q)), -PM_Q(0.3), PM_Q(0.3));
+        /* per-unit: 0.03 over the radians of a millisecond at base speed */
+        const pm_q_t per_ms = commissioning_period(drive) * (int32_t)drive->config.slow_divider;
+        const pm_q_t back = pm_mul(behind, pm_div(PM_Q(0.03), per_ms));
+        drive->omega_open -= ref < 0 ? -back : back;
+    }
+}
+
 phase_result_t rotation_up(drive_t *drive)
 {
     commissioning_t *self = &drive->identify.work;
     take_torque(drive);
-    drive->omega_open = commissioning_approach(drive->omega_open, self->of.rotation.omega, ramp_step(self));
+    turn_on(drive, self->of.rotation.omega);
     self->of.rotation.tau_up = mean_torque(self);
-    return (phase_result_t){.done = drive->omega_open == self->of.rotation.omega};
+    return (phase_result_t){.done = self->of.rotation.omega_ref == self->of.rotation.omega};
 }
 
 static active_t active_flux(const drive_t *drive)
@@ -100,6 +121,7 @@ static const phase_result_t stuck = {.failed = COMMISSIONING_NOT_TURNING};
 phase_result_t rotation_full(drive_t *drive)
 {
     commissioning_t *self = &drive->identify.work;
+    turn_on(drive, self->of.rotation.omega);
     if (!is_measured(self)) {
         return running;
     }
@@ -107,7 +129,7 @@ phase_result_t rotation_full(drive_t *drive)
     if (!active.follows) {
         return stuck;
     }
-    self->of.rotation.tau_even = torque_voltage(self, pm_abs(drive->omega_open));
+    self->of.rotation.tau_even = torque_voltage(self, pm_abs(self->of.rotation.omega));
     return (phase_result_t){.done = true};
 }
 
@@ -118,6 +140,7 @@ phase_result_t rotation_less(drive_t *drive)
     commissioning_result_t *r = &drive->commissioning_report.result;
     const pm_q_t half = commissioning_current(drive) / 4;
     drive->i_ref.d = commissioning_approach(drive->i_ref.d, half, half / 64 + 1);
+    turn_on(drive, self->of.rotation.omega);
     if (!is_measured(self)) {
         return running;
     }
@@ -152,13 +175,14 @@ phase_result_t rotation_down(drive_t *drive)
     const pm_q_t full = commissioning_current(drive) / 2;
     if (self->ms < SETTLE_MS) {
         drive->i_ref.d = commissioning_approach(drive->i_ref.d, full, full / 64 + 1);
+        turn_on(drive, self->of.rotation.omega);
         commissioning_clear_sums(self);
         self->of.rotation.count = 0;
         return running;
     }
     take_torque(drive);
-    drive->omega_open = commissioning_approach(drive->omega_open, 0, ramp_step(self));
-    if (drive->omega_open != 0) {
+    turn_on(drive, 0);
+    if (self->of.rotation.omega_ref != 0) {
         return running;
     }
     const pm_q_t tau_down = mean_torque(self);

@@ -34,7 +34,7 @@ def values(x, bandwidth=None):
     v_injection, leads = _injection(x)
     position_Hz = min(max(math.sqrt(0.8 * jerk * x["pole_pairs"]) / (2 * math.pi), 25.0), 60.0)
     lag = 0.12 * (2 * math.pi * position_Hz) ** 2 / x["pole_pairs"]  # acceleration for 0.12 rad behind
-    low, high = (0.18, 0.34) if leads else (0.05, 0.10)
+    low, high = (0.18, 0.34) if leads else (0.04, 0.08)
     return {
         "current_bandwidth": bandwidth or min(x["f_pwm"] / 20, 1500.0),
         "speed_bandwidth": min(max(6 * jerk / rated_speed / (2 * math.pi), 2.0), 10.0),
