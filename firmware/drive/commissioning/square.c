@@ -56,7 +56,7 @@ static void take(drive_t *drive, pm_ab_t v)
     if (self->of.square.on_q) {
         self->sum[SUM_FLUX] += v.beta < 0 ? -w.beta : w.beta;
         self->sum[SUM_CURRENT] += v.beta < 0 ? -di.beta : di.beta;
-        const pm_q_t far = pm_mul(self->of.square.wanted, PM_Q(0.7)); /* near the current that it is for */
+        const pm_q_t far = pm_mul(self->of.square.wanted, PM_Q(0.8)); /* near the current that it is for */
         const pm_q_t x = pm_abs(mean.beta) > far ? pm_mul(mean.beta, di.beta) : 0;
         self->sum[SUM_D_FLUX] += (int64_t)w.alpha * x / FINE;
         self->sum[SUM_D_CURRENT] += (int64_t)di.alpha * x / FINE;
