@@ -36,6 +36,7 @@ def values(x, bandwidth=None):
     v_injection, leads = _injection(x)
     position_Hz = min(max(math.sqrt(0.8 * jerk * x["pole_pairs"]) / (2 * math.pi), 25.0), 60.0)
     lag = 0.12 * (2 * math.pi * position_Hz) ** 2 / x["pole_pairs"]  # acceleration for 0.12 rad behind
+    ripple = x["v_dc_nominal"] / (x["L_d"] * x["f_pwm"])  # of the current by the pulses: light load must be beyond it
     low, high = (0.15, 0.27) if leads else (0.04, 0.08)
     return {
         "current_bandwidth": bandwidth or min(x["f_pwm"] / 20, 1500.0),
@@ -45,7 +46,7 @@ def values(x, bandwidth=None):
         "flux_gain": 0.5 if x["L_q_rated"] < 0.985 * x["L_q"] else 1.0,
         "speed_low": low * rated_speed,
         "speed_high": high * rated_speed,
-        "i_d_light": 0.1 * x["i_rated"],
+        "i_d_light": min(max(0.1 * x["i_rated"], 0.05 * ripple), 0.2 * x["i_rated"]),
         "i_fw_max": 0.5 * x["i_rated"],
         "comp_zone": 12 * 2 * x["i_full_scale"] / STEPS,
         "v_injection": v_injection,
