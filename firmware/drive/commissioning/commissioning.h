@@ -92,6 +92,7 @@ typedef struct {
             pm_q_t omega, omega_ref; /* at the top, and now, without what damps the swing */
             pm_q_t u_d;              /* mean of a quarter of a second */
             int32_t count;           /* of the torques in the sum */
+            pm_q_t psi_full;         /* magnet flux, measured at full current */
             pm_q_t tau_up, tau_even; /* u_d / omega while speeding up, at speed */
         } rotation;
     } of;

@@ -16,7 +16,7 @@
 enum { U_D, U_Q, I_D, I_Q, TORQUE }; /* of the sums */
 
 typedef struct {
-    pm_q_t length, i_d;
+    pm_q_t psi; /* of the magnet */
     bool follows;
 } active_t;
 
@@ -103,8 +103,10 @@ static active_t active_flux(const drive_t *drive)
     const pm_q_t d = pm_div(e_q, speed) - pm_mul(self->L_q, i);
     const pm_q_t q = pm_div(e_d, speed);
     const pm_q_t length = pm_hypot(d, q);
-    const bool follows = d > pm_mul(self->L_q, i) / 8 && pm_abs(q) < 2 * d;
-    return (active_t){.length = length, .i_d = pm_mul(i, pm_div(d, pm_max(length, 1))), .follows = follows};
+    const pm_q_t i_d = pm_mul(i, pm_div(d, pm_max(length, 1)));
+    const pm_q_t psi = length + pm_mul(self->L_q - self->L_d, i_d);
+    const bool follows = d > pm_mul(self->L_q, i) / 8 && pm_abs(q) < 2 * d && psi > 0;
+    return (active_t){.psi = psi, .follows = follows};
 }
 
 static bool is_measured(commissioning_t *self)
@@ -129,6 +131,7 @@ phase_result_t rotation_full(drive_t *drive)
     if (!active.follows) {
         return stuck;
     }
+    self->of.rotation.psi_full = active.psi;
     self->of.rotation.tau_even = torque_voltage(self, pm_abs(self->of.rotation.omega));
     return (phase_result_t){.done = true};
 }
@@ -145,11 +148,11 @@ phase_result_t rotation_less(drive_t *drive)
         return running;
     }
     const active_t active = active_flux(drive);
-    if (!active.follows) {
+    /* what the current alone makes of a rotor that stands would be half now */
+    if (!active.follows || active.psi < pm_mul(self->of.rotation.psi_full, PM_Q(0.75))) {
         return stuck;
     }
-    const pm_q_t psi = active.length + pm_mul(self->L_q - self->L_d, active.i_d);
-    r->psi_m = psi;
+    r->psi_m = active.psi;
     return (phase_result_t){.done = true};
 }
 

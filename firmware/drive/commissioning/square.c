@@ -56,7 +56,7 @@ static void take(drive_t *drive, pm_ab_t v)
     if (self->of.square.on_q) {
         self->sum[SUM_FLUX] += v.beta < 0 ? -w.beta : w.beta;
         self->sum[SUM_CURRENT] += v.beta < 0 ? -di.beta : di.beta;
-        const pm_q_t far = pm_mul(self->of.square.wanted, PM_Q(0.7)); /* near the current that it is for */
+        const pm_q_t far = pm_mul(self->of.square.wanted, PM_Q(0.8)); /* near the current that it is for */
         const pm_q_t x = pm_abs(mean.beta) > far ? pm_mul(mean.beta, di.beta) : 0;
         self->sum[SUM_D_FLUX] += (int64_t)w.alpha * x / FINE;
         self->sum[SUM_D_CURRENT] += (int64_t)di.alpha * x / FINE;
@@ -73,11 +73,14 @@ static uint32_t settling(const square_t *square)
     return square->bias != 0 ? 1U : SETTLE_CYCLES;
 }
 
-/* A whole wave has ended. */
+/* A whole wave has ended, in the middle of its rise: the current is zero, and a change of the voltage here
+ * leaves no mean behind, which would turn the rotor. */
 static void judge(drive_t *drive, square_t *square)
 {
     const uint32_t cycles = square->bias != 0 ? BIASED_CYCLES : CYCLES;
-    if (square->state == (uint8_t)SQUARE_MEASURES) {
+    if (square->leading) {
+        square->leading = false; /* not a whole one */
+    } else if (square->state == (uint8_t)SQUARE_MEASURES) {
         square->cycles++;
         if (square->cycles >= settling(square) + cycles) {
             square->state = (uint8_t)SQUARE_DONE;
@@ -90,6 +93,7 @@ static void judge(drive_t *drive, square_t *square)
         if (square->voltage > pm_mul(drive->status.v_dc, PM_Q(0.4))) {
             square->voltage /= 2;
             square->half = (uint16_t)(2U * square->half);
+            square->count = square->half / 2U;
             if (square->half > SQUARE_LONGEST) {
                 square->state = (uint8_t)SQUARE_FAILED;
             }
@@ -101,15 +105,10 @@ static void judge(drive_t *drive, square_t *square)
 
 /* The first waves are such that the rotor has no speed when the current is at its peaks: then its mean speed
  * is zero, too. */
-static void flip(drive_t *drive, square_t *square)
+static void flip(square_t *square)
 {
-    const bool leading = square->leading;
-    square->count = leading ? (uint16_t)((uint32_t)square->half * 146U / 1000U) : 0U;
+    square->count = square->leading ? (uint16_t)((uint32_t)square->half * 146U / 1000U) : 0U;
     square->up = !square->up;
-    square->leading = false;
-    if (square->up && !leading) {
-        judge(drive, square);
-    }
 }
 
 void square_step(drive_t *drive, pm_ab_t v_past)
@@ -126,8 +125,11 @@ void square_step(drive_t *drive, pm_ab_t v_past)
     if (square->state == (uint8_t)SQUARE_MEASURES && square->cycles >= settling(square)) {
         take(drive, v_past);
     }
-    if (square->count >= square->half && square->state < (uint8_t)SQUARE_DONE) {
-        flip(drive, square);
+    if (square->count >= square->half) {
+        flip(square);
+    }
+    if (square->up && square->count == square->half / 2U && square->state < (uint8_t)SQUARE_DONE) {
+        judge(drive, square);
     }
     square->count++;
     const pm_q_t v = square->state < (uint8_t)SQUARE_DONE ? square->voltage : 0;
