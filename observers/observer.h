@@ -23,6 +23,7 @@
 #include "observers/back_emf.h"
 #include "observers/extended_emf.h"
 #include "observers/extended_emf_ab.h"
+#include "observers/flux_linkage.h"
 
 typedef enum {
 #define PM_OBSERVER(name, help) OBSERVER_##name,

@@ -37,6 +37,12 @@ inline void configure(emf_config_t &c, const Machine &m, const Base &b)
     c = emf_config(m, b);
 }
 
+inline void configure(flux_linkage_config_t &c, const Machine &m, const Base &b)
+{
+    c.flux = flux_config(m, b);
+    c.g = PM_Q(0.5);
+}
+
 } // namespace observers
 
 inline std::vector<ObserverCase> observer_cases(const Machine &m = kIpmLinear, const Base &b = kIpmBase)
