@@ -16,5 +16,6 @@ extern "C" {
 #include "injection/initial_pulses.h"
 #include "injection/pulsating_square.h"
 #include "observers/active_flux.h"
+#include "observers/sliding_mode.h"
 }
 #pragma GCC diagnostic pop

@@ -12,6 +12,7 @@
 
 #include "tests/contract/bench.h"
 #include "tests/unit/math/samples.h"
+#include "tests/unit/observers/sliding_mode_bench.h"
 
 namespace
 {
@@ -76,6 +77,30 @@ class ActiveFlux : public Source
     obs_out_t none_ = {};
 };
 
+class SlidingMode : public Source
+{
+  public:
+    SlidingMode()
+    {
+        std::memset(&state_, 0xa5, sizeof state_);
+    }
+    void reset(const obs_in_t &in) override
+    {
+        sliding_mode_reset(&state_, &config_, &in);
+    }
+    obs_out_t step(const obs_in_t &in) override
+    {
+        obs_out_t out;
+        sliding_mode_step(&state_, &config_, &in, &out);
+        return out;
+    }
+
+  private:
+    sliding_mode_config_t config_ =
+        bench::sliding_mode_config(kMachine, kBase, SLIDING_MODE_SATURATION, false);
+    sliding_mode_t state_;
+};
+
 class PulsatingSquare : public Source
 {
   public:
@@ -124,6 +149,7 @@ template <class T> Entry entry(const char *name, double omega_pu)
 // The sources.
 const Entry kSources[] = {
     entry<ActiveFlux>("active_flux", 0.4),
+    entry<SlidingMode>("sliding_mode", 0.4),
     entry<PulsatingSquare>("pulsating_square", 0.05),
 };
 
