@@ -32,8 +32,8 @@ static void set_reference(active_flux_t *self, pm_q_t psi)
 /* What depends on current, speed and temperature, which change little within a millisecond. */
 static void set_operating_point(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in)
 {
-    const pm_q_t L_q = config->L_q + pm_mul(config->L_q2, pm_mul(in->i_dq.q, in->i_dq.q));
-    self->drop = to_drop(pm_frac(self->R, config->t_s));
+    const pm_q_t L_q = observer_L_q(&config->model, in->i_dq.q);
+    self->drop = to_drop(pm_frac(self->R, config->model.t_s));
     self->inductance = pm_add_sat(to_inductance(L_q), self->drop / 4); /* R T_s / 2 */
     self->k_amplitude = to_feedback(pm_mul(pm_abs(in->omega), config->g));
 }
@@ -43,16 +43,11 @@ void active_flux_tie(active_flux_t *self, const active_flux_config_t *config)
     self->k_seed = to_feedback(config->k_seed);
 }
 
-static pm_q_t nominal(const active_flux_config_t *config, pm_q_t i_d)
-{
-    return config->psi_m + pm_mul(config->L_d - config->L_q, i_d);
-}
-
 void active_flux_reset(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in)
 {
-    self->R = config->R;
-    self->step = config->t_s / 4;
-    set_reference(self, nominal(config, in->i_dq.d));
+    self->R = config->model.R;
+    self->step = config->model.t_s / 4;
+    set_reference(self, observer_active_flux(&config->model, in->i_dq.d));
     set_operating_point(self, config, in);
     active_flux_tie(self, config);
     const pm_dq_t drawn = {.d = pm_mulh(self->inductance, in->i_dq.d),
@@ -111,24 +106,16 @@ obs_out_t active_flux_last(const active_flux_t *self)
     return out;
 }
 
-static void follow_resistance(active_flux_t *self, const active_flux_config_t *config, pm_q_t psi_q,
-                              pm_q_t i_q)
-{
-    const pm_q_t change = pm_narrow(pm_gain(pm_mul(psi_q, i_q), config->k_R));
-    self->R = pm_clamp(self->R + change, config->R_min, config->R_max);
-}
-
 void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in,
                       const obs_out_t *out, pm_q_t weight)
 {
-    const pm_q_t centre = nominal(config, in->i_dq.d);
+    const pm_q_t centre = observer_active_flux(&config->model, in->i_dq.d);
     if (weight == 0) {
         /* tied to the position, the flux says nothing of the amplitude */
         active_flux_tie(self, config);
         set_reference(self, centre);
-        if (pm_abs(in->omega) < config->omega_R) {
-            follow_resistance(self, config, out->vector.q, in->i_dq.q);
-        }
+        const pm_q_t lack = pm_mul(out->vector.q, in->i_dq.q);
+        self->R = observer_resistance(&config->resistance, self->R, in->omega, lack);
     } else {
         const pm_q_t band = pm_mul(centre, BAND);
         const pm_q_t psi = self->psi_ref + pm_frac(out->vector.d - self->psi_ref, config->k_adapt);

@@ -24,20 +24,14 @@
 #ifndef OBSERVERS_ACTIVE_FLUX_H
 #define OBSERVERS_ACTIVE_FLUX_H
 
-#include "firmware/math/estimate.h"
+#include "observers/model.h"
 
 typedef struct {
-    pm_q_t R;
-    pm_q_t L_d, L_q;
-    pm_q_t L_q2; /* change of L_q with i_q^2, <= 0 */
-    pm_q_t psi_m;
-    pm_frac_t t_s;     /* T_s w_base, Q32 */
+    observer_model_t model;
+    observer_resistance_t resistance;
     pm_frac_t g;       /* amplitude feedback per radian: g T_s w_base, Q32 */
     pm_frac_t k_adapt; /* filter constant of psi_ref per slow step */
     pm_frac_t k_seed;  /* T_s k_q at weight 0, Q32 */
-    pm_gain_t k_R;     /* adaptation of R per slow step, Q26; 0: off */
-    pm_q_t R_min, R_max;
-    pm_q_t omega_R; /* R adapts below this speed: above, errors of psi_m outweigh it */
 } active_flux_config_t;
 
 typedef struct {

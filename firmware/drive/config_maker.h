@@ -98,6 +98,9 @@ void make_speed(maker_t *m, speed_control_config_t *c);
 void make_flux_weakening(maker_t *m, field_weakening_config_t *c);
 void make_mtpa(maker_t *m, mtpa_config_t *c);
 
+/* config_observer.c */
+void make_observer(maker_t *m, observer_config_t *c);
+
 /* config_position.c */
 bool salient(const maker_t *m);
 void make_position(maker_t *m, position_config_t *c, bool injection);

@@ -14,39 +14,6 @@ static pm_pll_config_t make_pll(maker_t *m, drive_param_id_t bandwidth)
     };
 }
 
-static void make_flux(maker_t *m, active_flux_config_t *c)
-{
-    const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
-    const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
-    const pm_num_t change = pm_num_sub(si(m, DRIVE_PARAM_L_q_rated), si(m, DRIVE_PARAM_L_q));
-    c->R = per_unit(m, DRIVE_PARAM_R_s, m->impedance);
-    c->L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
-    c->L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);
-    /* the observer holds it in Q29 */
-    (void)fixed(m, pm_num_div(si(m, DRIVE_PARAM_L_q), m->inductance), Q_BITS + 1, DRIVE_PARAM_L_q);
-    c->L_q2 = 0;
-    if (m->params->saturation_comp != 0) {
-        c->L_q2 = fixed(m, pm_num_div(pm_num_div(change, m->inductance), square(i_rated)), Q_BITS,
-                        DRIVE_PARAM_L_q_rated);
-    }
-    c->psi_m = per_unit(m, DRIVE_PARAM_psi_m, m->base.psi);
-    c->t_s = fixed(m, step, FRAC_BITS, DRIVE_PARAM_f_pwm);
-    c->g = fixed(m, pm_num_mul(si(m, DRIVE_PARAM_flux_gain), step), FRAC_BITS, DRIVE_PARAM_flux_gain);
-    c->k_adapt = PM_FRAC(0.01);
-    /* tie of 300 rad/s; R follows in 8 ms at rated current */
-    const pm_num_t tie = pm_num(300);
-    const pm_num_t follow = pm_num_ratio(1, 8);
-    c->k_seed = fixed(m, pm_num_mul(tie, m->base.t_s), FRAC_BITS, DRIVE_PARAM_f_pwm);
-    c->k_R = 0;
-    if (m->params->resistance_adaptation != 0) {
-        const pm_num_t k_R = pm_num_div(pm_num_mul(follow, tie), pm_num_mul(m->base.omega, square(i_rated)));
-        c->k_R = fixed(m, k_R, GAIN_BITS, DRIVE_PARAM_i_rated);
-    }
-    c->omega_R = speed(m, DRIVE_PARAM_speed_low) / 2;
-    c->R_min = c->R / 2;
-    c->R_max = c->R < PM_Q(4.0) ? c->R * 2 : PM_Q(7.9);
-}
-
 typedef struct {
     pm_num_t L_d, L_q, L_dq;
 } inductances_t;
@@ -162,7 +129,7 @@ static int32_t per_span(maker_t *m)
 
 void make_position(maker_t *m, position_config_t *c, bool injection)
 {
-    make_flux(m, &c->flux);
+    make_observer(m, &c->observer);
     c->injection = injection;
     c->omega_low = speed(m, DRIVE_PARAM_speed_low);
     c->omega_high = speed(m, DRIVE_PARAM_speed_high);

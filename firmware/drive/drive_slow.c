@@ -96,7 +96,7 @@ static void find(drive_t *drive)
         }
         break;
     default:
-        position_slow(&drive->position, &drive->config.position, drive->status.i);
+        position_slow(&drive->position, &drive->config.position, drive->i_ab, drive->status.i);
         drive->i_ref = (pm_dq_t){0, 0};
         if (drive->state_ms >= SETTLE_MS) {
             reference_reset(drive, 0);
@@ -109,7 +109,7 @@ static void find(drive_t *drive)
 static void run(drive_t *drive)
 {
     const position_config_t *c = &drive->config.position;
-    position_slow(&drive->position, c, drive->status.i);
+    position_slow(&drive->position, c, drive->i_ab, drive->status.i);
     if (drive->stage == STAGE_OPEN_LOOP) {
         open_loop_slow(drive);
         return;

@@ -22,7 +22,7 @@ void position_reset(position_t *self, const position_config_t *config, pm_angle_
                          .quality = PM_ONE};
     const pm_dir_t dir = pm_dir(theta);
     const obs_in_t in = {.i = i, .dir = dir, .i_dq = pm_park(i, dir)};
-    active_flux_reset(&self->flux, &config->flux, &in);
+    observer_reset(&self->observer, &config->observer, &in);
     pulsating_square_reset(&self->square, &config->square, i);
 }
 
@@ -40,9 +40,9 @@ void position_step(position_t *self, const position_config_t *config, pm_ab_t v,
     }
     const pm_dq_t i_dq = pm_park_half(twice, dir);
     const obs_in_t in = {.v = v, .i = i, .dir = dir, .omega = pll.omega, .i_dq = i_dq};
-    obs_out_t flux;
-    active_flux_step(&self->flux, &config->flux, &in, &flux);
-    pm_q_t eps = flux.eps;
+    obs_out_t seen;
+    observer_step(&self->observer, &config->observer, &in, &seen);
+    pm_q_t eps = seen.eps;
     if (inject) {
         obs_out_t square;
         pulsating_square_demodulate(&self->square, &config->square, &in, &square);
@@ -55,7 +55,7 @@ void position_step(position_t *self, const position_config_t *config, pm_ab_t v,
 
 void position_lead(position_t *self, const position_config_t *config, const pm_pll_t *imposed)
 {
-    active_flux_tie(&self->flux, &config->flux);
+    observer_tie(&self->observer, &config->observer);
     self->pll = *imposed;
     self->pll.theta -= (pm_angle_t)pm_omega_to_angle(imposed->omega, self->gains.k_theta);
 }
@@ -65,7 +65,7 @@ void position_follow(position_t *self, const pm_pll_t *imposed)
     self->pll = *imposed;
 }
 
-static void set_weight(position_t *self, const position_config_t *config)
+static void set_weight(position_t *self, const position_config_t *config, pm_ab_t i)
 {
     const pm_q_t speed = pm_abs(pm_lp1(&self->omega_mean, self->pll.omega, K_SPEED));
     if (!config->injection) {
@@ -78,7 +78,7 @@ static void set_weight(position_t *self, const position_config_t *config)
     }
     if (!self->inject && speed < config->omega_high) {
         self->inject = true;
-        pulsating_square_reset(&self->square, &config->square, self->flux.i);
+        pulsating_square_reset(&self->square, &config->square, i);
     } else if (self->inject && speed > config->omega_high + config->omega_high / 8) {
         self->inject = false;
     }
@@ -96,12 +96,12 @@ static pm_q_t magnitude_after(pm_q_t *filter, pm_q_t x)
 
 /* Means of magnitudes: a source that has slipped shows errors of either sign, slower than the noise that is
  * filtered before. Whichever leads, both must agree. */
-static void set_quality(position_t *self, const position_config_t *config, const obs_out_t *flux)
+static void set_quality(position_t *self, const position_config_t *config, const obs_out_t *seen)
 {
     const pm_q_t square_eps = magnitude_after(&self->square_eps, self->square.eps);
-    /* also while the flux is tied: an EMF that the position does not explain */
-    pm_q_t eps = magnitude_after(&self->flux_eps, flux->eps);
-    pm_q_t misfit = self->weight > 0 ? pm_abs(flux->misfit) : 0;
+    /* also while the observer is tied: an EMF that the position does not explain */
+    pm_q_t eps = magnitude_after(&self->observer_eps, seen->eps);
+    pm_q_t misfit = self->weight > 0 ? pm_abs(seen->misfit) : 0;
     if (self->weight < PM_ONE) {
         eps = pm_max(eps, square_eps);
         misfit = pm_max(misfit, pm_abs(pulsating_square_misfit(&self->square, &config->square)));
@@ -113,14 +113,14 @@ static void set_quality(position_t *self, const position_config_t *config, const
     self->quality = pm_max(0, PM_ONE - worst);
 }
 
-void position_slow(position_t *self, const position_config_t *config, pm_dq_t i)
+void position_slow(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq)
 {
-    const obs_in_t in = {.omega = self->pll.omega, .i_dq = i};
-    const obs_out_t flux = active_flux_last(&self->flux);
-    set_weight(self, config);
+    const obs_in_t in = {.omega = self->pll.omega, .i = i, .i_dq = i_dq};
+    const obs_out_t seen = observer_last(&self->observer, &config->observer);
+    set_weight(self, config, i);
     pulsating_square_slow(&self->square, &config->square, &in);
     self->gains.kp_turn = between(config->pll_low.kp_turn, config->pll_high.kp_turn, self->weight);
     self->gains.ki = between(config->pll_low.ki, config->pll_high.ki, self->weight);
-    active_flux_slow(&self->flux, &config->flux, &in, &flux, self->weight);
-    set_quality(self, config, &flux);
+    observer_slow(&self->observer, &config->observer, &in, &seen, self->weight);
+    set_quality(self, config, &seen);
 }

@@ -1,7 +1,7 @@
-/* The position of the rotor: injection at low speed, active flux above, one phase-locked loop
+/* The position of the rotor: injection at low speed, an observer above, one phase-locked loop
  * (METHODS.md 5.9, row 69).
  *
- *   eps = eps_injection + weight (eps_flux - eps_injection)
+ *   eps = eps_injection + weight (eps_observer - eps_injection)
  * weight goes from 0 at omega_low to 1 at omega_high; the carrier is on below omega_high and off above 1.1
  * omega_high (hysteresis). The loop's bandwidth moves with the weight. This is the only place that knows both
  * sources. Quality: 1 while the sources agree with the measurement, 0 when the position is lost. Tests:
@@ -12,10 +12,10 @@
 #include "firmware/math/estimate.h"
 #include "firmware/math/pll.h"
 #include "injection/pulsating_square.h"
-#include "observers/active_flux.h"
+#include "observers/observer.h"
 
 typedef struct {
-    active_flux_config_t flux;
+    observer_config_t observer;
     pulsating_square_config_t square;
     pm_pll_config_t pll_low, pll_high;
     pm_q_t omega_low, omega_high;
@@ -26,12 +26,12 @@ typedef struct {
 typedef struct {
     pm_pll_t pll;
     pm_pll_config_t gains; /* between pll_low and pll_high */
-    active_flux_t flux;
+    observer_t observer;
     pulsating_square_t square;
-    pm_q_t weight;               /* 0: injection, 1: flux observer */
-    bool inject;                 /* carrier on */
-    pm_q_t omega_mean;           /* filtered for the weight */
-    pm_q_t flux_eps, square_eps; /* without noise, for the quality */
+    pm_q_t weight;                   /* 0: injection, 1: observer */
+    bool inject;                     /* carrier on */
+    pm_q_t omega_mean;               /* filtered for the weight */
+    pm_q_t observer_eps, square_eps; /* without noise, for the quality */
     pm_q_t eps_mean;
     pm_q_t misfit_mean;
     pm_q_t quality;
@@ -51,11 +51,12 @@ void position_step(position_t *self, const position_config_t *config, pm_ab_t v,
                    position_out_t *out);
 
 /* While the rotor follows a given vector (align, open-loop start) the step stands between these two:
- * `imposed` takes the place of the loop, and the flux is tied to it. */
+ * `imposed` takes the place of the loop, and the observer is tied to it. */
 void position_lead(position_t *self, const position_config_t *config, const pm_pll_t *imposed);
 void position_follow(position_t *self, const pm_pll_t *imposed);
 
-/* At 1 kHz: weight, carrier, loop gains, quality. */
-void position_slow(position_t *self, const position_config_t *config, pm_dq_t i);
+/* At 1 kHz, with the current of the last step and the same in its frame: weight, carrier, loop gains,
+ * quality. */
+void position_slow(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq);
 
 #endif

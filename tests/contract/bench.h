@@ -136,6 +136,26 @@ struct Base {
 constexpr Base kIpmBase = {450, 10, 540, 100e-6};
 constexpr Base kSpmBase = {60, 10, 360, 100e-6};
 
+// observers/model.h.
+inline observer_model_t model(const Machine &m, const Base &b, double L_d_H, double L_q_H, double L_q_rated_H,
+                              double i_rated_A)
+{
+    const double i_rated = i_rated_A / b.i_A;
+    observer_model_t c = {};
+    c.R = fixed(m.R_ohm / b.impedance_ohm(), 28);
+    c.L_d = fixed(L_d_H / b.inductance_H(), 28);
+    c.L_q = fixed(L_q_H / b.inductance_H(), 28);
+    c.L_q2 = fixed((L_q_rated_H - L_q_H) / b.inductance_H() / (i_rated * i_rated), 28);
+    c.psi_m = fixed(m.psi_m_Wb / b.psi_Wb(), 28);
+    c.t_s = fixed(b.period_s * b.omega_rad_s, 32);
+    return c;
+}
+
+inline observer_model_t model(const Machine &linear, const Base &b)
+{
+    return model(linear, b, linear.L_d0_H, linear.L_q0_H, linear.L_q0_H, 4.0);
+}
+
 // observers/active_flux.h. Tie 300 rad/s, R follows in 8 ms at i_rated, amplitude filter 100 ms.
 inline active_flux_config_t flux_config(const Machine &m, const Base &b, double L_d_H, double L_q_H,
                                         double L_q_rated_H, double i_rated_A, double g = 0.5)
@@ -143,19 +163,14 @@ inline active_flux_config_t flux_config(const Machine &m, const Base &b, double 
     const double step = b.period_s * b.omega_rad_s;
     const double i_rated = i_rated_A / b.i_A;
     active_flux_config_t c = {};
-    c.R = fixed(m.R_ohm / b.impedance_ohm(), 28);
-    c.L_d = fixed(L_d_H / b.inductance_H(), 28);
-    c.L_q = fixed(L_q_H / b.inductance_H(), 28);
-    c.L_q2 = fixed((L_q_rated_H - L_q_H) / b.inductance_H() / (i_rated * i_rated), 28);
-    c.psi_m = fixed(m.psi_m_Wb / b.psi_Wb(), 28);
-    c.t_s = fixed(step, 32);
+    c.model = model(m, b, L_d_H, L_q_H, L_q_rated_H, i_rated_A);
     c.g = fixed(g * step, 32);
     c.k_adapt = fixed(0.01, 32);
     c.k_seed = fixed(300 * b.period_s, 32);
-    c.k_R = fixed(300.0 / 8 / (b.omega_rad_s * i_rated * i_rated), 26);
-    c.R_min = c.R / 2;
-    c.R_max = c.R * 2;
-    c.omega_R = PM_Q(0.06);
+    c.resistance.k = fixed(300.0 / 8 / (b.omega_rad_s * i_rated * i_rated), 26);
+    c.resistance.min = c.model.R / 2;
+    c.resistance.max = c.model.R * 2;
+    c.resistance.omega = PM_Q(0.06);
     return c;
 }
 

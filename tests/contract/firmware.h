@@ -15,7 +15,6 @@ extern "C" {
 #include "firmware/math/estimate.h"
 #include "injection/initial_pulses.h"
 #include "injection/pulsating_square.h"
-#include "observers/active_flux.h"
-#include "observers/sliding_mode.h"
+#include "observers/observer.h"
 }
 #pragma GCC diagnostic pop

@@ -1,5 +1,5 @@
-// What every position source owes drive/position.c, whatever its method. A new source is an adapter and a
-// line of the table at the end of the adapters.
+// What every position source owes drive/position.c, whatever its method: all observers of observers.def and
+// the injections.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,11 +8,11 @@
 #include <functional>
 #include <memory>
 #include <ostream>
+#include <string>
 #include <vector>
 
-#include "tests/contract/bench.h"
+#include "tests/contract/observers.h"
 #include "tests/unit/math/samples.h"
-#include "tests/unit/observers/sliding_mode_bench.h"
 
 namespace
 {
@@ -52,53 +52,32 @@ class Source
     }
 };
 
-class ActiveFlux : public Source
+class Observer : public Source
 {
   public:
-    ActiveFlux()
+    explicit Observer(const observer_config_t &config) : config_(config)
     {
         std::memset(&state_, 0xa5, sizeof state_); // reset owes every member
     }
     void reset(const obs_in_t &in) override
     {
-        active_flux_reset(&state_, &config_, &in);
-        active_flux_slow(&state_, &config_, &in, &none_, PM_ONE); // it leads
+        observer_reset(&state_, &config_, &in);
+        const obs_out_t none = observer_last(&state_, &config_);
+        ASSERT_EQ(none.eps, 0);
+        observer_slow(&state_, &config_, &in, &none, PM_ONE); // it leads
     }
     obs_out_t step(const obs_in_t &in) override
     {
         obs_out_t out;
-        active_flux_step(&state_, &config_, &in, &out);
+        observer_step(&state_, &config_, &in, &out);
+        const obs_out_t last = observer_last(&state_, &config_);
+        EXPECT_EQ(std::memcmp(&out, &last, sizeof out), 0);
         return out;
     }
 
   private:
-    active_flux_config_t config_ = bench::flux_config(kMachine, kBase);
-    active_flux_t state_;
-    obs_out_t none_ = {};
-};
-
-class SlidingMode : public Source
-{
-  public:
-    SlidingMode()
-    {
-        std::memset(&state_, 0xa5, sizeof state_);
-    }
-    void reset(const obs_in_t &in) override
-    {
-        sliding_mode_reset(&state_, &config_, &in);
-    }
-    obs_out_t step(const obs_in_t &in) override
-    {
-        obs_out_t out;
-        sliding_mode_step(&state_, &config_, &in, &out);
-        return out;
-    }
-
-  private:
-    sliding_mode_config_t config_ =
-        bench::sliding_mode_config(kMachine, kBase, SLIDING_MODE_SATURATION, false);
-    sliding_mode_t state_;
+    observer_config_t config_;
+    observer_t state_;
 };
 
 class PulsatingSquare : public Source
@@ -136,22 +115,21 @@ class PulsatingSquare : public Source
 };
 
 struct Entry {
-    const char *name;
+    std::string name;
     std::function<std::unique_ptr<Source>()> make;
     double omega_pu; // a speed at which it works
 };
 
-template <class T> Entry entry(const char *name, double omega_pu)
+std::vector<Entry> sources()
 {
-    return {name, [] { return std::make_unique<T>(); }, omega_pu};
+    std::vector<Entry> all = {
+        {"pulsating_square", [] { return std::make_unique<PulsatingSquare>(); }, 0.05},
+    };
+    for (const bench::ObserverCase &c : bench::observer_cases(kMachine, kBase)) {
+        all.push_back({c.name, [c] { return std::make_unique<Observer>(c.config); }, c.omega_pu});
+    }
+    return all;
 }
-
-// The sources.
-const Entry kSources[] = {
-    entry<ActiveFlux>("active_flux", 0.4),
-    entry<SlidingMode>("sliding_mode", 0.4),
-    entry<PulsatingSquare>("pulsating_square", 0.05),
-};
 
 // A linear machine at constant speed under steady voltage and the source's carrier, with the period of delay.
 class Drive
@@ -435,7 +413,7 @@ TEST_P(ObserverContract, ConstantExtremesForASecondAreHarmless)
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Sources, ObserverContract, ::testing::ValuesIn(kSources),
+INSTANTIATE_TEST_SUITE_P(Sources, ObserverContract, ::testing::ValuesIn(sources()),
                          [](const auto &p) { return std::string(p.param.name); });
 
 } // namespace

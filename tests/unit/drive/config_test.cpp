@@ -185,19 +185,19 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
         {"mtpa h", c.mtpa.h, 28, psi / (2 * (L_q - L_d)) / I},
         {"fw k", c.field_weakening.k, 32, std::min(0.4, 2 * kPi * 20 * slow / (L_d / Lb))},
         {"fw i_max", c.field_weakening.i_max, 28, 3 / I},
-        {"flux R", c.position.flux.R, 28, R / Z},
-        {"flux L_d", c.position.flux.L_d, 28, L_d / Lb},
-        {"flux L_q", c.position.flux.L_q, 28, L_q / Lb},
-        {"flux L_q2", c.position.flux.L_q2, 28, (70.835e-3 - L_q) / Lb / (i_r * i_r)},
-        {"flux psi_m", c.position.flux.psi_m, 28, psi / Pb},
-        {"flux t_s", c.position.flux.t_s, 32, T * W},
-        {"flux g", c.position.flux.g, 32, 0.5 * T * W},
-        {"flux k_adapt", c.position.flux.k_adapt, 32, 0.01},
-        {"flux k_seed", c.position.flux.k_seed, 32, 300 * T},
-        {"flux k_R", c.position.flux.k_R, 26, 300 / 8.0 / (W * i_r * i_r)},
-        {"flux R_min", c.position.flux.R_min, 28, 0.5 * R / Z},
-        {"flux R_max", c.position.flux.R_max, 28, 2 * R / Z},
-        {"flux omega_R", c.position.flux.omega_R, 28, 10.5 * P / W},
+        {"flux R", c.position.observer.active_flux.model.R, 28, R / Z},
+        {"flux L_d", c.position.observer.active_flux.model.L_d, 28, L_d / Lb},
+        {"flux L_q", c.position.observer.active_flux.model.L_q, 28, L_q / Lb},
+        {"flux L_q2", c.position.observer.active_flux.model.L_q2, 28, (70.835e-3 - L_q) / Lb / (i_r * i_r)},
+        {"flux psi_m", c.position.observer.active_flux.model.psi_m, 28, psi / Pb},
+        {"flux t_s", c.position.observer.active_flux.model.t_s, 32, T * W},
+        {"flux g", c.position.observer.active_flux.g, 32, 0.5 * T * W},
+        {"flux k_adapt", c.position.observer.active_flux.k_adapt, 32, 0.01},
+        {"flux k_seed", c.position.observer.active_flux.k_seed, 32, 300 * T},
+        {"flux k_R", c.position.observer.active_flux.resistance.k, 26, 300 / 8.0 / (W * i_r * i_r)},
+        {"flux R_min", c.position.observer.active_flux.resistance.min, 28, 0.5 * R / Z},
+        {"flux R_max", c.position.observer.active_flux.resistance.max, 28, 2 * R / Z},
+        {"flux omega_R", c.position.observer.active_flux.resistance.omega, 28, 10.5 * P / W},
         {"omega_low", c.position.omega_low, 28, 21 * P / W},
         {"omega_high", c.position.omega_high, 28, 40 * P / W},
         {"per_span", c.position.per_span, 20, W / (19 * P)},
@@ -264,8 +264,11 @@ TEST(Config, SwitchesSwitch)
 {
     EXPECT_EQ(configure(changed({{DRIVE_PARAM_mtpa, 0}})).mtpa.h, 0);
     EXPECT_FALSE(configure(changed({{DRIVE_PARAM_dead_time_comp, 0}})).modulator.compensate);
-    EXPECT_EQ(configure(changed({{DRIVE_PARAM_saturation_comp, 0}})).position.flux.L_q2, 0);
-    EXPECT_EQ(configure(changed({{DRIVE_PARAM_resistance_adaptation, 0}})).position.flux.k_R, 0);
+    EXPECT_EQ(configure(changed({{DRIVE_PARAM_saturation_comp, 0}})).position.observer.active_flux.model.L_q2,
+              0);
+    EXPECT_EQ(configure(changed({{DRIVE_PARAM_resistance_adaptation, 0}}))
+                  .position.observer.active_flux.resistance.k,
+              0);
     const drive_config_t c = configure(changed({{DRIVE_PARAM_cross_coupling_comp, 0}}));
     EXPECT_EQ(c.position.square.lambda_1, 0);
     EXPECT_EQ(c.position.square.lambda_2, 0);
@@ -342,10 +345,10 @@ std::vector<std::pair<const char *, int64_t>> must_be_positive(const drive_confi
         {"speed kb", c.speed.pi.kb},
         {"speed slope", c.speed.slope},
         {"fw k", c.field_weakening.k},
-        {"flux R", c.position.flux.R},
-        {"flux t_s", c.position.flux.t_s},
-        {"flux g", c.position.flux.g},
-        {"flux k_seed", c.position.flux.k_seed},
+        {"flux R", c.position.observer.active_flux.model.R},
+        {"flux t_s", c.position.observer.active_flux.model.t_s},
+        {"flux g", c.position.observer.active_flux.g},
+        {"flux k_seed", c.position.observer.active_flux.k_seed},
         {"pll_low kp", c.position.pll_low.kp_turn},
         {"pll_low ki", c.position.pll_low.ki},
         {"pll_high kp", c.position.pll_high.kp_turn},

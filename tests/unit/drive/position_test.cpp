@@ -36,7 +36,8 @@ position_config_t config(bool injection = true)
 {
     const double L_d = 43e-3, L_q = 75e-3, flux = 70 * bench::kIpmBase.period_s, i = bench::kIpmBase.i_A;
     position_config_t c = {};
-    c.flux = bench::flux_config(bench::kIpmLinear, bench::kIpmBase);
+    c.observer.id = OBSERVER_active_flux;
+    c.observer.active_flux = bench::flux_config(bench::kIpmLinear, bench::kIpmBase);
     c.square.v_h = fixed(70 / 450.0, 28);
     c.square.gain_0 = fixed(i * L_d * L_q / (flux * (L_q - L_d)), 20);
     c.square.half_step = fixed(bench::kIpmBase.period_s * bench::kIpmBase.omega_rad_s / 2, 32);
@@ -62,7 +63,7 @@ void hold(position_t &self, const position_config_t &c, double omega, int calls 
 {
     for (int k = 0; k < calls; ++k) {
         self.pll.omega = fixed(omega, 28);
-        position_slow(&self, &c, {0, 0});
+        position_slow(&self, &c, {0, 0}, {0, 0});
     }
 }
 
@@ -137,7 +138,7 @@ class Running
         self.weight = PM_ONE;
         self.gains = c_.pll_high;
         const obs_in_t in = rotation.seen(0, rotation.omega_rad_s);
-        active_flux_reset(&self.flux, &c_.flux, &in);
+        observer_reset(&self.observer, &c_.observer, &in);
     }
 
     void run_ms(int ms, const pm_pll_t *imposed = nullptr)
@@ -153,7 +154,7 @@ class Running
                 position_follow(&self, imposed);
             }
             if (k % 10 == 9) {
-                position_slow(&self, &c_, out.i);
+                position_slow(&self, &c_, in.i, out.i);
             }
         }
     }
@@ -210,7 +211,7 @@ TEST(Position, QualityFallsWithoutAVoltageOrACurrentThatFits)
         for (int k = 0; k < 10; ++k) {
             position_step(&r.self, &c, {0, 0}, {0, 0}, &r.out);
         }
-        position_slow(&r.self, &c, r.out.i);
+        position_slow(&r.self, &c, {0, 0}, r.out.i);
     }
     EXPECT_LE(ms, 3 * kLost_ms);
 }
@@ -225,7 +226,7 @@ TEST(Position, QualityFallsWhenTheCarrierIsGone)
             position_out_t out;
             position_step(&self, &c, {0, 0}, {0, 0}, &out);
         }
-        position_slow(&self, &c, {0, 0});
+        position_slow(&self, &c, {0, 0}, {0, 0});
     }
     EXPECT_LE(ms, kLost_ms);
 }

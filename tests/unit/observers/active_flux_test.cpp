@@ -130,7 +130,7 @@ TEST(ActiveFlux, FindsThePositionOfASaturatedMachine)
 TEST(ActiveFlux, AConstantInductanceCostsWhatTheFormulaSays)
 {
     Fixture f = ipm_saturated();
-    f.config.L_q2 = 0;
+    f.config.model.L_q2 = 0;
     const Complex psi = f.machine.flux_Wb(kRatedIpm_A);
     const double change = psi.imag() / kRatedIpm_A.imag() - 75e-3;
     const double psi_a = psi.real() - 75e-3 * kRatedIpm_A.real();
@@ -154,7 +154,7 @@ TEST(ActiveFlux, AWrongResistanceActsAsDerived)
         for (const double omega : {0.4, -0.4, 0.582}) { // 0.582: 400 r/min of SPM-400
             for (const Complex i : {Complex{-2, 0}, Complex{-2, 4}, Complex{-2, -4}, Complex{2, 2}}) {
                 Fixture f = spm_linear();
-                f.config.R = static_cast<pm_q_t>(f.config.R * factor);
+                f.config.model.R = static_cast<pm_q_t>(f.config.model.R * factor);
                 const double expected = formula_deg(f, omega, i, (1 - factor) * f.machine.R_ohm, 0);
                 Closed closed(f, Rotation(f.machine, f.base, omega, i));
                 EXPECT_NEAR(closed.settled_deg(), expected, kFormula * std::abs(expected))
@@ -170,7 +170,7 @@ TEST(ActiveFlux, AWrongInductanceActsAsDerived)
         for (const double factor : {0.7, 0.9, 1.1}) {
             for (const Complex i : {Complex{0, 4}, Complex{0, -2}}) {
                 Fixture f = exact;
-                f.config.L_q = static_cast<pm_q_t>(f.config.L_q * factor);
+                f.config.model.L_q = static_cast<pm_q_t>(f.config.model.L_q * factor);
                 const double expected = formula_deg(f, 0.5, i, 0, (1 - factor) * f.machine.L_q0_H);
                 Closed closed(f, Rotation(f.machine, f.base, 0.5, i));
                 EXPECT_NEAR(closed.settled_deg(), expected, kFormula * std::abs(expected))
@@ -183,10 +183,10 @@ TEST(ActiveFlux, AWrongInductanceActsAsDerived)
 TEST(ActiveFlux, PublishedMismatchFigures) // METHODS.md 3.5.1 (e)
 {
     Fixture f = spm_linear();
-    f.config.L_q = static_cast<pm_q_t>(f.config.L_q * 0.7);
+    f.config.model.L_q = static_cast<pm_q_t>(f.config.model.L_q * 0.7);
     EXPECT_NEAR(Closed(f, Rotation(f.machine, f.base, 0.582, {0, 4})).settled_deg(), -3.0, 0.3);
     f = spm_linear();
-    f.config.R /= 2;
+    f.config.model.R /= 2;
     EXPECT_NEAR(Closed(f, Rotation(f.machine, f.base, 0.582, {-2, 0})).settled_deg(), -1.3, 0.2);
 }
 
@@ -194,7 +194,7 @@ TEST(ActiveFlux, AWrongMagnetFluxMovesNoAngle)
 {
     for (const double factor : {0.8, 1.2}) {
         Fixture f = ipm_linear();
-        f.config.psi_m = static_cast<pm_q_t>(f.config.psi_m * factor);
+        f.config.model.psi_m = static_cast<pm_q_t>(f.config.model.psi_m * factor);
         Closed closed(f, Rotation(f.machine, f.base, 0.3, {-1, 3}));
         EXPECT_NEAR(closed.settled_deg(), 0, kIdeal_deg);
         // the followed amplitude is that of the machine
@@ -351,7 +351,7 @@ TEST(ActiveFlux, ErrorSignalIsLimited)
     for (const double factor : {-20.0, 20.0}) {
         active_flux_t state;
         active_flux_reset(&state, &f.config, &first);
-        state.psi = {0, bench::fixed(factor * real(f.config.psi_m), 26)};
+        state.psi = {0, bench::fixed(factor * real(f.config.model.psi_m), 26)};
         rotation.advance();
         const obs_in_t in = rotation.seen(rotation.theta_rad, rotation.omega_rad_s);
         obs_out_t out;
@@ -398,10 +398,10 @@ TEST(ActiveFlux, ResistanceIsFoundWhileInjectionLeads)
         for (const double omega : {0.0, 0.03, -0.03}) {
             for (const Complex i : {Complex{0, 4}, Complex{0, -4}}) {
                 Fixture f = ipm_linear();
-                const pm_q_t truth = f.config.R;
-                f.config.R = static_cast<pm_q_t>(truth * factor); // nominal, with its limits
-                f.config.R_min = f.config.R / 2;
-                f.config.R_max = f.config.R * 2;
+                const pm_q_t truth = f.config.model.R;
+                f.config.model.R = static_cast<pm_q_t>(truth * factor); // nominal, with its limits
+                f.config.resistance.min = f.config.model.R / 2;
+                f.config.resistance.max = f.config.model.R * 2;
                 Tied tied(f, omega, i);
                 tied.run(0.3);
                 EXPECT_NEAR(real(tied.state.R), real(truth), kAdapted * real(truth)) << factor << omega << i;
@@ -414,8 +414,8 @@ TEST(ActiveFlux, ResistanceIsFoundWhileInjectionLeads)
 TEST(ActiveFlux, ResistanceFollowsAtTheRateDerived)
 {
     Fixture f = ipm_linear();
-    const double truth = real(f.config.R);
-    f.config.R = static_cast<pm_q_t>(1.4 * f.config.R);
+    const double truth = real(f.config.model.R);
+    f.config.model.R = static_cast<pm_q_t>(1.4 * f.config.model.R);
     const double k_q = 300, damping = k_q / 2, swing = std::sqrt(k_q / 8e-3 - damping * damping);
     Tied tied(f, 0, {0, 4});
     for (int ms = 1; ms <= 40; ++ms) {
@@ -430,17 +430,17 @@ TEST(ActiveFlux, ResistanceFollowsAtTheRateDerived)
 TEST(ActiveFlux, ResistanceStaysWhereItCannotBeSeen)
 {
     Fixture f = ipm_linear();
-    f.config.R = static_cast<pm_q_t>(1.4 * f.config.R);
+    f.config.model.R = static_cast<pm_q_t>(1.4 * f.config.model.R);
     Tied leading(f, 0.03, {0, 4});
     leading.run(0.1, PM_ONE);
-    EXPECT_EQ(leading.state.R, f.config.R);
+    EXPECT_EQ(leading.state.R, f.config.model.R);
     Tied fast(f, 0.07, {0, 4}); // above omega_R
     fast.run(0.1);
-    EXPECT_EQ(fast.state.R, f.config.R);
-    f.config.k_R = 0;
+    EXPECT_EQ(fast.state.R, f.config.model.R);
+    f.config.resistance.k = 0;
     Tied off(f, 0.03, {0, 4});
     off.run(0.1);
-    EXPECT_EQ(off.state.R, f.config.R);
+    EXPECT_EQ(off.state.R, f.config.model.R);
 }
 
 TEST(ActiveFlux, ResistanceStaysWithinItsLimits)
@@ -450,7 +450,7 @@ TEST(ActiveFlux, ResistanceStaysWithinItsLimits)
         f.machine.R_ohm *= factor;
         Tied tied(f, 0, {0, 4});
         tied.run(0.5);
-        EXPECT_EQ(tied.state.R, factor < 1 ? f.config.R_min : f.config.R_max);
+        EXPECT_EQ(tied.state.R, factor < 1 ? f.config.resistance.min : f.config.resistance.max);
     }
 }
 
@@ -499,10 +499,11 @@ TEST(ActiveFlux, OnlyTheTiedFluxBelievesThePosition)
 TEST(ActiveFlux, AmplitudeIsFollowedWithinItsBandOnly)
 {
     Fixture f = ipm_linear();
-    f.config.psi_m = static_cast<pm_q_t>(f.config.psi_m * 0.4); // the machine has 2.5 times as much
+    f.config.model.psi_m =
+        static_cast<pm_q_t>(f.config.model.psi_m * 0.4); // the machine has 2.5 times as much
     Tied tied(f, 0.5, {0, 0});
     tied.run(2.0, PM_ONE);
-    EXPECT_NEAR(real(tied.state.psi_ref), 1.5 * real(f.config.psi_m), kRounding);
+    EXPECT_NEAR(real(tied.state.psi_ref), 1.5 * real(f.config.model.psi_m), kRounding);
 }
 
 } // namespace

@@ -1,0 +1,83 @@
+/* Configuration of the fundamental-model observers. */
+#include "firmware/drive/config_maker.h"
+
+static void make_model(maker_t *m, observer_model_t *c)
+{
+    const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
+    const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
+    const pm_num_t change = pm_num_sub(si(m, DRIVE_PARAM_L_q_rated), si(m, DRIVE_PARAM_L_q));
+    c->R = per_unit(m, DRIVE_PARAM_R_s, m->impedance);
+    c->L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
+    c->L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);
+    /* observers hold it in Q29 */
+    (void)fixed(m, pm_num_div(si(m, DRIVE_PARAM_L_q), m->inductance), Q_BITS + 1, DRIVE_PARAM_L_q);
+    c->L_q2 = 0;
+    if (m->params->saturation_comp != 0) {
+        c->L_q2 = fixed(m, pm_num_div(pm_num_div(change, m->inductance), square(i_rated)), Q_BITS,
+                        DRIVE_PARAM_L_q_rated);
+    }
+    c->psi_m = per_unit(m, DRIVE_PARAM_psi_m, m->base.psi);
+    c->t_s = fixed(m, step, FRAC_BITS, DRIVE_PARAM_f_pwm);
+}
+
+/* What is not known is tied to the position with so many rad/s while injection leads. */
+#define TIE pm_num(300)
+
+/* R follows in 8 ms at rated current. */
+static void make_resistance(maker_t *m, const observer_model_t *model, observer_resistance_t *c)
+{
+    const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
+    c->k = 0;
+    if (m->params->resistance_adaptation != 0) {
+        const pm_num_t follow = pm_num_ratio(1, 8);
+        const pm_num_t k = pm_num_div(pm_num_mul(follow, TIE), pm_num_mul(m->base.omega, square(i_rated)));
+        c->k = fixed(m, k, GAIN_BITS, DRIVE_PARAM_i_rated);
+    }
+    c->omega = speed(m, DRIVE_PARAM_speed_low) / 2;
+    c->min = model->R / 2;
+    c->max = model->R < PM_Q(4.0) ? model->R * 2 : PM_Q(7.9);
+}
+
+static void make_active_flux(maker_t *m, active_flux_config_t *c)
+{
+    const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
+    make_model(m, &c->model);
+    make_resistance(m, &c->model, &c->resistance);
+    c->g = fixed(m, pm_num_mul(si(m, DRIVE_PARAM_flux_gain), step), FRAC_BITS, DRIVE_PARAM_flux_gain);
+    c->k_adapt = PM_FRAC(0.01);
+    c->k_seed = fixed(m, pm_num_mul(TIE, m->base.t_s), FRAC_BITS, DRIVE_PARAM_f_pwm);
+}
+
+/* Share of v_dc_nominal, the farthest the EMF can be followed, that the gain has at standstill. */
+#define SLIDING_MODE_BASE pm_num_ratio(1, 20)
+
+static void make_sliding_mode(maker_t *m, sliding_mode_config_t *c)
+{
+    const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
+    const pm_num_t omega_c = mul3(PM_NUM_TWO_PI, pm_num(100), m->base.t_s);
+    make_model(m, &c->model);
+    c->function = SLIDING_MODE_SATURATION;
+    c->k_base =
+        fixed(m, mul3(SLIDING_MODE_BASE, si(m, DRIVE_PARAM_v_dc_nominal), pm_num_div(pm_num(1), m->base.v)),
+              Q_BITS, DRIVE_PARAM_v_dc_nominal);
+    c->k_speed = PM_Q(2.0);
+    c->omega_min = pm_max(speed(m, DRIVE_PARAM_speed_low) / 4, PM_Q(0.001));
+    c->k_lp = fixed(m, pm_num_div(omega_c, pm_num_add(pm_num(1), omega_c)), FRAC_BITS, DRIVE_PARAM_f_pwm);
+    c->slope = fixed(m, pm_num_div(pm_num_ratio(1, 2), step), SMALL_BITS, DRIVE_PARAM_f_pwm);
+}
+
+void make_observer(maker_t *m, observer_config_t *c)
+{
+    c->id = OBSERVER_active_flux;
+    switch (c->id) {
+#define PM_OBSERVER(name, help)                                                                              \
+    case OBSERVER_##name:                                                                                    \
+        make_##name(m, &c->name);                                                                            \
+        break;
+#include "observers/observers.def"
+#undef PM_OBSERVER
+    case OBSERVER_COUNT:
+    default:
+        break;
+    }
+}

@@ -1,0 +1,83 @@
+#include "observers/observer.h"
+
+/* One case for each of the list. */
+
+void observer_reset(observer_t *self, const observer_config_t *config, const obs_in_t *in)
+{
+    switch (config->id) {
+#define PM_OBSERVER(name, help)                                                                              \
+    case OBSERVER_##name:                                                                                    \
+        name##_reset(&self->name, &config->name, in);                                                        \
+        break;
+#include "observers/observers.def"
+#undef PM_OBSERVER
+    case OBSERVER_COUNT:
+    default:
+        break;
+    }
+}
+
+void observer_step_other(observer_t *self, const observer_config_t *config, const obs_in_t *in,
+                         obs_out_t *out)
+{
+    (void)self, (void)in; /* while the list has one */
+    switch (config->id) {
+#define PM_OBSERVER_DEFAULT(name, help)
+#define PM_OBSERVER(name, help)                                                                              \
+    case OBSERVER_##name:                                                                                    \
+        name##_step(&self->name, &config->name, in, out);                                                    \
+        break;
+#include "observers/observers.def"
+#undef PM_OBSERVER
+    case OBSERVER_active_flux: /* stands in observer_step() */
+    case OBSERVER_COUNT:
+    default:
+        *out = (obs_out_t){0};
+        break;
+    }
+}
+
+obs_out_t observer_last(const observer_t *self, const observer_config_t *config)
+{
+    switch (config->id) {
+#define PM_OBSERVER(name, help)                                                                              \
+    case OBSERVER_##name:                                                                                    \
+        return name##_last(&self->name);
+#include "observers/observers.def"
+#undef PM_OBSERVER
+    case OBSERVER_COUNT:
+    default:
+        return (obs_out_t){0};
+    }
+}
+
+void observer_slow(observer_t *self, const observer_config_t *config, const obs_in_t *in,
+                   const obs_out_t *out, pm_q_t weight)
+{
+    switch (config->id) {
+#define PM_OBSERVER(name, help)                                                                              \
+    case OBSERVER_##name:                                                                                    \
+        name##_slow(&self->name, &config->name, in, out, weight);                                            \
+        break;
+#include "observers/observers.def"
+#undef PM_OBSERVER
+    case OBSERVER_COUNT:
+    default:
+        break;
+    }
+}
+
+void observer_tie(observer_t *self, const observer_config_t *config)
+{
+    switch (config->id) {
+#define PM_OBSERVER(name, help)                                                                              \
+    case OBSERVER_##name:                                                                                    \
+        name##_tie(&self->name, &config->name);                                                              \
+        break;
+#include "observers/observers.def"
+#undef PM_OBSERVER
+    case OBSERVER_COUNT:
+    default:
+        break;
+    }
+}

@@ -1,0 +1,70 @@
+/* Any of the fundamental-model observers, chosen by the configuration.
+ *
+ * Every observer of observers.def is a source (firmware/math/estimate.h) with these functions; self is its
+ * state, config is const and made from model.h's machine and a few gains:
+ *   x_reset(self, config, in)             seeds every member at the given position, so that no transient
+ *                                         follows when that is right; also before the first step
+ *   x_step(self, config, in, out)         one period; no division, no root: those belong to x_slow
+ *   x_last(self)                          the result of the last step again (zero eps after x_reset)
+ *   x_slow(self, config, in, out, weight) at 1 kHz, with i_dq and omega of the last step and what came out;
+ *                                         weight 0: another source leads, and what the observer keeps is tied
+ *                                         to the present position; above 0 it is free, PM_ONE: it leads
+ *   x_tie(self, config)                   the position is imposed from outside (align, open-loop start):
+ * holds on to it until the next x_slow, learning nothing A configuration may change its values at any time
+ * between two steps, but not its id: then comes observer_reset() of the new one.
+ *
+ * Cost of the dispatch: three instructions for active_flux, which is compiled into the caller; a call for the
+ * others. Tests: tests/contract/observer_contract_test.cpp runs all of the list, tests/target/observers
+ * counts them. */
+#ifndef OBSERVERS_OBSERVER_H
+#define OBSERVERS_OBSERVER_H
+
+#include "observers/active_flux.h"
+#include "observers/sliding_mode.h"
+
+typedef enum {
+#define PM_OBSERVER(name, help) OBSERVER_##name,
+#include "observers/observers.def"
+#undef PM_OBSERVER
+    OBSERVER_COUNT
+} observer_id_t;
+
+typedef struct {
+    observer_id_t id;
+    union {
+#define PM_OBSERVER(name, help) name##_config_t name;
+#include "observers/observers.def"
+#undef PM_OBSERVER
+    };
+} observer_config_t;
+
+typedef union {
+#define PM_OBSERVER(name, help) name##_t name;
+#include "observers/observers.def"
+#undef PM_OBSERVER
+} observer_t;
+
+void observer_reset(observer_t *self, const observer_config_t *config, const obs_in_t *in);
+obs_out_t observer_last(const observer_t *self, const observer_config_t *config);
+void observer_slow(observer_t *self, const observer_config_t *config, const obs_in_t *in,
+                   const obs_out_t *out, pm_q_t weight);
+void observer_tie(observer_t *self, const observer_config_t *config);
+
+/* observer_step() of all but active_flux. */
+void observer_step_other(observer_t *self, const observer_config_t *config, const obs_in_t *in,
+                         obs_out_t *out);
+
+static inline void observer_step(observer_t *self, const observer_config_t *config, const obs_in_t *in,
+                                 obs_out_t *out)
+{
+    if (__builtin_expect(config->id == OBSERVER_active_flux, 1) != 0) {
+        active_flux_step(&self->active_flux, &config->active_flux, in, out);
+    } else {
+        const obs_in_t copy = *in; /* only this path needs it in memory */
+        obs_out_t result;
+        observer_step_other(self, config, &copy, &result);
+        *out = result;
+    }
+}
+
+#endif

@@ -1,0 +1,50 @@
+// Every observer of observers/observers.def for the linear machine of the tests: per-unit configurations as
+// the headers give them, and a speed at which each works.
+#pragma once
+
+#include <vector>
+
+#include "tests/contract/bench.h"
+#include "tests/unit/observers/sliding_mode_bench.h"
+
+namespace bench
+{
+
+struct ObserverCase {
+    const char *name;
+    observer_config_t config;
+    double omega_pu; // electrical, of the base
+};
+
+namespace observers
+{
+
+inline void configure(active_flux_config_t &c, const Machine &m, const Base &b)
+{
+    c = flux_config(m, b);
+}
+
+inline void configure(sliding_mode_config_t &c, const Machine &m, const Base &b)
+{
+    c = sliding_mode_config(m, b, SLIDING_MODE_SATURATION, false);
+}
+
+} // namespace observers
+
+inline std::vector<ObserverCase> observer_cases(const Machine &m = kIpmLinear, const Base &b = kIpmBase)
+{
+    std::vector<ObserverCase> all;
+    ObserverCase c = {};
+    c.omega_pu = 0.4;
+#define PM_OBSERVER(x, help)                                                                                 \
+    c.name = #x;                                                                                             \
+    c.config = {};                                                                                           \
+    c.config.id = OBSERVER_##x;                                                                              \
+    observers::configure(c.config.x, m, b);                                                                  \
+    all.push_back(c);
+#include "observers/observers.def"
+#undef PM_OBSERVER
+    return all;
+}
+
+} // namespace bench
