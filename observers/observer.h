@@ -20,6 +20,8 @@
 #define OBSERVERS_OBSERVER_H
 
 #include "observers/active_flux.h"
+#include "observers/ekf_full.h"
+#include "observers/ekf_reduced.h"
 #include "observers/sliding_mode.h"
 
 typedef enum {

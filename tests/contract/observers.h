@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tests/contract/bench.h"
+#include "tests/unit/observers/ekf_bench.h"
 #include "tests/unit/observers/sliding_mode_bench.h"
 
 namespace bench
@@ -27,6 +28,16 @@ inline void configure(active_flux_config_t &c, const Machine &m, const Base &b)
 inline void configure(sliding_mode_config_t &c, const Machine &m, const Base &b)
 {
     c = sliding_mode_config(m, b, SLIDING_MODE_SATURATION, false);
+}
+
+inline void configure(ekf_full_config_t &c, const Machine &m, const Base &b)
+{
+    c = ekf_full_config(m, b);
+}
+
+inline void configure(ekf_reduced_config_t &c, const Machine &m, const Base &b)
+{
+    c = ekf_reduced_config(m, b);
 }
 
 } // namespace observers

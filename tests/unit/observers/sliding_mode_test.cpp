@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "tests/contract/bench.h"
-#include "tests/unit/math/samples.h"
+#include "tests/unit/observers/closed.h"
 #include "tests/unit/observers/sliding_mode_bench.h"
 
 namespace
@@ -28,9 +28,6 @@ constexpr double kSmooth_deg = 0.8;
 constexpr double kRounding = 3e-4;
 // METHODS.md 12.3.3 (e).
 constexpr double kRippleShare = 0.5;
-
-// Half a step of a 12-bit converter for +-10 A, and its quantisation.
-constexpr double kNoise_A = 2.8e-3;
 
 struct Fixture {
     Machine machine;
@@ -58,79 +55,12 @@ Fixture spm(sliding_mode_function_t function)
 const sliding_mode_function_t kAll[] = {SLIDING_MODE_SIGN, SLIDING_MODE_SATURATION, SLIDING_MODE_SIGMOID,
                                         SLIDING_MODE_SUPER_TWISTING};
 
-// Measured with noise, in a loop of 25 Hz.
-class Closed
+class Closed : public bench::ClosedLoop<bench::SlidingModeFunctions>
 {
   public:
-    Closed(const Fixture &f, const Rotation &truth, double noise_A = kNoise_A)
-        : rotation(truth), f_(f), noise_A_(noise_A)
+    Closed(const Fixture &f, const Rotation &truth) : ClosedLoop(f.config, f.base, truth)
     {
-        loop.theta_rad = rotation.theta_rad;
-        loop.omega_rad_s = rotation.omega_rad_s;
-        const obs_in_t in = rotation.seen(loop.theta_rad, loop.omega_rad_s);
-        sliding_mode_reset(&state, &f.config, &in);
     }
-
-    void step()
-    {
-        rotation.advance();
-        loop.predict(f_.base.period_s);
-        const Complex noise = noise_A_ * Complex{gauss(), gauss()};
-        const obs_in_t in = rotation.seen(loop.theta_rad, loop.omega_rad_s, 0, noise);
-        sliding_mode_step(&state, &f_.config, &in, &out);
-        loop.correct(real(out.eps), f_.base.period_s);
-        if (++periods_ % 10 == 0) {
-            sliding_mode_slow(&state, &f_.config, &in, &out, PM_ONE);
-        }
-    }
-
-    double error_deg() const
-    {
-        return bench::wrapped(rotation.theta_rad - loop.theta_rad) / kDegree;
-    }
-
-    struct Errors {
-        double mean = 0, max = 0, ripple = 0; // degrees
-    };
-
-    Errors settled(double settle_s = 0.5, double seconds = 0.5)
-    {
-        const auto n = static_cast<int>(seconds / f_.base.period_s);
-        for (int k = 0; k < static_cast<int>(settle_s / f_.base.period_s); ++k) {
-            step();
-        }
-        double sum = 0, squares = 0;
-        Errors e;
-        for (int k = 0; k < n; ++k) {
-            step();
-            sum += error_deg();
-            squares += error_deg() * error_deg();
-            e.max = std::max(e.max, std::abs(error_deg()));
-        }
-        e.mean = sum / n;
-        e.ripple = std::sqrt(std::max(0.0, squares / n - e.mean * e.mean));
-        return e;
-    }
-
-    sliding_mode_t state = {};
-    obs_out_t out = {};
-    bench::Loop loop;
-    Rotation rotation;
-
-  private:
-    double gauss() // of twelve uniform ones
-    {
-        double sum = -6;
-        for (int k = 0; k < 12; ++k) {
-            sum += random_.within(0, 1);
-        }
-        return sum;
-    }
-
-    Fixture f_;
-    double noise_A_;
-    samples::Random random_;
-    int periods_ = 0;
 };
 
 // The same in double precision, from the header's formulas, at the operating point of the reset.
@@ -202,7 +132,8 @@ double deviation(const Fixture &f, double omega_pu, int periods)
     double worst = 0;
     for (int k = 0; k < periods; ++k) {
         rotation.advance();
-        const Complex noise = {random.within(-kNoise_A, kNoise_A), random.within(-kNoise_A, kNoise_A)};
+        const Complex noise = {random.within(-bench::kConverterNoise_A, bench::kConverterNoise_A),
+                               random.within(-bench::kConverterNoise_A, bench::kConverterNoise_A)};
         const obs_in_t in = rotation.seen(rotation.theta_rad - 0.1, rotation.omega_rad_s, 0, noise);
         obs_out_t out;
         sliding_mode_step(&state, &f.config, &in, &out);
