@@ -13,8 +13,8 @@
  *
  * Sign, saturation and sigmoid follow e within delay() periods; that and the lag of the low-pass are taken
  * back by one complex factor, exact to the second order of omega T_s. Below omega_min the error signal fades
- * with (omega / omega_min)^2, as nothing can be seen there. Nothing is kept that would have to be tied at
- * weight 0: the EMF is found anew within milliseconds.
+ * with (omega / omega_min)^2, as nothing can be seen there; at weight 0, where it only watches the leading
+ * source, already below omega_tie. Nothing else is tied: the EMF is found anew within milliseconds.
  *
  * Called each period; the result belongs to k. Range: L_q < 4, |e| < 1, K < 1; |s| saturates at 1/2. misfit:
  * amplitude of the EMF against omega psi_a, relative. vector: EMF. Cost: tests/target/observers. Tests:
@@ -38,6 +38,7 @@ typedef struct {
     pm_q_t k_base;    /* constant part of K, voltage */
     pm_q_t k_speed;   /* part of K per |omega| psi_a */
     pm_q_t omega_min; /* > 0 */
+    pm_q_t omega_tie; /* takes its place at weight 0 */
     pm_frac_t k_lp;   /* low-pass of z: 1 - exp(-omega_c T_s), Q32, > 2^-8 */
     int32_t slope;    /* SLIDING_MODE_STEP / (T_s w_base), Q20 */
 } sliding_mode_config_t;

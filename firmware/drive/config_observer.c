@@ -60,7 +60,8 @@ static void make_sliding_mode(maker_t *m, sliding_mode_config_t *c)
     const pm_num_t k_base = pm_num_mul(SLIDING_MODE_BASE, si(m, DRIVE_PARAM_v_dc_nominal));
     c->k_base = fixed(m, pm_num_div(k_base, m->base.v), Q_BITS, DRIVE_PARAM_v_dc_nominal);
     c->k_speed = PM_Q(2.0);
-    c->omega_min = pm_max(speed(m, DRIVE_PARAM_speed_low) / 4, PM_Q(0.001));
+    c->omega_tie = pm_max(speed(m, DRIVE_PARAM_speed_low), PM_Q(0.004));
+    c->omega_min = c->omega_tie / 4;
     c->k_lp = fixed(m, pm_num_div(omega_c, pm_num_add(pm_num(1), omega_c)), FRAC_BITS, DRIVE_PARAM_f_pwm);
     c->slope = fixed(m, pm_num_div(pm_num_ratio(1, 2), step), SMALL_BITS, DRIVE_PARAM_f_pwm);
 }

@@ -18,6 +18,7 @@ inline sliding_mode_config_t sliding_mode_config(const Machine &linear, const Ba
     c.k_base = fixed(conventional ? k_max : 0.1 * k_max, 28);
     c.k_speed = fixed(conventional ? 0.0 : 2.0, 28);
     c.omega_min = fixed(0.02, 28);
+    c.omega_tie = fixed(0.1, 28);
     c.k_lp = fixed(1 - std::exp(-2 * kPi * (conventional ? 20 : 100) * b.period_s), 32);
     c.slope = fixed(SLIDING_MODE_STEP / (b.period_s * b.omega_rad_s), 20);
     return c;
