@@ -3,7 +3,8 @@
  *   lambda = (L + R T_s / 2) i   in the frame of the present position, for each axis
  *   psi(k) turned back by the frame's turn + T_s v - T_s R (i(k) + i(k+1)) / 2 = psi(k+1)
  * What is kept is psi - R T_s / 2 i in the stationary frame, so that the turn is exact and each sample needs
- * its own current only. L_q(i_q) and R are renewed at 1 kHz. Range: |psi| < 4, L < 4. */
+ * its own current only. L_q(i_q) and R are renewed at 1 kHz. Range: |psi| and |lambda| < 4,
+ * L < 4. */
 #ifndef OBSERVERS_DQ_FLUX_H
 #define OBSERVERS_DQ_FLUX_H
 
@@ -42,8 +43,8 @@ static inline pm_dq_t dq_flux_advance(const dq_flux_t *self, pm_frac_t t_s, pm_a
 static inline void dq_flux_keep(dq_flux_t *self, pm_dq_t lambda, pm_dq_t magnet, pm_dir_t dir)
 {
     pm_dq_t psi;
-    psi.d = pm_sat(pm_mulh_sub(lambda.d, lambda.d, self->loss_d) + magnet.d, PM_Q_BITS + 2);
-    psi.q = pm_sat(pm_mulh_sub(lambda.q, lambda.q, self->loss_q) + magnet.q, PM_Q_BITS + 2);
+    psi.d = pm_mulh_sub(lambda.d, lambda.d, self->loss_d) + magnet.d;
+    psi.q = pm_mulh_sub(lambda.q, lambda.q, self->loss_q) + magnet.q;
     self->psi = pm_park_inverse(psi, dir);
     self->dir = dir;
 }

@@ -109,7 +109,8 @@ void ekf_full_step(ekf_full_t *self, const ekf_full_config_t *config, const obs_
     pm_kalman_hold(self->P, EKF_STATES, EKF_DELTA);
 
     lambda.d = pm_mulh_add(lambda.d + pm_kalman_gained(&d, y_d), y_q, q.K[EKF_LAMBDA_D]);
-    lambda.q += pm_kalman_gained(&q, y_q);
+    lambda.d = pm_sat(lambda.d, PM_Q_BITS + 2);
+    lambda.q = pm_sat(lambda.q + pm_kalman_gained(&q, y_q), PM_Q_BITS + 2);
     omega = pm_mulh_add(pm_mulh_add(omega, u_d, d.K[EKF_OMEGA]), u_q, q.K[EKF_OMEGA]);
     const pm_q_t change = pm_mulh_add(pm_mulh(u_d, d.K[EKF_DELTA]), u_q, q.K[EKF_DELTA]);
     angle.d += pm_mul(self->flux.eta, change);

@@ -48,7 +48,7 @@ static void set_twist(sliding_mode_t *self, const sliding_mode_config_t *config,
     const pm_q_t limit = pm_max(speed, config->omega_min);
     const pm_q_t change = pm_mul_sat(pm_mul(limit, limit), psi);
     const pm_q_t Lambda = change + pm_half(change);
-    self->lambda = pm_mul(Lambda, PM_Q(2.25));
+    self->lambda = pm_shl(pm_sat(pm_mul(Lambda, PM_Q(2.25)), 27), 4);
     self->twist = pm_frac(pm_mul(Lambda, PM_Q(1.1)), config->model.t_s);
 }
 
@@ -62,8 +62,7 @@ static void set_operating_point(sliding_mode_t *self, const sliding_mode_config_
     const pm_q_t speed = pm_min(pm_abs(omega), PM_Q(2.0));
     const pm_q_t reach = pm_max(speed, omega_min);
     self->inductance = pm_shl(L_q, 1);
-    self->decay = pm_div(pm_frac(model->R, model->t_s), L_q); /* a fraction: Q28 to Q32 */
-    self->decay = pm_shl(pm_sat(self->decay, 27), 4);
+    self->half_decay = pm_small(pm_half(pm_div(pm_frac(model->R, model->t_s), L_q)));
 
     /* 2 / (reach psi) times omega / reach; Q20 */
     const pm_q_t share = pm_div(speed, reach);
@@ -114,9 +113,11 @@ static inline pm_q_t sigmoid(const sliding_mode_t *self, pm_q_t s)
 
 static inline pm_q_t twisted(const sliding_mode_t *self, pm_q_t *w, pm_q_t s)
 {
-    *w = pm_sat(*w + sign_of(s, self->twist), PM_Q_BITS);
-    const pm_q_t root = pm_sqrt(pm_mul_sat(pm_abs(s), self->lambda));
-    return pm_sat(s < 0 ? *w - root : *w + root, PM_Q_BITS);
+    const int32_t square = pm_mulh(pm_magnitude(s), self->lambda); /* Q28 */
+    const pm_q_t root = pm_shl(pm_root_twice(square), PM_Q_BITS / 2 - 1);
+    const pm_q_t next = s < 0 ? *w - self->twist : *w + self->twist;
+    *w = pm_sat(next, PM_Q_BITS);
+    return s < 0 ? next - root : next + root;
 }
 
 static inline pm_ab_t switched(sliding_mode_t *self, const sliding_mode_config_t *config, pm_ab_t s)
@@ -147,8 +148,8 @@ static inline pm_ab_t switched(sliding_mode_t *self, const sliding_mode_config_t
 static inline pm_q_t advance(const sliding_mode_t *self, pm_q_t *y, pm_q_t v, pm_q_t i, pm_frac_t t_s)
 {
     const pm_q_t next = pm_frac_add(*y, v, t_s);
-    *y = pm_sat(pm_mulh_sub(next, pm_half(next) + pm_half(*y), self->decay), PM_Q_BITS + 2);
-    return pm_sub_sat(*y, pm_shl(pm_mulh(i, self->inductance), 3));
+    *y = pm_sat(pm_mulh_sub(next, next + *y, self->half_decay), PM_Q_BITS + 1);
+    return *y - pm_shl(pm_mulh(i, self->inductance), 3);
 }
 
 /* Relative to the amplitude of the EMF; within +-1 of the base, halved to fit. */

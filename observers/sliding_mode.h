@@ -16,7 +16,8 @@
  * with (omega / omega_min)^2, as nothing can be seen there; at weight 0, where it only watches the leading
  * source, already below omega_tie. Nothing else is tied: the EMF is found anew within milliseconds.
  *
- * Called each period; the result belongs to k. Range: L_q < 4, |e| < 1, K < 1; |s| saturates at 1/2. misfit:
+ * Called each period; the result belongs to k. Range: L_q < 4, |L_q i| < 2,
+ * |e| < 1, K < 1; |s| saturates at 1/2. misfit:
  * amplitude of the EMF against omega psi_a, relative. vector: EMF. Cost: tests/target/observers. Tests:
  * tests/unit/observers/sliding_mode_test.cpp (against double precision, ripple, K too small), tests/scenario.
  */
@@ -28,8 +29,8 @@
 typedef enum {
     SLIDING_MODE_SIGN,
     SLIDING_MODE_SATURATION,
-    SLIDING_MODE_SIGMOID,
-    SLIDING_MODE_SUPER_TWISTING
+    SLIDING_MODE_SUPER_TWISTING,
+    SLIDING_MODE_SIGMOID
 } sliding_mode_function_t;
 
 typedef struct {
@@ -47,17 +48,17 @@ typedef struct {
 #define SLIDING_MODE_STEP 0.5
 
 typedef struct {
-    pm_ab_t y;          /* L_q i^, Q28 */
-    pm_ab_t z;          /* what the switching function gave, voltage */
-    pm_ab_t w;          /* integral of super-twisting */
-    pm_ab_t e;          /* low-pass of z */
-    int32_t inductance; /* L_q(i_q), Q29 */
-    pm_frac_t decay;    /* R T_s / L_q, Q32 */
-    pm_q_t K;           /* present gain */
-    int32_t steepness;  /* slope / (1.5 K), Q20 */
-    pm_q_t lambda;      /* 2.25 Lambda, Q28 */
-    pm_q_t twist;       /* 1.1 Lambda T_s, Q28 */
-    int32_t lead_real;  /* complex factor that takes the lag back, Q28; below 4 */
+    pm_ab_t y;            /* L_q i^, Q28 */
+    pm_ab_t z;            /* what the switching function gave, voltage */
+    pm_ab_t w;            /* integral of super-twisting */
+    pm_ab_t e;            /* low-pass of z */
+    int32_t inductance;   /* L_q(i_q), Q29 */
+    pm_frac_t half_decay; /* R T_s / (2 L_q), Q32 */
+    pm_q_t K;             /* present gain */
+    int32_t steepness;    /* slope / (1.5 K), Q20 */
+    pm_q_t lambda;        /* 2.25 Lambda, Q32 */
+    pm_q_t twist;         /* 1.1 Lambda T_s, Q28 */
+    int32_t lead_real;    /* complex factor that takes the lag back, Q28; below 4 */
     int32_t lead_imag;
     int32_t per_emf; /* 2 sgn(omega) / (|omega| psi_a), fading below omega_min, Q20 */
     pm_q_t expected; /* amplitude by the model times per_emf: 1, less below omega_min */

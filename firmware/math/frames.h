@@ -89,7 +89,7 @@ static inline pm_half_dir_t pm_dir_sum(pm_dir_t a, pm_dir_t b)
     return r;
 }
 
-/* Angle from one direction to another in rad, Q28; error below 4e-5 up to 0.2 rad, monotonous up to a quarter
+/* Angle from one direction to another in rad, Q28; error below 2.5e-5 up to 0.2 rad, monotonous up to a quarter
  * turn. */
 static inline pm_q_t pm_dir_turn(pm_dir_t from, pm_dir_t to)
 {

@@ -26,6 +26,8 @@ constexpr double kAcceptance_deg = 4.0;
 constexpr double kSmooth_deg = 0.8;
 // Rad. The lead is of second order: what the third leaves at 60 % of base speed, (omega T_s)^3 / k_lp.
 constexpr double kRounding = 3e-4;
+// The root of super-twisting has a few bits only near zero, and where the sign differs once the paths part.
+constexpr double kTwisted = 6e-3;
 // METHODS.md 12.3.3 (e).
 constexpr double kRippleShare = 0.5;
 
@@ -78,7 +80,7 @@ class Reference
         Lambda_ = 1.5 * omega_ * omega_ * psi_;
         const double x = omega_ * t_, k = real(f.config.k_lp, 32);
         const Complex low_pass = k / (1.0 - (1 - k) * std::polar(1.0, -x));
-        const double delays[] = {0.35, 1.5, 1.5, -0.6};
+        const double delays[] = {0.35, 1.5, -0.6, 1.5};
         lead_ = std::polar(1.0, delays[f.config.function] * x) / low_pass;
         z_ = w_ = kJ * omega_ * psi_ * std::polar(1.0, truth.theta_rad);
         e_ = z_ / lead_;
@@ -97,6 +99,13 @@ class Reference
     }
 
   private:
+    // One step of Newton's from the power of two: 0 to 6.1 % above the root.
+    static double coarse_root(double x)
+    {
+        const double start = std::exp2(std::floor((std::log2(2.25 * x * 0x1p28) + 1) / 2));
+        return x > 0 ? (start + 2.25 * x * 0x1p28 / start) / 2 * 0x1p-14 / 1.5 : 0;
+    }
+
     double switched(double s, bool imag)
     {
         const double steep = SLIDING_MODE_STEP / t_, sign = (s > 0) - (s < 0);
@@ -113,7 +122,7 @@ class Reference
         double w = imag ? w_.imag() : w_.real();
         w += t_ * 1.1 * Lambda_ * sign;
         w_ = imag ? Complex{w_.real(), w} : Complex{w, w_.imag()};
-        return w + 1.5 * std::sqrt(Lambda_ * std::abs(s)) * sign;
+        return w + 1.5 * coarse_root(Lambda_ * std::abs(s)) * sign;
     }
 
     Fixture f_;
@@ -149,9 +158,8 @@ TEST(SlidingMode, FollowsTheReferenceInDoublePrecision)
             EXPECT_LE(deviation(ipm(function), omega, 20000), kRounding) << function << ' ' << omega;
         }
         // where the sign is decided by the last bit the paths part: compared as long as they do not
-        for (const auto function : {SLIDING_MODE_SIGN, SLIDING_MODE_SUPER_TWISTING}) {
-            EXPECT_LE(deviation(ipm(function), omega, 300), kRounding) << function << ' ' << omega;
-        }
+        EXPECT_LE(deviation(ipm(SLIDING_MODE_SIGN), omega, 300), kRounding) << omega;
+        EXPECT_LE(deviation(ipm(SLIDING_MODE_SUPER_TWISTING), omega, 300), kTwisted) << omega;
     }
 }
 
