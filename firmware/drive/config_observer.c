@@ -48,21 +48,19 @@ static void make_active_flux(maker_t *m, active_flux_config_t *c)
     c->k_seed = fixed(m, pm_num_mul(TIE, m->base.t_s), FRAC_BITS, DRIVE_PARAM_f_pwm);
 }
 
-/* Share of v_dc_nominal, the farthest the EMF can be followed, that the gain has at standstill. */
-#define SLIDING_MODE_BASE pm_num_ratio(1, 20)
-
 static void make_sliding_mode(maker_t *m, sliding_mode_config_t *c)
 {
     const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
-    const pm_num_t omega_c = mul3(PM_NUM_TWO_PI, pm_num(100), m->base.t_s);
+    const pm_num_t omega_c = pm_num_mul(angular(m, DRIVE_PARAM_sliding_bandwidth), m->base.t_s);
+    const pm_num_t K = pm_num_mul(si(m, DRIVE_PARAM_sliding_gain), si(m, DRIVE_PARAM_v_dc_nominal));
     make_model(m, &c->model);
-    c->function = SLIDING_MODE_SATURATION;
-    const pm_num_t k_base = pm_num_mul(SLIDING_MODE_BASE, si(m, DRIVE_PARAM_v_dc_nominal));
-    c->k_base = fixed(m, pm_num_div(k_base, m->base.v), Q_BITS, DRIVE_PARAM_v_dc_nominal);
-    c->k_speed = PM_Q(2.0);
+    c->function = (sliding_mode_function_t)m->params->sliding_function;
+    c->k_base = fixed(m, pm_num_div(K, m->base.v), Q_BITS, DRIVE_PARAM_sliding_gain);
+    c->k_speed = fixed(m, si(m, DRIVE_PARAM_sliding_gain_speed), Q_BITS, DRIVE_PARAM_sliding_gain_speed);
     c->omega_tie = pm_max(speed(m, DRIVE_PARAM_speed_low), PM_Q(0.004));
     c->omega_min = c->omega_tie / 4;
-    c->k_lp = fixed(m, pm_num_div(omega_c, pm_num_add(pm_num(1), omega_c)), FRAC_BITS, DRIVE_PARAM_f_pwm);
+    c->k_lp = gain(m, pm_num_div(omega_c, pm_num_add(pm_num(1), omega_c)), FRAC_BITS,
+                   DRIVE_PARAM_sliding_bandwidth);
     c->slope = fixed(m, pm_num_div(pm_num_ratio(1, 2), step), SMALL_BITS, DRIVE_PARAM_f_pwm);
 }
 
@@ -81,9 +79,9 @@ static ekf_noise_t ekf_noise(const maker_t *m)
     const pm_num_t acceleration = pm_num_mul(si(m, DRIVE_PARAM_acceleration), pole_pairs(m));
     return (ekf_noise_t){
         .current = si(m, DRIVE_PARAM_i_noise),
-        .voltage = pm_num_mul(si(m, DRIVE_PARAM_v_dc_nominal), pm_num_ratio(1, 150)),
-        .speed = mul3(acceleration, pm_num_ratio(1, 6), root),
-        .angle = pm_num_mul(pm_num_ratio(1, 20), root),
+        .voltage = pm_num_mul(si(m, DRIVE_PARAM_v_dc_nominal), si(m, DRIVE_PARAM_ekf_voltage_noise)),
+        .speed = mul3(acceleration, si(m, DRIVE_PARAM_ekf_speed_noise), root),
+        .angle = pm_num_mul(si(m, DRIVE_PARAM_ekf_angle_noise), root),
         .u = mul3(si(m, DRIVE_PARAM_psi_m), m->base.omega, m->base.t_s),
     };
 }
