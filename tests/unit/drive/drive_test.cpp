@@ -5,16 +5,9 @@
 #include <memory>
 #include <vector>
 
+#include "tests/support/application.h"
 #include "tests/support/plants.h"
 #include "tests/unit/drive/direct.h"
-
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpedantic"
-#pragma GCC diagnostic ignored "-Wc++20-extensions"
-extern "C" {
-#include "hal/sim/sim_loop.h"
-}
-#pragma GCC diagnostic pop
 
 namespace
 {

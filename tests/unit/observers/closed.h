@@ -1,8 +1,8 @@
-// An observer in a loop of 25 Hz on a machine at constant speed and current, with the noise of a converter.
+// Any observer of the list with a phase-locked loop in double around a rotor at constant speed, with or
+// without the noise of a converter.
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 
 #include "tests/contract/bench.h"
 #include "tests/unit/math/samples.h"
@@ -16,45 +16,48 @@ struct Errors {
     double mean = 0, max = 0, ripple = 0; // degrees
 };
 
-template <class Functions> class ClosedLoop
+class Closed
 {
   public:
-    using Config = typename Functions::Config;
-
-    ClosedLoop(const Config &config, const Base &base, const Rotation &truth,
-               double noise_A = kConverterNoise_A)
-        : rotation(truth), config_(config), base_(base), noise_A_(noise_A)
+    Closed(const Base &base, const observer_config_t &of, const Rotation &truth, double noise_A = 0)
+        : config(of), rotation(truth), base_(base), noise_A_(noise_A)
     {
         loop.theta_rad = rotation.theta_rad;
         loop.omega_rad_s = rotation.omega_rad_s;
-        const obs_in_t in = rotation.seen(loop.theta_rad, loop.omega_rad_s);
-        Functions::reset(&state, &config_, &in);
+        in = rotation.seen(loop.theta_rad, loop.omega_rad_s);
+        observer_reset(&state, &config, &in);
     }
 
-    void step()
+    void step(pm_q_t weight = PM_ONE)
     {
         rotation.advance();
         loop.predict(base_.period_s);
-        const Complex noise = noise_A_ * Complex{gauss(), gauss()};
-        const obs_in_t in = rotation.seen(loop.theta_rad, loop.omega_rad_s, 0, noise);
-        Functions::step(&state, &config_, &in, &out);
+        const Complex noise = noise_A_ == 0 ? 0 : noise_A_ * Complex{gauss(), gauss()};
+        in = rotation.seen(loop.theta_rad, loop.omega_rad_s, 0, noise);
+        observer_step(&state, &config, &in, &out);
         loop.correct(real(out.eps), base_.period_s);
         if (++periods_ % 10 == 0) {
-            Functions::slow(&state, &config_, &in, &out, PM_ONE);
+            observer_slow(&state, &config, &in, &out, weight);
         }
     }
 
-    double error_deg() const
+    double error_deg() const // theta - theta_hat
     {
         return wrapped(rotation.theta_rad - loop.theta_rad) / kDegree;
+    }
+
+    double settled_deg(double seconds = 1.0)
+    {
+        for (int k = 0; k < static_cast<int>(seconds / base_.period_s); ++k) {
+            step();
+        }
+        return error_deg();
     }
 
     Errors settled(double settle_s = 0.5, double seconds = 0.5)
     {
         const auto n = static_cast<int>(seconds / base_.period_s);
-        for (int k = 0; k < static_cast<int>(settle_s / base_.period_s); ++k) {
-            step();
-        }
+        settled_deg(settle_s);
         double sum = 0, squares = 0;
         Errors e;
         for (int k = 0; k < n; ++k) {
@@ -68,10 +71,12 @@ template <class Functions> class ClosedLoop
         return e;
     }
 
-    typename Functions::State state = {};
-    obs_out_t out = {};
+    observer_config_t config;
+    observer_t state = {};
     Loop loop;
     Rotation rotation;
+    obs_in_t in = {};
+    obs_out_t out = {};
 
   private:
     double gauss() // of twelve uniform ones
@@ -83,35 +88,10 @@ template <class Functions> class ClosedLoop
         return sum;
     }
 
-    Config config_;
     Base base_;
     double noise_A_;
     samples::Random random_;
     int periods_ = 0;
-};
-
-struct SlidingModeFunctions {
-    using State = sliding_mode_t;
-    using Config = sliding_mode_config_t;
-    static constexpr auto reset = sliding_mode_reset;
-    static constexpr auto step = sliding_mode_step;
-    static constexpr auto slow = sliding_mode_slow;
-};
-
-struct EkfFullFunctions {
-    using State = ekf_full_t;
-    using Config = ekf_full_config_t;
-    static constexpr auto reset = ekf_full_reset;
-    static constexpr auto step = ekf_full_step;
-    static constexpr auto slow = ekf_full_slow;
-};
-
-struct EkfReducedFunctions {
-    using State = ekf_reduced_t;
-    using Config = ekf_reduced_config_t;
-    static constexpr auto reset = ekf_reduced_reset;
-    static constexpr auto step = ekf_reduced_step;
-    static constexpr auto slow = ekf_reduced_slow;
 };
 
 } // namespace bench

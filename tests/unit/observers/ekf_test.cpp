@@ -31,8 +31,56 @@ constexpr double kCovariance = 1e-3;
 // Noise of the converter through loops of 25 Hz.
 constexpr double kIdeal_deg = 0.2;
 
-using Full = bench::ClosedLoop<bench::EkfFullFunctions>;
-using Reduced = bench::ClosedLoop<bench::EkfReducedFunctions>;
+// With the noise of a converter.
+class Full : public bench::Closed
+{
+  public:
+    Full(const ekf_full_config_t &filter, const Base &b, const Rotation &truth)
+        : Closed(b, of(filter), truth, bench::kConverterNoise_A)
+    {
+    }
+
+  private:
+    static observer_config_t of(const ekf_full_config_t &filter)
+    {
+        observer_config_t c = {};
+        c.id = OBSERVER_ekf_full;
+        c.ekf_full = filter;
+        return c;
+    }
+};
+
+class Reduced : public bench::Closed
+{
+  public:
+    Reduced(const ekf_reduced_config_t &filter, const Base &b, const Rotation &truth)
+        : Closed(b, of(filter), truth, bench::kConverterNoise_A)
+    {
+    }
+
+  private:
+    static observer_config_t of(const ekf_reduced_config_t &filter)
+    {
+        observer_config_t c = {};
+        c.id = OBSERVER_ekf_reduced;
+        c.ekf_reduced = filter;
+        return c;
+    }
+};
+
+struct FullFunctions {
+    using State = ekf_full_t;
+    static constexpr auto reset = ekf_full_reset;
+    static constexpr auto step = ekf_full_step;
+    static constexpr auto slow = ekf_full_slow;
+};
+
+struct ReducedFunctions {
+    using State = ekf_reduced_t;
+    static constexpr auto reset = ekf_reduced_reset;
+    static constexpr auto step = ekf_reduced_step;
+    static constexpr auto slow = ekf_reduced_slow;
+};
 
 // The filters in double precision, in the form of the literature: both currents at once through the inverse
 // of a matrix, P = (I - K H) P. Units of the headers.
@@ -188,7 +236,7 @@ struct Deviation {
 
 // Seen from a position that is 0.1 rad behind, with noise. The covariance once the gains are below what they
 // are held at; the angle once the start, which that prolongs, is forgotten.
-template <class Loop, class Reference, class Functions, class Config>
+template <class Reference, class Functions, class Config>
 Deviation deviation(const Config &config, const Machine &m, const Base &b, double omega_pu, Complex i_A)
 {
     Rotation rotation(m, b, omega_pu, i_A, 1.0);
@@ -226,10 +274,10 @@ TEST(Ekf, FollowsTheReferenceInDoublePrecision)
     const Base b = bench::kIpmBase;
     for (const double share : {0.05, -0.3, 1.0}) {
         for (const Complex i : {Complex{0, 0}, kRated_A, std::conj(kRated_A)}) {
-            const Deviation f = deviation<Full, FullReference, bench::EkfFullFunctions>(
-                bench::ekf_full_config(m, b), m, b, share * kRated_pu, i);
-            const Deviation r = deviation<Reduced, ReducedReference, bench::EkfReducedFunctions>(
-                bench::ekf_reduced_config(m, b), m, b, share * kRated_pu, i);
+            const Deviation f = deviation<FullReference, FullFunctions>(bench::ekf_full_config(m, b), m, b,
+                                                                        share * kRated_pu, i);
+            const Deviation r = deviation<ReducedReference, ReducedFunctions>(bench::ekf_reduced_config(m, b),
+                                                                              m, b, share * kRated_pu, i);
             EXPECT_LE(f.angle, kRounding_rad) << share << ' ' << i;
             EXPECT_LE(f.covariance, kCovariance) << share << ' ' << i;
             EXPECT_LE(r.angle, kRounding_rad) << share << ' ' << i;
@@ -319,12 +367,9 @@ TEST(Ekf, TheCovarianceStaysPositive)
             noise.voltage_V *= q;
             noise.speed_rad_s *= q;
             noise.angle_rad *= q;
-            EXPECT_GT((least_eigenvalue<bench::EkfFullFunctions, 4>(bench::ekf_full_config(m, b, noise))),
-                      0.0)
+            EXPECT_GT((least_eigenvalue<FullFunctions, 4>(bench::ekf_full_config(m, b, noise))), 0.0)
                 << r << ' ' << q;
-            EXPECT_GT(
-                (least_eigenvalue<bench::EkfReducedFunctions, 2>(bench::ekf_reduced_config(m, b, noise))),
-                0.0)
+            EXPECT_GT((least_eigenvalue<ReducedFunctions, 2>(bench::ekf_reduced_config(m, b, noise))), 0.0)
                 << r << ' ' << q;
         }
     }

@@ -57,10 +57,20 @@ Fixture spm(sliding_mode_function_t function)
 const sliding_mode_function_t kAll[] = {SLIDING_MODE_SIGN, SLIDING_MODE_SATURATION, SLIDING_MODE_SIGMOID,
                                         SLIDING_MODE_SUPER_TWISTING};
 
-class Closed : public bench::ClosedLoop<bench::SlidingModeFunctions>
+observer_config_t of(const sliding_mode_config_t &config)
+{
+    observer_config_t c = {};
+    c.id = OBSERVER_sliding_mode;
+    c.sliding_mode = config;
+    return c;
+}
+
+// Measured with noise, in a loop of 25 Hz.
+class Closed : public bench::Closed
 {
   public:
-    Closed(const Fixture &f, const Rotation &truth) : ClosedLoop(f.config, f.base, truth)
+    Closed(const Fixture &f, const Rotation &truth)
+        : bench::Closed(f.base, of(f.config), truth, bench::kConverterNoise_A)
     {
     }
 };
