@@ -18,7 +18,7 @@
  * How to choose them: tools/ekf_tune, docs/results/ekf_tuning.md.
  *
  * Called each period; the result belongs to k. Range: |psi| < 4, L < 4, |delta| <= 1, |omega| < 2; an
- * innovation counts up to 32 u. At weight 0 delta and omega return to the present position within 8 ms.
+ * innovation counts up to 32 u. At weight 0 delta is halved each slow step and all else starts anew.
  * misfit: innovation of the q-axis over u. vector: active flux. Tests: tests/unit/observers/ekf_test.cpp
  * (against Eigen in double precision), tests/scenario. Cost: tests/target/observers. */
 #ifndef OBSERVERS_EKF_FULL_H

@@ -24,11 +24,17 @@ static void set_operating_point(ekf_reduced_t *self, const ekf_reduced_config_t 
     self->r_delta = pm_min(pm_mul_sat(pm_div(pm_div(config->r, reach), reach), ratio), MOST_R);
 }
 
+static void set_covariance(ekf_reduced_t *self)
+{
+    self->P[PM_KALMAN_AT(EKF_REDUCED_OMEGA, EKF_REDUCED_OMEGA)] = SEED_OMEGA;
+    self->P[PM_KALMAN_AT(EKF_REDUCED_DELTA, EKF_REDUCED_OMEGA)] = 0;
+    self->P[PM_KALMAN_AT(EKF_REDUCED_DELTA, EKF_REDUCED_DELTA)] = SEED_DELTA;
+}
+
 void ekf_reduced_reset(ekf_reduced_t *self, const ekf_reduced_config_t *config, const obs_in_t *in)
 {
     *self = (ekf_reduced_t){.omega = in->omega};
-    self->P[PM_KALMAN_AT(EKF_REDUCED_OMEGA, EKF_REDUCED_OMEGA)] = SEED_OMEGA;
-    self->P[PM_KALMAN_AT(EKF_REDUCED_DELTA, EKF_REDUCED_DELTA)] = SEED_DELTA;
+    set_covariance(self);
     set_operating_point(self, config, in->omega, in->i_dq);
     const pm_dq_t magnet = {.d = config->model.psi_m, .q = 0};
     dq_flux_keep(&self->flux, dq_flux_lambda(&self->flux, in->i, in->dir), magnet, in->dir);
@@ -106,9 +112,10 @@ void ekf_reduced_slow(ekf_reduced_t *self, const ekf_reduced_config_t *config, c
                       const obs_out_t *out, pm_q_t weight)
 {
     (void)out;
-    if (weight == 0) {
-        self->delta -= self->delta / 8;
-        self->omega += (in->omega - self->omega) / 8;
+    if (weight == 0) { /* a start that waits: at standstill nothing is seen, and the angle would wander */
+        self->delta /= 2;
+        self->omega = in->omega;
+        set_covariance(self);
     }
     self->misfit = pm_sat(pm_abs(self->omega - in->omega), PM_Q_BITS);
     set_operating_point(self, config, in->omega, in->i_dq);

@@ -18,7 +18,7 @@
  * (omega / omega_min)^2.
  *
  * Called each period; the result belongs to k. Range: |psi| < 4, L < 4, |delta| <= 1, |omega| < 2. At weight
- * 0 delta and omega return to the present position within 8 ms. misfit: difference of the speeds, filter and
+ * 0 delta is halved each slow step and all else starts anew. misfit: difference of the speeds, filter and
  * loop, relative to base speed, at 1 kHz. vector: active flux. Tests: tests/unit/observers/ekf_test.cpp
  * (against Eigen in double precision), tests/scenario. Cost: tests/target/observers. */
 #ifndef OBSERVERS_EKF_REDUCED_H
