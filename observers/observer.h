@@ -20,6 +20,9 @@
 #define OBSERVERS_OBSERVER_H
 
 #include "observers/active_flux.h"
+#include "observers/mras_current.h"
+#include "observers/mras_simple.h"
+#include "observers/mras_voltage.h"
 
 typedef enum {
 #define PM_OBSERVER(name, help) OBSERVER_##name,

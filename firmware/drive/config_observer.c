@@ -23,14 +23,15 @@ static void make_model(maker_t *m, observer_model_t *c)
 /* What is not known is tied to the position with so many rad/s while injection leads. */
 #define TIE pm_num(300)
 
-/* R follows in 8 ms at rated current. */
-static void make_resistance(maker_t *m, const observer_model_t *model, observer_resistance_t *c)
+/* R follows in 8 ms at rated current. seen: what the observer shows of one unit of lacking voltage. */
+static void make_resistance(maker_t *m, const observer_model_t *model, pm_num_t seen,
+                            observer_resistance_t *c)
 {
     const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
     c->k = 0;
     if (m->params->resistance_adaptation != 0) {
         const pm_num_t follow = pm_num_ratio(1, 8);
-        const pm_num_t k = pm_num_div(pm_num_mul(follow, TIE), pm_num_mul(m->base.omega, square(i_rated)));
+        const pm_num_t k = pm_num_div(follow, pm_num_mul(seen, square(i_rated)));
         c->k = fixed(m, k, GAIN_BITS, DRIVE_PARAM_i_rated);
     }
     c->omega = speed(m, DRIVE_PARAM_speed_low) / 2;
@@ -42,10 +43,42 @@ static void make_active_flux(maker_t *m, active_flux_config_t *c)
 {
     const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
     make_model(m, &c->model);
-    make_resistance(m, &c->model, &c->resistance);
+    make_resistance(m, &c->model, pm_num_div(m->base.omega, TIE), &c->resistance);
     c->g = fixed(m, pm_num_mul(si(m, DRIVE_PARAM_flux_gain), step), FRAC_BITS, DRIVE_PARAM_flux_gain);
     c->k_adapt = PM_FRAC(0.01);
     c->k_seed = fixed(m, pm_num_mul(TIE, m->base.t_s), FRAC_BITS, DRIVE_PARAM_f_pwm);
+}
+
+/* The adapted quantity at 50 Hz, twice the loop; nothing is claimed below a quarter of the speed at which the
+ * observer comes in. lag: radians of the speed in the reactive term. */
+static void make_mras(maker_t *m, int32_t lag, mras_config_t *c)
+{
+    make_model(m, &c->model);
+    make_resistance(m, &c->model, pm_num(1), &c->resistance);
+    const pm_num_t L = pm_num_div(si(m, DRIVE_PARAM_L_d), m->inductance);
+    const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
+    (void)fixed(m, pm_num_div(L, step), 24, DRIVE_PARAM_L_d);
+    (void)fixed(m, pm_num_div(step, L), 30, DRIVE_PARAM_L_d);
+    c->k = fixed(m, mul3(PM_NUM_TWO_PI, pm_num(50), m->base.t_s), FRAC_BITS, DRIVE_PARAM_f_pwm);
+    c->emf_min = pm_max(1, pm_mul(speed(m, DRIVE_PARAM_speed_low) / 4, c->model.psi_m));
+    const pm_num_t turn = pm_num_div(pm_num_mul(m->base.omega, m->t_slow), pm_num(lag));
+    c->turn = fixed(m, least(turn, pm_num_ratio(49, 100)), FRAC_BITS, DRIVE_PARAM_f_pwm);
+}
+
+/* Radians above (L_q - L_d) i_q / psi_a, and above L_q i_q / psi_a. */
+static void make_mras_current(maker_t *m, mras_current_config_t *c)
+{
+    make_mras(m, 1, c);
+}
+
+static void make_mras_voltage(maker_t *m, mras_voltage_config_t *c)
+{
+    make_mras(m, 1, c);
+}
+
+static void make_mras_simple(maker_t *m, mras_simple_config_t *c)
+{
+    make_mras(m, 2, c);
 }
 
 void make_observer(maker_t *m, observer_config_t *c)

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tests/contract/bench.h"
+#include "tests/contract/mras_config.h"
 
 namespace bench
 {
@@ -21,6 +22,12 @@ namespace observers
 inline void configure(active_flux_config_t &c, const Machine &m, const Base &b)
 {
     c = flux_config(m, b);
+}
+
+// The three of observers/mras.h have one configuration. A lag of two radians serves the simplified one too.
+inline void configure(mras_config_t &c, const Machine &m, const Base &b)
+{
+    c = mras_config(m, b, 2);
 }
 
 } // namespace observers
