@@ -5,6 +5,8 @@
  *   v = (R + p L_d) i + w_f (L_q - L_d) J i + (0, E),  E = omega psi_a,  J = [0 -1; 1 0]
  * Currents are changes in the stationary frame, so a correction of the position leaves no step in them.
  * What was measured over [k-1, k) belongs to its middle: it is turned by omega T_s / 2 into the frame of k.
+ * The error signal is the mean of two periods: an error of L_d leaves a carrier of half the sampling rate in
+ * it, which would otherwise meet the limit of +-1, and a current sample stands in it as L_d/T_s.
  *
  * The error signal is divided by E as E / max(|E|, emf_min)^2: its sign is right in both directions and it
  * fades to nothing at standstill, where nothing is to be seen. The quotient is renewed at 1 kHz.
@@ -12,7 +14,7 @@
  * The reactive term needs the speed of the loop, which moves with the error signal. With c = (L_q - L_d) i_q
  * / E the two run away at 1 / (c - tau) unless the speed reaches the model through a lag tau > c. So w_f lags
  * by n radians of the rotor, tau = n / omega, n > (L_q - L_d) i_q / psi_a; under an acceleration a that costs
- * a tau c. (The simplified model has L_q in the place of L_q - L_d.) */
+ * a tau c. */
 #ifndef OBSERVERS_MRAS_H
 #define OBSERVERS_MRAS_H
 

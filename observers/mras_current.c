@@ -65,7 +65,9 @@ void mras_current_step(mras_current_t *self, const mras_current_config_t *config
     pm_dq_t change = mras_middle(pm_park_half(stationary, in->dir), turning.second); /* Q25 */
     change.d = pm_mulh_sub(change.d, in->i_dq.q, turning.first);
     change.q = pm_mulh_add(pm_mulh_add(change.q, in->i_dq.d, turning.first), self->emf, self->response);
-    change.d = pm_shl(pm_sat(change.d, 24), 7);
+    const int32_t d = change.d + self->change_d;
+    self->change_d = change.d;
+    change.d = pm_shl(pm_sat(d, 25), 6); /* the mean of two */
     change.q = pm_shl(pm_sat(change.q, 24), 7);
     describe(self, change, out);
     self->emf = pm_sat(pm_mulh_sub(self->emf, change.q, self->adapt), 30);

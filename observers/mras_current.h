@@ -31,8 +31,9 @@ typedef struct {
     pm_q_t emf_model;       /* omega psi_a */
     pm_q_t emf;             /* E^ */
     obs_out_t last;
-    pm_q_t omega_f; /* w_f */
-    pm_q_t R;       /* adapted */
+    pm_q_t omega_f;   /* w_f */
+    int32_t change_d; /* D_d of the last step, Q25 */
+    pm_q_t R;         /* adapted */
 } mras_current_t;
 
 void mras_current_reset(mras_current_t *self, const mras_current_config_t *config, const obs_in_t *in);

@@ -1,15 +1,18 @@
 /* Model reference adaptive system, simplified voltage model (METHODS.md 12.2.4, row 139).
  *
- * The d-axis of the voltage model alone, without the change of current, with the sign and the size of the
- * EMF from the filtered speed w_f:
- *   D_d = v_d - R i_d + w_f L_q i_q = -E sin(error),  eps = -D_d / (w_f psi_a)
- * v_d is the mean of two periods, from which a square-wave carrier is gone. The turn of half a period is left
- * to v_q of the model in the steady state: eps gets (w_f T_s/2) v_q / (w_f psi_a) at 1 kHz instead of two
- * products per period. What it gives up: eps is L_d p i_d / E wrong while i_d moves, and no q-axis means no
- * EMF ratio and no misfit (always 0): a lost position shows in eps alone.
+ * The d-axis of the voltage model alone, with the sign and the size of the EMF from the filtered speed w_f:
+ *   D_d = v_d - R i_d - L_q (p i)_d = -E sin(error),  eps = -D_d / (w_f psi_a)
+ * where (p i)_d is the change of the stationary current seen along the d-axis, which holds -omega i_q: so no
+ * speed enters the model. (With w_f L_q i_q instead, the loop's own correction k_p eps turns the frame that
+ * the current control holds i_q in, which is a positive feedback of k_p L_q i_q / E: unstable at rated load
+ * below a third of rated speed.) All is the mean of two periods. The turn of half a period is left to v_q of
+ * the steady state at 1 kHz: eps gets (w_f T_s/2) (R i_q + E) / E instead of two products per period.
  *
- * R stays as it is given. Called each period; result belongs to k. Range: |v| and |i| < 2. vector: (D_d,
- * w_f psi_a). Tests: tests/unit/observers/mras_test.cpp, tests/scenario. */
+ * What it gives up: eps is (L_d - L_q) p i_d / E wrong while i_d moves, and without the q-axis there is no
+ * EMF ratio and no misfit (always 0): a lost position shows in eps alone. R stays as it is given.
+ *
+ * Called each period; result belongs to k. Range: |v| and |i| < 2, L_q / (T_s emf_min) < 2048 or it is held
+ * there. vector: (D_d, w_f psi_a). Tests: tests/unit/observers/mras_test.cpp, tests/scenario. */
 #ifndef OBSERVERS_MRAS_SIMPLE_H
 #define OBSERVERS_MRAS_SIMPLE_H
 
@@ -18,9 +21,10 @@
 typedef mras_config_t mras_simple_config_t;
 
 typedef struct {
-    int32_t resistive, reactive; /* R and w_f L_q over E, Q24 */
+    pm_ab_t i;                   /* at k-1 */
     int32_t inverse, offset;     /* 1 / E, Q24; what v_q adds, Q20 */
-    int32_t v_d;                 /* of the last period, Q27 */
+    int32_t resistive, reactive; /* R / E, Q24; L_q / (T_s E), Q20 */
+    int32_t v_d, rise;           /* of the last period, Q27: v_d and the change of current along d */
     pm_q_t eps;                  /* of the last step */
     pm_q_t emf;                  /* w_f psi_a */
     pm_q_t omega;                /* w_f */

@@ -58,7 +58,9 @@ void mras_voltage_step(mras_voltage_t *self, const mras_voltage_config_t *config
     pm_dq_t d = mras_middle(pm_park_half(e, in->dir), turning.second); /* Q19 */
     d.d = pm_mulh_add(d.d, in->i_dq.q, turning.first);
     d.q = pm_mulh_sub(pm_mulh_sub(d.q, in->i_dq.d, turning.first), self->omega, self->psi);
-    const pm_dq_t held = {.d = pm_shl(pm_sat(d.d, 20), 9), .q = pm_shl(pm_sat(d.q, 20), 9)};
+    const int32_t sum = d.d + self->difference_d;
+    self->difference_d = d.d;
+    const pm_dq_t held = {.d = pm_shl(pm_sat(sum, 21), 8), .q = pm_shl(pm_sat(d.q, 20), 9)};
     describe(self, held, out);
     self->omega = pm_sat(self->omega + pm_shl(pm_mulh(pm_shl(held.q, 2), self->adapt), 2), 30);
     self->last = *out;

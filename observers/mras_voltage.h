@@ -4,7 +4,7 @@
  * machine was given differs by (mras.h)
  *   v_VM = (R + p L_d) i + w_f (L_q - L_d) J i + (0, w^ psi_a)
  *   D_d = -E sin(error),  D_q = E cos(error) - w^ psi_a
- *   w^ += (k / psi_a) D_q,  eps = -D_d / (w^ psi_a),  misfit = 1 - w^ / omega
+ *   w^ += (k / psi_a) D_q,  eps = -mean of two D_d / (w^ psi_a),  misfit = 1 - w^ / omega
  * with p i = (i(k) - i(k-1))/T_s and i the mean of both ends. Knows psi_m, which moves no angle, only w^ and
  * the loop gain. w^ is the EMF ratio of speed.h.
  *
@@ -28,8 +28,9 @@ typedef struct {
     pm_q_t omega_loop;
     pm_q_t omega; /* w^ */
     obs_out_t last;
-    pm_q_t omega_f; /* w_f */
-    pm_q_t R;       /* adapted */
+    pm_q_t omega_f;       /* w_f */
+    int32_t difference_d; /* D_d of the last step, Q19 */
+    pm_q_t R;             /* adapted */
 } mras_voltage_t;
 
 void mras_voltage_reset(mras_voltage_t *self, const mras_voltage_config_t *config, const obs_in_t *in);

@@ -24,10 +24,10 @@ inline void configure(active_flux_config_t &c, const Machine &m, const Base &b)
     c = flux_config(m, b);
 }
 
-// The three of observers/mras.h have one configuration. A lag of two radians serves the simplified one too.
+// The three of observers/mras.h have one configuration.
 inline void configure(mras_config_t &c, const Machine &m, const Base &b)
 {
-    c = mras_config(m, b, 2);
+    c = mras_config(m, b);
 }
 
 } // namespace observers
