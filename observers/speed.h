@@ -3,7 +3,7 @@
  *   difference   w_d = (theta(k) - theta(k-N)) / (N T): exact mean, late by N T/2
  *   EMF ratio    w_e = e_q / psi: at once, wrong by what psi_m is
  *   combined     w = w_e + LPF(w_d - w_e): the mean of the first, the speed of the second
- * or the speed of the loop, which needs none of them.
+ * or the speed of the loop, which needs none of them: then nothing is done.
  *
  * The difference is taken against the turn that the loop's speed stands for, so it may be more than half a
  * turn: w_d = w_loop + (theta - theta(k-N) - N T w_loop) / (N T). e_q comes from the voltage equation in the
@@ -15,28 +15,30 @@
 #ifndef OBSERVERS_SPEED_H
 #define OBSERVERS_SPEED_H
 
-#include "observers/model.h"
+#include "firmware/math/fixed.h"
+#include "firmware/math/frames.h"
 
-#define SPEED_WINDOW 16U
+#define SPEED_WINDOW 8U
 
 typedef enum { SPEED_LOOP, SPEED_DIFFERENCE, SPEED_EMF_RATIO, SPEED_COMBINED, SPEED_COUNT } speed_id_t;
 
 typedef struct {
-    speed_id_t id;
-    uint32_t window;    /* N */
-    uint32_t turn_step; /* control periods per step */
-    int32_t k_theta;    /* pm_omega_to_angle() */
-    int32_t per_turn;   /* 2 pi / (N T w_base), Q26 */
-    pm_frac_t k_ratio;  /* low-pass of w_e per step, Q32 */
-    pm_frac_t k_mean;   /* low-pass of w_d - w_e per step, Q32 */
+    uint8_t id;         /* speed_id_t */
+    uint8_t window;     /* N */
+    uint16_t turn_step; /* control periods per step */
+    pm_q_t R, L_d, psi_m;
+    int32_t k_theta;   /* pm_omega_to_angle() */
+    int32_t per_turn;  /* 2 pi / (N T w_base), Q26 */
+    pm_frac_t k_ratio; /* low-pass of w_e per step, Q32 */
+    pm_frac_t k_mean;  /* low-pass of w_d - w_e per step, Q32 */
 } speed_config_t;
 
 typedef struct {
     pm_angle_t past[SPEED_WINDOW];
-    uint32_t next;
-    pm_q_t omega_d, omega_e;
+    uint8_t next;
+    bool ready; /* what it remembers is of the step before */
+    pm_q_t omega_e;
     pm_q_t difference; /* LPF(w_d - w_e) */
-    pm_q_t omega;      /* the result */
 } speed_t;
 
 typedef struct {
@@ -48,7 +50,6 @@ typedef struct {
 
 /* As if it had turned at this speed since long ago. */
 void speed_reset(speed_t *self, const speed_config_t *config, pm_angle_t theta, pm_q_t omega);
-pm_q_t speed_step(speed_t *self, const speed_config_t *config, const observer_model_t *model,
-                  const speed_in_t *in);
+pm_q_t speed_step(speed_t *self, const speed_config_t *config, const speed_in_t *in);
 
 #endif

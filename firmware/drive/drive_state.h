@@ -51,6 +51,7 @@ struct drive {
     pm_procedure_t pulses_state;
     current_control_t current;
     speed_control_t speed;
+    speed_t speed_estimate;
     field_weakening_t field_weakening;
 
     pm_dq_t i_ref;
