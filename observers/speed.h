@@ -7,8 +7,8 @@
  *
  * The difference is taken against the turn that the loop's speed stands for, so it may be more than half a
  * turn: w_d = w_loop + (theta - theta(k-N) - N T w_loop) / (N T). e_q comes from the voltage equation in the
- * present frame in the steady state, (v_q - R i_q) / (psi_m + L_d i_d), and so works behind any source; w_e
- * is filtered.
+ * present frame, w_e = (v_q - R i_q - L_q p i_q) / (psi_m + L_d i_d), and so works behind any source; w_e is
+ * filtered.
  *
  * Called at 1 kHz, T being that step, with values of the same period. Range: N <= SPEED_WINDOW, within which
  * the loop may be half a turn off. Tests: tests/unit/observers/speed_test.cpp. */
@@ -18,7 +18,7 @@
 #include "firmware/math/fixed.h"
 #include "firmware/math/frames.h"
 
-#define SPEED_WINDOW 8U
+#define SPEED_WINDOW 6U
 
 typedef enum { SPEED_LOOP, SPEED_DIFFERENCE, SPEED_EMF_RATIO, SPEED_COMBINED, SPEED_COUNT } speed_id_t;
 
@@ -27,6 +27,7 @@ typedef struct {
     uint8_t window;     /* N */
     uint16_t turn_step; /* control periods per step */
     pm_q_t R, L_d, psi_m;
+    pm_gain_t rise;    /* L_q / (T w_base), Q26 */
     int32_t k_theta;   /* pm_omega_to_angle() */
     int32_t per_turn;  /* 2 pi / (N T w_base), Q26 */
     pm_frac_t k_ratio; /* low-pass of w_e per step, Q32 */
@@ -37,6 +38,7 @@ typedef struct {
     pm_angle_t past[SPEED_WINDOW];
     uint8_t next;
     bool ready; /* what it remembers is of the step before */
+    pm_q_t i_q, v_q;
     pm_q_t omega_e;
     pm_q_t difference; /* LPF(w_d - w_e) */
 } speed_t;
@@ -48,8 +50,8 @@ typedef struct {
     pm_dq_t i;
 } speed_in_t;
 
-/* As if it had turned at this speed since long ago. */
-void speed_reset(speed_t *self, const speed_config_t *config, pm_angle_t theta, pm_q_t omega);
+/* Before the step of the same instant: as if it had turned at this speed since long ago. */
+void speed_reset(speed_t *self, const speed_config_t *config, const speed_in_t *in);
 pm_q_t speed_step(speed_t *self, const speed_config_t *config, const speed_in_t *in);
 
 #endif
