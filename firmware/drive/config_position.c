@@ -19,10 +19,12 @@ static pm_pll_config_t make_pll(maker_t *m, drive_param_id_t bandwidth)
     return make_gains(m, kp, ki, bandwidth);
 }
 
+#define EKF_SHARE pm_num_ratio(7067, 10000)
+
 /* The simplified EKF with the noise of the PLL, r = 0.7067 w_n: 2 r T, 2 r^2 T, r^3 T^2. */
 static pm_pll_config_t make_ekf(maker_t *m, int32_t *k_acceleration)
 {
-    const pm_num_t r = pm_num_mul(pm_num_ratio(7067, 10000), angular(m, DRIVE_PARAM_flux_bandwidth));
+    const pm_num_t r = pm_num_mul(EKF_SHARE, angular(m, DRIVE_PARAM_flux_bandwidth));
     const pm_num_t step = pm_num_mul(r, m->base.t_s);
     const pm_num_t jerk = pm_num_div(pm_num_mul(square(step), r), m->base.omega);
     *k_acceleration = gain(m, jerk, 36, DRIVE_PARAM_flux_bandwidth);
@@ -42,6 +44,30 @@ static void make_loop(maker_t *m, position_config_t *c)
         c->loop.k_omega = gain(m, corner, 30, DRIVE_PARAM_flux_bandwidth);
     } else {
         /* the loop alone */
+    }
+}
+
+/* Learns within 2 T / mu = 50 ms; the loop's gains as they act while the observer leads. */
+static void make_second_harmonic(maker_t *m, second_harmonic_config_t *c)
+{
+    const bool ekf = m->params->position_observer == (int32_t)LOOP_SIMPLIFIED_EKF;
+    const pm_num_t w_n = pm_num_div(angular(m, DRIVE_PARAM_flux_bandwidth), m->base.omega);
+    const pm_num_t r = pm_num_mul(EKF_SHARE, w_n);
+    const pm_num_t two = pm_num(2);
+    const pm_num_t k_p = ekf ? pm_num_mul(two, r) : pm_num_mul(pm_num_ratio(9, 5), w_n);
+    const pm_num_t k_i = ekf ? mul3(two, r, r) : square(w_n);
+    const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
+    *c = (second_harmonic_config_t){
+        .id = (second_harmonic_id_t)m->params->second_harmonic,
+        .mu = fixed(m, pm_num_mul(pm_num(40), m->base.t_s), FRAC_BITS, DRIVE_PARAM_f_pwm),
+        .k_p = fixed(m, k_p, Q_BITS, DRIVE_PARAM_flux_bandwidth),
+        .k_i = fixed(m, k_i, Q_BITS, DRIVE_PARAM_flux_bandwidth),
+        .k_1 = ekf ? fixed(m, mul3(r, r, r), Q_BITS, DRIVE_PARAM_flux_bandwidth) : 0,
+        .omega_least = fixed(m, w_n, Q_BITS, DRIVE_PARAM_flux_bandwidth) / 6,
+        .t_s = fixed(m, step, FRAC_BITS, DRIVE_PARAM_f_pwm),
+    };
+    if (c->id != SECOND_HARMONIC_STAYS && m->params->position_observer == (int32_t)LOOP_ARCTANGENT) {
+        refuse(m, DRIVE_PARAM_second_harmonic, "has nothing to learn from behind the arctangent");
     }
 }
 
@@ -186,6 +212,7 @@ void make_position(maker_t *m, position_config_t *c, bool injection)
     c->omega_low = speed(m, DRIVE_PARAM_speed_low);
     c->omega_high = speed(m, DRIVE_PARAM_speed_high);
     make_loop(m, c);
+    make_second_harmonic(m, &c->second_harmonic);
     if (m->params->speed_high <= m->params->speed_low) {
         refuse(m, DRIVE_PARAM_speed_high, "must be above speed_low");
         return;

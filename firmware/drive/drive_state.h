@@ -47,11 +47,9 @@ struct drive {
     modulator_t modulator;
 
     position_t position;
-    initial_pulses_t pulses;
     pm_procedure_t pulses_state;
     current_control_t current;
     speed_control_t speed;
-    speed_t speed_estimate;
     field_weakening_t field_weakening;
 
     pm_dq_t i_ref;
@@ -69,6 +67,10 @@ struct drive {
     uint16_t still_ms; /* standstill while stopping */
     uint16_t agree_ms; /* observer and imposed angle turn alike */
     int32_t temperature_dC;
+
+    /* not of a control period */
+    initial_pulses_t pulses;
+    speed_t speed_estimate;
 };
 
 #endif

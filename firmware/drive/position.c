@@ -48,6 +48,9 @@ void position_step(position_t *self, const position_config_t *config, pm_ab_t v,
         pulsating_square_demodulate(&self->square, &config->square, &in, &square);
         eps = square.eps + pm_mul(self->weight, eps - square.eps);
     }
+    if (__builtin_expect(config->second_harmonic.id != SECOND_HARMONIC_STAYS, 0) != 0) {
+        eps = second_harmonic_step(&self->second_harmonic, &config->second_harmonic, dir, eps);
+    }
     loop_correct(&self->loop, &config->loop, &pll, &self->gains, eps);
     self->pll = pll;
     *out = (position_out_t){.dir = dir, .i = i_dq, .omega = pll.omega};
@@ -57,6 +60,7 @@ void position_lead(position_t *self, const position_config_t *config, const pm_p
 {
     observer_tie(&self->observer, &config->observer);
     loop_reset(&self->loop);
+    second_harmonic_reset(&self->second_harmonic);
     self->pll = *imposed;
     self->pll.theta -= (pm_angle_t)pm_omega_to_angle(imposed->omega, self->gains.k_theta);
 }
@@ -123,6 +127,7 @@ void position_slow(position_t *self, const position_config_t *config, pm_ab_t i,
     self->gains.kp_turn = between(config->pll_low.kp_turn, config->pll_high.kp_turn, self->weight);
     self->gains.ki = between(config->pll_low.ki, config->pll_high.ki, self->weight);
     loop_slow(&self->loop, &config->loop, self->weight);
+    second_harmonic_slow(&self->second_harmonic, &config->second_harmonic, self->pll.omega, self->weight);
     observer_slow(&self->observer, &config->observer, &in, &seen, self->weight);
     set_quality(self, config, &seen);
 }

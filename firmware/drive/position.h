@@ -14,12 +14,14 @@
 #include "injection/pulsating_square.h"
 #include "observers/loop.h"
 #include "observers/observer.h"
+#include "observers/second_harmonic.h"
 
 typedef struct {
     observer_config_t observer;
     pulsating_square_config_t square;
     pm_pll_config_t pll_low, pll_high;
     loop_config_t loop;
+    second_harmonic_config_t second_harmonic;
     pm_q_t omega_low, omega_high;
     int32_t per_span; /* 1 / (omega_high - omega_low), Q20 */
     bool injection;
@@ -29,6 +31,7 @@ typedef struct {
     pm_pll_t pll;
     pm_pll_config_t gains; /* between pll_low and pll_high */
     loop_t loop;
+    second_harmonic_t second_harmonic;
     observer_t observer;
     pulsating_square_t square;
     pm_q_t weight;                   /* 0: injection, 1: observer */
