@@ -21,9 +21,3 @@ pm_q_t mras_cross(const mras_config_t *config, pm_q_t omega, pm_q_t i_q)
 {
     return pm_mul(omega, observer_L_q(&config->model, i_q) - config->model.L_d);
 }
-
-pm_q_t mras_resistance(const mras_config_t *config, pm_q_t R, const obs_in_t *in, pm_q_t e_q)
-{
-    const pm_q_t E = pm_mul(in->omega, observer_active_flux(&config->model, in->i_dq.d));
-    return observer_resistance(&config->resistance, R, in->omega, pm_mul_sat(e_q - E, in->i_dq.q));
-}

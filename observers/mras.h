@@ -11,6 +11,9 @@
  * The error signal is divided by E as E / max(|E|, emf_min)^2: its sign is right in both directions and it
  * fades to nothing at standstill, where nothing is to be seen. The quotient is renewed at 1 kHz.
  *
+ * R is the one given: what a square-wave carrier and p i_q leave on the q-axis at low speed would pass for
+ * more than the resistance itself.
+ *
  * The reactive term needs the speed of the loop, which moves with the error signal. With c = (L_q - L_d) i_q
  * / E the two run away at 1 / (c - tau) unless the speed reaches the model through a lag tau > c. So w_f lags
  * by n radians of the rotor, tau = n / omega, n > (L_q - L_d) i_q / psi_a; under an acceleration a that costs
@@ -22,7 +25,6 @@
 
 typedef struct {
     observer_model_t model;
-    observer_resistance_t resistance;
     pm_frac_t k;    /* bandwidth of the adapted quantity times T_s, Q32 */
     pm_q_t emf_min; /* > 0: below this |E| the error signal fades */
     pm_frac_t turn; /* w_base T_slow / n: radians per slow step over those of the lag, Q32, < 0.5 */
@@ -36,9 +38,6 @@ pm_q_t mras_speed(const mras_config_t *config, pm_q_t filtered, const obs_in_t *
 
 /* w_f (L_q(i_q) - L_d), Q28. */
 pm_q_t mras_cross(const mras_config_t *config, pm_q_t omega, pm_q_t i_q);
-
-/* R at weight 0, from the voltage along i_q that the model lacks. */
-pm_q_t mras_resistance(const mras_config_t *config, pm_q_t R, const obs_in_t *in, pm_q_t e_q);
 
 /* omega T_s / 2, Q32. */
 static inline int32_t mras_half_turn(const mras_config_t *config, pm_q_t omega)

@@ -9,7 +9,7 @@ static void set_operating_point(mras_current_t *self, const mras_current_config_
 {
     const observer_model_t *m = &config->model;
     const pm_q_t rise = pm_div(m->t_s / 16, m->L_d); /* T_s / L_d */
-    const pm_q_t r = pm_mul_sat(rise, self->R) / 2;
+    const pm_q_t r = pm_mul_sat(rise, m->R) / 2;
     const pm_q_t b = pm_div(rise, PM_ONE + r);
     self->keep = pm_shl(pm_sat(pm_div(PM_ONE - r, PM_ONE + r), PM_Q_BITS), 2);
     self->drive = pm_shl(pm_sat(b, PM_Q_BITS + 1), 2);
@@ -32,7 +32,7 @@ void mras_current_tie(mras_current_t *self, const mras_current_config_t *config)
 
 void mras_current_reset(mras_current_t *self, const mras_current_config_t *config, const obs_in_t *in)
 {
-    *self = (mras_current_t){.i = in->i, .R = config->model.R, .omega_f = in->omega};
+    *self = (mras_current_t){.i = in->i, .omega_f = in->omega};
     self->emf = pm_mul(in->omega, observer_active_flux(&config->model, in->i_dq.d));
     set_operating_point(self, config, in);
     mras_current_tie(self, config);
@@ -82,9 +82,9 @@ obs_out_t mras_current_last(const mras_current_t *self)
 void mras_current_slow(mras_current_t *self, const mras_current_config_t *config, const obs_in_t *in,
                        const obs_out_t *out, pm_q_t weight)
 {
+    (void)out;
     self->omega_f = mras_speed(config, self->omega_f, in, weight);
     if (weight == 0) {
-        self->R = mras_resistance(config, self->R, in, out->vector.q);
         self->emf = pm_mul(in->omega, observer_active_flux(&config->model, in->i_dq.d));
     }
     set_operating_point(self, config, in);

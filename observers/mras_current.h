@@ -9,7 +9,7 @@
  * sample stands as L_d/T_s times its difference in the EMF; the loop behind, of which it is the derivative,
  * takes it away.
  *
- * R follows at weight 0 as in active_flux.h. Called each period; result belongs to k. Range: T_s/L_d < 2,
+ * Called each period; result belongs to k. Range: T_s/L_d < 2,
  * L_d/T_s < 128, |v| and |i| < 2; currents that miss by half the base are held there. vector: E in the
  * present frame, held at +-4. Tests: tests/unit/observers/mras_test.cpp, tests/scenario. */
 #ifndef OBSERVERS_MRAS_CURRENT_H
@@ -33,7 +33,6 @@ typedef struct {
     obs_out_t last;
     pm_q_t omega_f;   /* w_f */
     int32_t change_d; /* D_d of the last step, Q25 */
-    pm_q_t R;         /* adapted */
 } mras_current_t;
 
 void mras_current_reset(mras_current_t *self, const mras_current_config_t *config, const obs_in_t *in);

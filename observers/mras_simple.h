@@ -9,7 +9,7 @@
  * the steady state at 1 kHz: eps gets (w_f T_s/2) (R i_q + E) / E instead of two products per period.
  *
  * What it gives up: eps is (L_d - L_q) p i_d / E wrong while i_d moves, and without the q-axis there is no
- * EMF ratio and no misfit (always 0): a lost position shows in eps alone. R stays as it is given.
+ * EMF ratio and no misfit (always 0): a lost position shows in eps alone.
  *
  * Called each period; result belongs to k. Range: |v| and |i| < 2, L_q / (T_s emf_min) < 2048 or it is held
  * there. vector: (D_d, w_f psi_a). Tests: tests/unit/observers/mras_test.cpp, tests/scenario. */

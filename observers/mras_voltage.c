@@ -9,7 +9,7 @@ static void set_operating_point(mras_voltage_t *self, const mras_voltage_config_
 {
     const observer_model_t *m = &config->model;
     const pm_q_t psi_a = pm_max(observer_active_flux(m, in->i_dq.d), PM_Q(1.0 / 128));
-    self->drop = self->R / 32;
+    self->drop = m->R / 32;
     self->rise = pm_div(m->L_d, m->t_s); /* a Q28 over a Q32 that is read as Q28: in Q24 */
     self->cross = mras_cross(config, self->omega_f, in->i_dq.q) / 32;
     self->half = mras_half_turn(config, in->omega);
@@ -28,7 +28,7 @@ void mras_voltage_tie(mras_voltage_t *self, const mras_voltage_config_t *config)
 
 void mras_voltage_reset(mras_voltage_t *self, const mras_voltage_config_t *config, const obs_in_t *in)
 {
-    *self = (mras_voltage_t){.i = in->i, .R = config->model.R, .omega = in->omega, .omega_f = in->omega};
+    *self = (mras_voltage_t){.i = in->i, .omega = in->omega, .omega_f = in->omega};
     set_operating_point(self, config, in);
     mras_voltage_tie(self, config);
 }
@@ -74,9 +74,9 @@ obs_out_t mras_voltage_last(const mras_voltage_t *self)
 void mras_voltage_slow(mras_voltage_t *self, const mras_voltage_config_t *config, const obs_in_t *in,
                        const obs_out_t *out, pm_q_t weight)
 {
+    (void)out;
     self->omega_f = mras_speed(config, self->omega_f, in, weight);
     if (weight == 0) {
-        self->R = mras_resistance(config, self->R, in, out->vector.q);
         self->omega = in->omega;
     }
     set_operating_point(self, config, in);

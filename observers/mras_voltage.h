@@ -8,7 +8,7 @@
  * with p i = (i(k) - i(k-1))/T_s and i the mean of both ends. Knows psi_m, which moves no angle, only w^ and
  * the loop gain. w^ is the EMF ratio of speed.h.
  *
- * R follows at weight 0 as in active_flux.h. Called each period; result belongs to k. Range: L_d/T_s < 128,
+ * Called each period; result belongs to k. Range: L_d/T_s < 128,
  * |v| and |i| < 2, psi_a > 1/128; |D| is held at 2, w^ at +-4. vector: E in the present frame. Tests:
  * tests/unit/observers/mras_test.cpp, tests/scenario. */
 #ifndef OBSERVERS_MRAS_VOLTAGE_H
@@ -30,7 +30,6 @@ typedef struct {
     obs_out_t last;
     pm_q_t omega_f;       /* w_f */
     int32_t difference_d; /* D_d of the last step, Q19 */
-    pm_q_t R;             /* adapted */
 } mras_voltage_t;
 
 void mras_voltage_reset(mras_voltage_t *self, const mras_voltage_config_t *config, const obs_in_t *in);

@@ -20,7 +20,6 @@ void observer_reset(observer_t *self, const observer_config_t *config, const obs
 void observer_step_other(observer_t *self, const observer_config_t *config, const obs_in_t *in,
                          obs_out_t *out)
 {
-    (void)self, (void)in; /* while the list has one */
     switch (config->id) {
 #define PM_OBSERVER_DEFAULT(name, help)
 #define PM_OBSERVER(name, help)                                                                              \

@@ -20,6 +20,9 @@
 #define OBSERVERS_OBSERVER_H
 
 #include "observers/active_flux.h"
+#include "observers/back_emf.h"
+#include "observers/extended_emf.h"
+#include "observers/extended_emf_ab.h"
 #include "observers/mras_current.h"
 #include "observers/mras_simple.h"
 #include "observers/mras_voltage.h"

@@ -26,7 +26,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
-import motulator_environment  # noqa: E402
+import python_environment  # noqa: E402
 
 
 def arguments():
@@ -42,7 +42,7 @@ if __name__ == "__main__":
     OPTIONS = arguments()
     if not OPTIONS.pmsim.is_file():
         sys.exit(f"{OPTIONS.pmsim}: not built; cmake --preset host-release && cmake --build --preset host-release")
-    motulator_environment.enter(OPTIONS.environment)
+    python_environment.enter("motulator", OPTIONS.environment)
 
 import motulator.drive.control.sm as control  # noqa: E402
 import numpy as np  # noqa: E402

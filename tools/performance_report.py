@@ -8,7 +8,6 @@ import re
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -17,6 +16,8 @@ PMSIM = ROOT / "out/build/host-release/tools/pmsim/pmsim"
 TARGET = ROOT / "out/build/stm32g431"
 IMAGE = TARGET / "pmdrive.elf"
 SCENARIOS = ROOT / "tests/scenario"
+FAST = (SCENARIOS / "board/identity.yaml", "--set", "theta=0")  # at 20 kHz
+RUNS = 5
 
 
 def output(command):
@@ -33,11 +34,16 @@ def count_step(folder):
 
 
 def run_board(folder, *words):
-    """(figures, wall seconds) of a run on the emulated board."""
+    """Figures of a run on the emulated board."""
     figures = folder / "figures.json"
-    began = time.monotonic()
     output([PMSIM, "board", IMAGE, *words, "--jobs", "1", "--quiet", "--figures", figures])
-    return json.loads(figures.read_text()), time.monotonic() - began
+    return json.loads(figures.read_text())
+
+
+def board_speed(*words):
+    """Simulated seconds per second of the wall: the best of several runs, which others on the machine slow down."""
+    runs = (json.loads(output([PMSIM, "board", IMAGE, *words, "--jobs", "1", "--json"])) for _ in range(RUNS))
+    return max(run["simulated_s"] / run["wall_s"] for run in runs)
 
 
 def limits():
@@ -55,8 +61,9 @@ def main():
     with tempfile.TemporaryDirectory(prefix="pm_performance") as name:
         folder = Path(name)
         step = count_step(folder)
-        demo, _ = run_board(folder, SCENARIOS / "demo.yaml")
-        fast, wall_s = run_board(folder, SCENARIOS / "board/identity.yaml", "--set", "theta=0")
+        demo = run_board(folder, SCENARIOS / "demo.yaml")
+        fast = run_board(folder, *FAST)
+        slow_speed, speed = board_speed(SCENARIOS / "demo.yaml"), board_speed(*FAST)
 
     def mode(key):
         return [f"{demo[f'control.{key}.mean']:.0f}", f"{demo[f'control.{key}.worst']:.0f}",
@@ -80,7 +87,8 @@ def main():
                ["stack, measured", f"{max(demo['stack_bytes'], fast['stack_bytes']):.0f} bytes", "2048"],
                ["interrupts after which the drive's memory was the host's, bit for bit",
                 f"{demo['identical'] + fast['identical']:.0f} of as many", "all"],
-               ["speed of the emulation with the plant, simulated s per wall s", f"{10.0 / wall_s:.1f}", "4"]]),
+               ["speed of the emulation with plant and comparison, simulated s per wall s", f"{speed:.1f}", "4"],
+              ["the same for the demonstration, at 10 kHz", f"{slow_speed:.1f}", ""]]),
         table(["image", "bytes", "budget"], [[what, size.strip(), bound.strip()] for what, size, bound in limits()]),
     ]
     text, found = re.subn(r"(?s)(<!-- measured -->\n).*?(<!-- end -->)",

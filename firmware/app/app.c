@@ -7,6 +7,8 @@
 
 /* The main loop is dead when a round takes longer. */
 #define TURN_MS 100U
+/* A round that nothing calls for: timers of the bus count in ms. */
+#define ROUND_US 250U
 
 /* Of i_trip, where the comparators act: the software's limit comes first unless the current is steep. */
 #define BREAK_PERCENT 110
@@ -66,7 +68,7 @@ drive_result_t app_configure(app_t *app, hal_t *hal, const drive_params_t *param
     (void)memset(app, 0, sizeof *app);
     app->hal = hal;
     app->slow_divider = 1;
-    app->slow_countdown = 1;
+    app->slow_at = 1;
     app->params = *params;
     app->f_pwm = params->f_pwm;
     app->stored = stored;
@@ -82,6 +84,7 @@ drive_result_t app_configure(app_t *app, hal_t *hal, const drive_params_t *param
         }
     }
     app_bus_init(app);
+    app->round_us = hal_time_us(hal) - ROUND_US;
     return result;
 }
 
@@ -94,10 +97,10 @@ void app_control(app_t *app)
     drive_step(&app->drive, &app->in, &app->out);
     hal_bridge_write(app->hal, &app->out);
     trace_sample(&app->trace);
-    app->periods++;
-    app->slow_countdown--;
-    if (app->slow_countdown == 0U) {
-        app->slow_countdown = app->slow_divider;
+    const uint32_t periods = app->periods + 1U;
+    app->periods = periods;
+    if (periods == app->slow_at) {
+        app->slow_at = periods + app->slow_divider;
         app->slow_busy = true;
         hal_pend_slow(app->hal);
     }
@@ -165,9 +168,27 @@ static void tell(app_t *app)
     hal_led(app->hal, hal_bridge_armed(app->hal));
 }
 
+/* The main loop comes by after every interrupt, mostly for nothing. */
+static bool is_due(app_t *app)
+{
+    const bool frames = app_bus_take(app);
+    const drive_state_t state = app->drive.state;
+    const uint32_t now_us = hal_time_us(app->hal);
+    const bool changed = state != app->seen_state || app->drive.fault != app->shown_fault || app->stalled;
+    if (!frames && !changed && !node_busy(&app->node) && now_us - app->round_us < ROUND_US) {
+        return false;
+    }
+    app->seen_state = state;
+    app->round_us = now_us;
+    return true;
+}
+
 void app_turn(app_t *app)
 {
     app->turn_age_ms = 0;
+    if (!is_due(app)) {
+        return;
+    }
     app_bus_run(app);
     if (app->stalled) {
         app_trip(app, DRIVE_FAULT_OVERRUN);

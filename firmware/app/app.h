@@ -5,7 +5,8 @@
  * parameters are those that were stored: an image without stored parameters says so and stays off.
  *
  *   app_boot(a, hal)   parameters from the store, hardware, drive; then interrupts run
- *   app_turn(a)        one round of the main loop; never blocks, but for a store that was asked for
+ *   app_turn(a)        one round of the main loop, cheap when nothing has changed and no timer of the bus can
+ *                      have run out; never blocks, but for a store that was asked for
  *   app_control(), app_slow(), app_monitor(): called up by the port (hal.h)
  *
  * drive_slow() runs in app_slow() between two control interrupts and is never interrupted by one: were it
@@ -45,15 +46,17 @@ struct app {
     hal_slow_t slow;
 
     hal_t *hal;
-    uint32_t slow_divider, slow_countdown; /* periods per app_slow(), and until the next */
-    volatile uint32_t periods;             /* control interrupts since start */
-    volatile bool slow_busy;               /* from its pending to its end */
+    uint32_t slow_divider, slow_at; /* periods per app_slow(), and of the next */
+    volatile uint32_t periods;      /* control interrupts since start */
+    volatile bool slow_busy;        /* from its pending to its end */
 
     volatile bool stalled;         /* the monitor has found that control has ceased */
     uint32_t seen_periods;         /* by the monitor */
     volatile uint32_t turn_age_ms; /* since the main loop's last round */
 
     drive_fault_t shown_fault; /* on the console and the bus */
+    drive_state_t seen_state;  /* by the last full round of the main loop, */
+    uint32_t round_us;         /* which was then */
     bool hardware;             /* configured: control interrupts come */
 
     /* parameters */
@@ -67,6 +70,7 @@ struct app {
     bool stored, refused, restart, batch;
     drive_param_id_t refused_param; /* that the last check named */
     uint16_t dropped;               /* stored pairs that this version does not know */
+    uint8_t routines;               /* what to identify: COMMISSIONING_... */
 
     /* bus */
     node_t node;

@@ -84,7 +84,8 @@ uint32_t node_host_put(void *context, const od_entry_t *entry, int32_t value)
     if (entry->slot == (uint16_t)OD_LIVE_PARAMETER_BATCH) {
         return app_put_batch(app, value != 0);
     }
-    const bool done = cia402_put(&app->cia402, entry->slot, value, &code) ||
+    const bool done = app_identify_put(app, entry->slot, value) ||
+                      cia402_put(&app->cia402, entry->slot, value, &code) ||
                       trace_put(&app->trace, entry->slot, value, &code);
     return done ? code : SDO_UNSUPPORTED;
 }
@@ -177,6 +178,8 @@ static drive_command_t command_of(const app_t *app, const cia402_out_t *out)
         command.mode = DRIVE_MODE_TORQUE;
     } else if (out->mode == CIA402_MODE_CURRENT) {
         command.mode = DRIVE_MODE_CURRENT;
+    } else if (out->mode == CIA402_MODE_IDENTIFY) {
+        app_identify_command(app, &command);
     } else {
         /* speed, also while there is none */
     }
@@ -210,15 +213,18 @@ static void profile(app_t *app)
     }
 }
 
-static void take_frames(app_t *app)
+bool app_bus_take(app_t *app)
 {
     hal_can_frame_t in;
-    for (uint32_t n = 0; n < FRAMES_MOST && hal_can_receive(app->hal, &in); n++) {
+    uint32_t n = 0;
+    while (n < FRAMES_MOST && hal_can_receive(app->hal, &in)) {
         node_frame_t frame = {.id = in.id, .length = in.length};
         (void)memcpy(frame.data, in.data, sizeof frame.data);
         node_receive(&app->node, &frame, hal_time_us(app->hal));
         profile(app); /* two controlwords in one round are two */
+        n++;
     }
+    return n > 0U;
 }
 
 static void watch_bus(app_t *app)
@@ -264,7 +270,6 @@ void app_bus_init(app_t *app)
 
 void app_bus_run(app_t *app)
 {
-    take_frames(app);
     watch_bus(app);
     profile(app);
     tell_fault(app);

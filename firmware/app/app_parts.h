@@ -10,13 +10,21 @@ void app_trip(app_t *app, drive_fault_t fault);
 
 /* app_bus.c: the node and the drive profile */
 void app_bus_init(app_t *app);
+bool app_bus_take(app_t *app); /* the frames that have come; false: none */
 void app_bus_run(app_t *app);
 bool app_is_on(const app_t *app); /* the bridge is on, or about to be */
 
 /* app_values.c: what is shown of the drive; false: not one of these */
 bool app_value(app_t *app, uint16_t slot, int32_t *value);
 cia402_in_t app_drive_facts(const app_t *app);
+int32_t app_in_units(pm_q_t x, pm_num_t base,
+                     int exponent); /* of 10^-exponent SI; what does not fit is limited */
 int32_t app_torque_uNm(const app_t *app, int32_t permille);
+
+/* app_identification.c */
+bool app_identify_value(const app_t *app, uint16_t slot, int32_t *value); /* false: not one of these */
+bool app_identify_put(app_t *app, uint16_t slot, int32_t value);
+void app_identify_command(const app_t *app, drive_command_t *command); /* with what was left open */
 
 /* app_parameters.c: abort codes */
 uint32_t app_put_parameter(app_t *app, drive_param_id_t id, int32_t value);

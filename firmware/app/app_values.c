@@ -7,7 +7,7 @@
 #define THOUSAND 1000
 
 /* Signal times base, times 10^exponent, as an integer; what does not fit is limited. */
-static int32_t in_units(pm_q_t x, pm_num_t base, int exponent)
+int32_t app_in_units(pm_q_t x, pm_num_t base, int exponent)
 {
     int32_t value;
     const pm_num_t si = pm_num_mul(pm_num_from_fixed(x, PM_Q_BITS), base);
@@ -128,7 +128,7 @@ bool trace_host_find(void *context, uint16_t index, uint8_t sub, trace_signal_t 
         return false;
     }
     const unit_t unit = unit_of(app, row->unit);
-    const int32_t scale = in_units(2 * PM_ONE, unit.base, unit.exponent);
+    const int32_t scale = app_in_units(2 * PM_ONE, unit.base, unit.exponent);
     *signal = (trace_signal_t){.source = place_of(app, row), .shift = PM_Q_BITS - 14, .scale = scale};
     return true;
 }
@@ -168,7 +168,7 @@ static int32_t torque_permille(const app_t *app)
 static int32_t current_permille(const app_t *app)
 {
     const unit_t unit = current(app);
-    const pm_num_t i_mA = pm_num(in_units(app->drive.status.i.q, unit.base, unit.exponent));
+    const pm_num_t i_mA = pm_num(app_in_units(app->drive.status.i.q, unit.base, unit.exponent));
     const pm_num_t part = pm_num_div(pm_num_mul(i_mA, pm_num(THOUSAND)), pm_num(app->params.i_rated));
     return pm_clamp(rounded(part), INT16_MIN, INT16_MAX);
 }
@@ -185,19 +185,19 @@ static bool record_value(const app_t *app, uint16_t slot, int32_t *value)
         *value = (int32_t)record->fault;
         return true;
     case OD_LIVE_FAULT_RECORD_I_A:
-        *value = in_units(record->i.a, i.base, i.exponent);
+        *value = app_in_units(record->i.a, i.base, i.exponent);
         return true;
     case OD_LIVE_FAULT_RECORD_I_B:
-        *value = in_units(record->i.b, i.base, i.exponent);
+        *value = app_in_units(record->i.b, i.base, i.exponent);
         return true;
     case OD_LIVE_FAULT_RECORD_I_C:
-        *value = in_units(record->i.c, i.base, i.exponent);
+        *value = app_in_units(record->i.c, i.base, i.exponent);
         return true;
     case OD_LIVE_FAULT_RECORD_V_DC:
-        *value = in_units(record->v_dc, voltage(app).base, 3);
+        *value = app_in_units(record->v_dc, voltage(app).base, 3);
         return true;
     case OD_LIVE_FAULT_RECORD_OMEGA_E:
-        *value = in_units(record->omega, speed_e(app).base, 3);
+        *value = app_in_units(record->omega, speed_e(app).base, 3);
         return true;
     case OD_LIVE_FAULT_RECORD_THETA:
         *value = (int32_t)record->theta;
@@ -248,15 +248,15 @@ bool app_value(app_t *app, uint16_t slot, int32_t *value)
     const signal_row_t *row = signal_of(slot);
     if (row != NULL) {
         const unit_t unit = unit_of(app, row->unit);
-        *value = in_units(*place_of(app, row), unit.base, unit.exponent);
+        *value = app_in_units(*place_of(app, row), unit.base, unit.exponent);
         return true;
     }
     switch (slot) {
     case OD_LIVE_V_ALPHA:
-        *value = in_units(app->drive.status.v.alpha, voltage(app).base, 3);
+        *value = app_in_units(app->drive.status.v.alpha, voltage(app).base, 3);
         return true;
     case OD_LIVE_V_BETA:
-        *value = in_units(app->drive.status.v.beta, voltage(app).base, 3);
+        *value = app_in_units(app->drive.status.v.beta, voltage(app).base, 3);
         return true;
     case OD_LIVE_THETA:
         *value = (int32_t)app->drive.status.theta;
@@ -277,7 +277,7 @@ bool app_value(app_t *app, uint16_t slot, int32_t *value)
         *value = current_permille(app);
         return true;
     default:
-        return state_value(app, slot, value);
+        return app_identify_value(app, slot, value) || state_value(app, slot, value);
     }
 }
 
@@ -295,6 +295,6 @@ cia402_in_t app_drive_facts(const app_t *app)
         .voltage = drive->status.v_dc >= limit->v_dc_min && drive->status.v_dc <= limit->v_dc_max,
         .limited = (drive->status.limits & ~derated) != 0U,
         .warning = (drive->status.limits & derated) != 0U,
-        .velocity = in_units(drive->position.pll.omega, unit.base, unit.exponent),
+        .velocity = app_in_units(drive->position.pll.omega, unit.base, unit.exponent),
     };
 }

@@ -132,7 +132,7 @@ static void give_targets(const cia402_t *self, cia402_out_t *out)
         out->velocity = self->active_mode == CIA402_MODE_TORQUE ? 0 : self->target_velocity;
         out->torque = self->active_mode == CIA402_MODE_TORQUE ? self->target_torque : 0;
     }
-    out->current = self->active_mode == CIA402_MODE_CURRENT ? self->target_current : 0;
+    out->current = self->active_mode < CIA402_MODE_NONE ? self->target_current : 0;
 }
 
 cia402_out_t cia402_step(cia402_t *self, const cia402_in_t *in)

@@ -1,8 +1,9 @@
 /* Drive profile CiA 402: from the controlword to what the drive is to do, and back to the statusword.
  *
- * Modes: profile velocity (3), profile torque (4), and -1: current vector of a given amplitude that turns at
- * the target velocity, for commissioning. Option codes as far as the drive has them: quick stop 0, 1, 5;
- * shutdown 0, 1; disable operation 0, 1; halt 1; fault reaction 0 (the bridge opens at once, always).
+ * Modes: profile velocity (3), profile torque (4), -1: current vector of a given amplitude that turns at the
+ * target velocity, and -2: identification of the machine with that current up to that velocity. Option codes
+ * as far as the drive has them: quick stop 0, 1, 5; shutdown 0, 1; disable operation 0, 1; halt 1; fault
+ * reaction 0 (the bridge opens at once, always).
  *
  * Facts about the drive come in, orders go out: cia402_step() after every frame and once per round of the
  * main loop; the order `clear_fault` holds for this step alone. A fault is left only by the rising edge of
@@ -27,7 +28,13 @@ typedef enum {
     CIA402_FAULT,
 } cia402_state_t;
 
-enum { CIA402_MODE_CURRENT = -1, CIA402_MODE_NONE = 0, CIA402_MODE_VELOCITY = 3, CIA402_MODE_TORQUE = 4 };
+enum {
+    CIA402_MODE_IDENTIFY = -2,
+    CIA402_MODE_CURRENT = -1,
+    CIA402_MODE_NONE = 0,
+    CIA402_MODE_VELOCITY = 3,
+    CIA402_MODE_TORQUE = 4,
+};
 
 /* What the drive says */
 typedef struct {

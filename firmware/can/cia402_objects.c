@@ -63,8 +63,8 @@ static uint32_t put_option(int16_t *place, int32_t value, int32_t other)
 
 static uint32_t put_mode(cia402_t *self, int32_t value)
 {
-    if (value != CIA402_MODE_CURRENT && value != CIA402_MODE_NONE && value != CIA402_MODE_VELOCITY &&
-        value != CIA402_MODE_TORQUE) {
+    const bool own = value == CIA402_MODE_IDENTIFY || value == CIA402_MODE_CURRENT;
+    if (!own && value != CIA402_MODE_NONE && value != CIA402_MODE_VELOCITY && value != CIA402_MODE_TORQUE) {
         return INVALID;
     }
     self->mode = (int16_t)value;

@@ -5,8 +5,9 @@
  *
  *   node_init(n, context, serial, now)   values of the dictionary, then boot-up
  *   node_receive(n, frame, now)                for every frame, at any time
- *   node_run(n, now)                           once per round of the main loop: timers and what waits to be
- * sent node_bus(n, state), node_error(n, ...)     what the application has noticed
+ *   node_run(n, now)                           timers and what waits to be sent: in every round of the main
+ *                                              loop while node_busy(n), else when a timer may have run out
+ *   node_bus(n, state), node_error(n, ...)     what the application has noticed
  *
  * Thread context alone; nothing blocks. Time is passed in, in microseconds that wrap; node_run() must come at
  * least every 50 ms. At most NODE_RING frames wait for the host; what finds no room then is dropped and
@@ -14,7 +15,9 @@
  *
  * Reactions: heartbeat of a master lost, RPDO time-out, bus-off, and leaving OPERATIONAL or a reset while the
  * application is on, call node_host_alarm(). After a lost heartbeat or bus-off the node goes from OPERATIONAL
- * to PRE-OPERATIONAL as 1029h says. Tests: tests/unit/can. */
+ * to PRE-OPERATIONAL as 1029h says. Another node that is heard with this node id is an error; while the
+ * application is off the node then stays out of OPERATIONAL until communication is reset. Tests:
+ * tests/unit/can. */
 #ifndef CAN_NODE_H
 #define CAN_NODE_H
 
@@ -92,6 +95,7 @@ typedef struct node node_t; /* caller-owned: node_state.h */
 void node_init(node_t *node, void *context, uint32_t serial, uint32_t now_us);
 void node_receive(node_t *node, const node_frame_t *frame, uint32_t now_us);
 void node_run(node_t *node, uint32_t now_us);
+bool node_busy(const node_t *node); /* something waits for room to be sent */
 
 void node_bus(node_t *node, node_bus_t state);
 

@@ -23,15 +23,13 @@ static void make_model(maker_t *m, observer_model_t *c)
 /* What is not known is tied to the position with so many rad/s while injection leads. */
 #define TIE pm_num(300)
 
-/* R follows in 8 ms at rated current. seen: what the observer shows of one unit of lacking voltage. */
-static void make_resistance(maker_t *m, const observer_model_t *model, pm_num_t seen,
-                            observer_resistance_t *c)
+/* R follows in 8 ms at rated current. */
+#define FOLLOW pm_num_ratio(1, 8)
+
+static void make_resistance(maker_t *m, const observer_model_t *model, observer_resistance_t *c, pm_num_t k)
 {
-    const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
     c->k = 0;
     if (m->params->resistance_adaptation != 0) {
-        const pm_num_t follow = pm_num_ratio(1, 8);
-        const pm_num_t k = pm_num_div(follow, pm_num_mul(seen, square(i_rated)));
         c->k = fixed(m, k, GAIN_BITS, DRIVE_PARAM_i_rated);
     }
     c->omega = speed(m, DRIVE_PARAM_speed_low) / 2;
@@ -42,11 +40,63 @@ static void make_resistance(maker_t *m, const observer_model_t *model, pm_num_t 
 static void make_active_flux(maker_t *m, active_flux_config_t *c)
 {
     const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
+    const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
     make_model(m, &c->model);
-    make_resistance(m, &c->model, pm_num_div(m->base.omega, TIE), &c->resistance);
+    make_resistance(m, &c->model, &c->resistance,
+                    pm_num_div(pm_num_mul(FOLLOW, TIE), pm_num_mul(m->base.omega, square(i_rated))));
     c->g = fixed(m, pm_num_mul(si(m, DRIVE_PARAM_flux_gain), step), FRAC_BITS, DRIVE_PARAM_flux_gain);
     c->k_adapt = PM_FRAC(0.01);
     c->k_seed = fixed(m, pm_num_mul(TIE, m->base.t_s), FRAC_BITS, DRIVE_PARAM_f_pwm);
+}
+
+/* lag: (2 - k) / k, k = w T / (1 + w T). */
+static void make_emf(maker_t *m, emf_config_t *c)
+{
+    const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
+    const pm_num_t w = pm_num_mul(angular(m, DRIVE_PARAM_emf_bandwidth), m->base.t_s);
+    const pm_num_t k = pm_num_div(w, pm_num_add(pm_num(1), w));
+    make_model(m, &c->model);
+    make_resistance(m, &c->model, &c->resistance, pm_num_div(FOLLOW, square(i_rated)));
+    c->k_filter = gain(m, k, FRAC_BITS, DRIVE_PARAM_emf_bandwidth);
+    c->lag = fixed(m, pm_num_div(pm_num_sub(pm_num(2), k), k), GAIN_BITS, DRIVE_PARAM_emf_bandwidth);
+    c->k_adapt = PM_FRAC(0.01);
+    c->rate = fixed(m, pm_num_div(pm_num(1), pm_num_mul(m->base.t_s, m->base.omega)), SMALL_BITS,
+                    DRIVE_PARAM_f_pwm);
+    const pm_num_t slow = pm_num_div(pm_num(1), pm_num_mul(m->t_slow, m->base.omega));
+    c->slow_rate = fixed(m, least(slow, pm_num(31)), GAIN_BITS, DRIVE_PARAM_f_pwm);
+    c->slow_step = fixed(m, pm_num_mul(m->t_slow, m->base.omega), Q_BITS, DRIVE_PARAM_speed_trip);
+    /* 2 zeta / w_n */
+    const pm_num_t lag =
+        pm_num_div(pm_num_ratio(9, 5), pm_num_mul(angular(m, DRIVE_PARAM_injection_bandwidth), m->t_slow));
+    c->speed_lag = fixed(m, least(lag, pm_num(31)), GAIN_BITS, DRIVE_PARAM_injection_bandwidth);
+    c->omega_min = speed(m, DRIVE_PARAM_speed_low) / 2;
+    c->omega_tied =
+        fixed(m, least(pm_num_div(TIE, m->base.omega), pm_num(1)), Q_BITS, DRIVE_PARAM_speed_trip);
+}
+
+static void round_only(maker_t *m)
+{
+    const pm_num_t L_q = si(m, DRIVE_PARAM_L_q);
+    const pm_num_t dL = pm_num_sub(L_q, si(m, DRIVE_PARAM_L_d));
+    if (pm_num_cmp(dL, pm_num_mul(L_q, pm_num_ratio(1, 8))) > 0) {
+        refuse(m, DRIVE_PARAM_observer, "is for machines without saliency");
+    }
+}
+
+static void make_back_emf(maker_t *m, back_emf_config_t *c)
+{
+    round_only(m);
+    make_emf(m, c);
+}
+
+static void make_extended_emf(maker_t *m, extended_emf_config_t *c)
+{
+    make_emf(m, c);
+}
+
+static void make_extended_emf_ab(maker_t *m, extended_emf_ab_config_t *c)
+{
+    make_emf(m, c);
 }
 
 /* The adapted quantity at 50 Hz, twice the loop; nothing is claimed below a quarter of the speed at which the
@@ -55,7 +105,6 @@ static void make_active_flux(maker_t *m, active_flux_config_t *c)
 static void make_mras(maker_t *m, mras_config_t *c)
 {
     make_model(m, &c->model);
-    make_resistance(m, &c->model, pm_num(1), &c->resistance);
     const pm_num_t L = pm_num_div(si(m, DRIVE_PARAM_L_d), m->inductance);
     const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
     (void)fixed(m, pm_num_div(L, step), 24, DRIVE_PARAM_L_d);
@@ -87,7 +136,7 @@ static void make_mras_simple(maker_t *m, mras_simple_config_t *c)
 
 void make_observer(maker_t *m, observer_config_t *c)
 {
-    c->id = OBSERVER_active_flux;
+    c->id = (observer_id_t)m->params->observer;
     switch (c->id) {
 #define PM_OBSERVER(name, help)                                                                              \
     case OBSERVER_##name:                                                                                    \
@@ -96,7 +145,7 @@ void make_observer(maker_t *m, observer_config_t *c)
 #include "observers/observers.def"
 #undef PM_OBSERVER
     case OBSERVER_COUNT:
-    default:
+    default: /* the range of the parameter ends before */
         break;
     }
 }

@@ -52,6 +52,9 @@ void drive_command(drive_t *drive, const drive_command_t *command)
     const drive_mode_t mode = drive->state == DRIVE_OFF ? command->mode : drive->command.mode;
     drive->command = *command;
     drive->command.mode = mode;
+    if (!command->enable && drive->stage == STAGE_IDENTIFY) {
+        drive->stage = STAGE_OFF; /* nothing to slow down: the period that comes is without voltage */
+    }
 }
 
 bool drive_clear_fault(drive_t *drive)
@@ -134,12 +137,15 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
 {
     drive->hw_fault = in->hw_fault;
     protection_step(drive);
+    const pm_ab_t v_past = drive->v_acting;
     drive->v_acting = drive->v_next;
     drive->v_next = (pm_ab_t){0, 0};
     drive->status.theta = drive->position.pll.theta;
     out->trip = drive->fault != DRIVE_FAULT_NONE;
     if (drive->stage == STAGE_PULSES) {
         pulses(drive, out);
+    } else if (drive->stage == STAGE_IDENTIFY) {
+        commissioning_step(drive, v_past, out);
     } else {
         off(out);
         if (drive->stage == STAGE_CALIBRATE) {
@@ -148,30 +154,11 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
     }
 }
 
-/* Below this speed the observer would drift on an imposed angle: it is led along. */
-static bool is_led(const drive_t *drive)
+/* Open loop at a speed where the observer has an angle of its own. */
+PM_RARE static position_out_t imposed(const drive_t *drive)
 {
-    return pm_abs(drive->omega_open) < drive->config.position.omega_low;
-}
-
-PM_RARE static void impose(drive_t *drive)
-{
-    drive->theta_open += (pm_angle_t)pm_omega_to_angle(drive->omega_open, drive->config.k_theta);
-    if (is_led(drive)) {
-        const pm_pll_t open = {.theta = drive->theta_open, .omega = drive->omega_open};
-        position_lead(&drive->position, &drive->config.position, &open);
-    }
-}
-
-PM_RARE static position_out_t imposed(drive_t *drive)
-{
-    const pm_pll_t open = {.theta = drive->theta_open, .omega = drive->omega_open};
-    if (is_led(drive)) {
-        position_follow(&drive->position, &open);
-        drive->status.theta = open.theta;
-    }
-    const pm_dir_t dir = pm_dir(open.theta);
-    return (position_out_t){.dir = dir, .i = pm_park(drive->i_ab, dir), .omega = open.omega};
+    const pm_dir_t dir = pm_dir(drive->theta_open);
+    return (position_out_t){.dir = dir, .i = pm_park(drive->i_ab, dir), .omega = drive->omega_open};
 }
 
 static inline void write_out(const modulator_out_t *m, drive_out_t *out)
@@ -219,15 +206,14 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
         const pm_ab_t next = pm_pair_ab(&drive->v_next);
         drive->v_acting.alpha = next.alpha;
         drive->v_acting.beta = next.beta;
-        const bool open = drive->stage != STAGE_VECTOR;
-        if (open) {
-            impose(drive);
-        }
         position_out_t frame;
         position_step(&drive->position, &drive->config.position, v, drive->i_ab, &frame);
         drive->status.theta = drive->position.pll.theta;
-        if (open) {
-            frame = imposed(drive);
+        if (drive->stage != STAGE_VECTOR) {
+            drive->theta_open += (pm_angle_t)drive->turn_open;
+            if (!drive->led) {
+                frame = imposed(drive);
+            }
         }
         control(drive, &frame, out);
     }
@@ -238,7 +224,15 @@ void drive_prepare(drive_t *drive)
     const drive_config_t *c = &drive->config;
     const bool open = drive->stage == STAGE_OPEN_LOOP;
     const pm_q_t v_dc = drive->status.v_dc;
-    const int32_t turn = pm_omega_to_angle(open ? drive->omega_open : drive->position.pll.omega, c->k_theta);
+    const pm_q_t omega = open ? drive->omega_open : drive->position.pll.omega;
+    const int32_t turn = pm_omega_to_angle(omega, c->k_theta);
+    /* at low speed the observer would drift on an imposed angle */
+    drive->led = open && pm_abs(omega) < c->position.omega_low;
+    if (drive->led) {
+        const pm_pll_t imposed = {.theta = drive->theta_open, .omega = omega};
+        position_lead(&drive->position, &c->position, &imposed);
+    }
+    drive->turn_open = turn;
     drive->ahead = pm_dir((pm_angle_t)turn + (pm_angle_t)pm_half(turn));
     drive->carrier = drive->stage == STAGE_VECTOR && drive->position.inject;
     drive->v_share = c->v_linear;

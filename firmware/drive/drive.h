@@ -55,6 +55,7 @@ typedef enum {
     DRIVE_MODE_SPEED,
     DRIVE_MODE_TORQUE,
     DRIVE_MODE_CURRENT, /* current vector at a given angle that turns at the speed reference: commissioning */
+    DRIVE_MODE_IDENTIFY, /* the drive measures its machine, with that current up to that speed, then waits */
 } drive_mode_t;
 
 typedef struct {
@@ -62,7 +63,8 @@ typedef struct {
     drive_mode_t mode;    /* taken when the drive starts */
     int32_t speed_mrad_s; /* mechanical, signed */
     int32_t torque_uNm;
-    int32_t current_mA; /* current mode */
+    int32_t current_mA; /* current mode, identification */
+    uint8_t routines;   /* COMMISSIONING_...: what to identify */
     bool coast;         /* when not enabled: off at once, without a stop */
 } drive_command_t;
 

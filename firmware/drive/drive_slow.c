@@ -52,7 +52,13 @@ static void finish_calibration(drive_t *drive)
             return;
         }
     }
-    begin_finding(drive);
+    if (drive->command.mode == DRIVE_MODE_IDENTIFY) {
+        drive->state = DRIVE_RUNNING;
+        drive->sum_ms = 0;
+        commissioning_start(drive);
+    } else {
+        begin_finding(drive);
+    }
 }
 
 /* The rotor stands at theta: injection takes over. */
@@ -106,6 +112,16 @@ static void find(drive_t *drive)
     }
 }
 
+/* The end of the command ends it at once: there is no speed that the drive knows. */
+static void identify(drive_t *drive, bool enable)
+{
+    commissioning_slow(drive);
+    if (!enable) {
+        commissioning_abort(drive);
+        switch_off(drive);
+    }
+}
+
 static void run(drive_t *drive)
 {
     const position_config_t *c = &drive->config.position;
@@ -138,6 +154,7 @@ static void move(drive_t *drive)
 {
     const bool enable = drive->command.enable;
     if (!enable && drive->command.coast) {
+        commissioning_abort(drive);
         switch_off(drive);
         return;
     }
@@ -162,6 +179,10 @@ static void move(drive_t *drive)
         }
         break;
     case DRIVE_RUNNING:
+        if (drive->command.mode == DRIVE_MODE_IDENTIFY) {
+            identify(drive, enable);
+            break;
+        }
         run(drive);
         if (!enable) {
             drive->state = DRIVE_STOPPING;
@@ -203,6 +224,7 @@ void drive_slow(drive_t *drive, const drive_slow_in_t *in)
         protection_slow(drive);
     }
     if (drive->fault != DRIVE_FAULT_NONE) {
+        commissioning_abort(drive);
         drive->state = DRIVE_FAULT;
         drive->stage = STAGE_OFF;
     }

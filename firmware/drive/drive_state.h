@@ -2,6 +2,7 @@
 #ifndef DRIVE_DRIVE_STATE_H
 #define DRIVE_DRIVE_STATE_H
 
+#include "firmware/drive/commissioning/commissioning.h"
 #include "firmware/drive/drive.h"
 
 /* What drive_step() does; drive_slow() moves it on. */
@@ -9,6 +10,7 @@ typedef enum {
     STAGE_OFF,
     STAGE_CALIBRATE,
     STAGE_PULSES,
+    STAGE_IDENTIFY,
     STAGE_OPEN_LOOP, /* current vector at an imposed angle */
     STAGE_VECTOR,    /* field-oriented control at the estimated angle */
 } drive_stage_t;
@@ -25,9 +27,7 @@ typedef struct {
 
 struct drive {
     drive_config_t config;
-    drive_command_t command;
     drive_status_t status;
-    drive_fault_record_t record;
 
     drive_fault_t fault; /* latched; while it is set, the stage is STAGE_OFF */
     drive_state_t state;
@@ -39,6 +39,7 @@ struct drive {
     pm_ab_t i_ab;
     bool hw_fault;
     bool carrier;      /* injection is on */
+    bool led;          /* open loop: the observer is led along */
     pm_dir_t ahead;    /* one and a half periods of rotation: from the sample to where the voltage acts */
     pm_unit_t v_share; /* share of v_dc for current control */
     pm_dq_t u;         /* voltage of the current control, without carrier; Q22 */
@@ -46,7 +47,13 @@ struct drive {
     pm_ab_t v_next;    /* commanded at k: acts over [k+1, k+2) */
     modulator_t modulator;
 
-    position_t position;
+    union { /* while it identifies, nothing estimates the position */
+        position_t position;
+        struct {
+            pm_pll_t pll; /* of position: stays */
+            commissioning_t work;
+        } identify;
+    };
     pm_procedure_t pulses_state;
     current_control_t current;
     speed_control_t speed;
@@ -55,6 +62,7 @@ struct drive {
     pm_dq_t i_ref;
     pm_angle_t theta_open; /* open loop: angle of the current vector */
     pm_q_t omega_open;
+    int32_t turn_open; /* of that speed in a period */
     pm_q_t i_open;
 
     /* references in per-unit, made from the command once */
@@ -69,6 +77,9 @@ struct drive {
     int32_t temperature_dC;
 
     /* not of a control period */
+    drive_command_t command;
+    drive_fault_record_t record;
+    commissioning_report_t commissioning_report;
     initial_pulses_t pulses;
     speed_t speed_estimate;
 };

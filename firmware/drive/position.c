@@ -62,12 +62,8 @@ void position_lead(position_t *self, const position_config_t *config, const pm_p
     loop_reset(&self->loop);
     second_harmonic_reset(&self->second_harmonic);
     self->pll = *imposed;
-    self->pll.theta -= (pm_angle_t)pm_omega_to_angle(imposed->omega, self->gains.k_theta);
-}
-
-void position_follow(position_t *self, const pm_pll_t *imposed)
-{
-    self->pll = *imposed;
+    self->gains.kp_turn = 0;
+    self->gains.ki = 0;
 }
 
 static void set_weight(position_t *self, const position_config_t *config, pm_ab_t i)

@@ -34,12 +34,12 @@ typedef struct {
     second_harmonic_t second_harmonic;
     observer_t observer;
     pulsating_square_t square;
-    pm_q_t weight;                   /* 0: injection, 1: observer */
     bool inject;                     /* carrier on */
     pm_q_t omega_mean;               /* filtered for the weight */
     pm_q_t observer_eps, square_eps; /* without noise, for the quality */
     pm_q_t eps_mean;
     pm_q_t misfit_mean;
+    pm_q_t weight; /* 0: injection, 1: observer */
     pm_q_t quality;
 } position_t;
 
@@ -56,10 +56,9 @@ typedef struct {
 void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i,
                    position_out_t *out);
 
-/* While the rotor follows a given vector (align, open-loop start) the step stands between these two:
- * `imposed` takes the place of the loop, and the observer is tied to it. */
+/* While the rotor follows a given vector (align, open-loop start): the loop is opened, the position is
+ * `imposed` and goes on with its speed, and the observer is tied to it. Up to the next position_slow(). */
 void position_lead(position_t *self, const position_config_t *config, const pm_pll_t *imposed);
-void position_follow(position_t *self, const pm_pll_t *imposed);
 
 /* At 1 kHz, with the current of the last step and the same in its frame: weight, carrier, loop gains,
  * quality. */

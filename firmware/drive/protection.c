@@ -70,7 +70,7 @@ void protection_slow(drive_t *drive)
         drive_trip(drive, DRIVE_FAULT_OVER_SPEED);
     }
     /* in open loop too, where the rotor can fall out of step; but not in commissioning */
-    const bool judged = drive->state >= DRIVE_RUNNING && drive->command.mode != DRIVE_MODE_CURRENT;
+    const bool judged = drive->state >= DRIVE_RUNNING && drive->command.mode < DRIVE_MODE_CURRENT;
     if (lasts(&drive->lost_ms, judged && drive->position.quality == 0, c->lost_ms)) {
         drive_trip(drive, DRIVE_FAULT_POSITION_LOST);
     }

@@ -32,12 +32,4 @@ bool gpio_line_set(gpio_line_t *line, bool active); /* false: failed */
 int gpio_line_get(gpio_line_t *line);               /* 0, 1, or -1: failed */
 int gpio_line_edges(gpio_line_t *line);             /* taken from the queue, none: 0; -1: failed */
 
-/* "CHIP:OFFSET[!]"; for the implementations. */
-typedef struct {
-    char chip[64];
-    unsigned offset;
-    bool active_low;
-} gpio_name_t;
-bool gpio_name_parse(const char *name, gpio_name_t *parsed, char *error, size_t error_size);
-
 #endif

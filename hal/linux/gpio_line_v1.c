@@ -1,11 +1,9 @@
 /* libgpiod 1.x */
-#include "hal/linux/gpio_line.h"
+#include "hal/linux/gpio_backend.h"
 
 #include <errno.h>
 #include <gpiod.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <time.h>
 
 struct gpio_line {
@@ -28,28 +26,25 @@ static int request_type(gpio_use_t use)
     return GPIOD_LINE_REQUEST_DIRECTION_INPUT;
 }
 
-gpio_line_t *gpio_line_open(const char *name, gpio_use_t use, char *error, size_t error_size)
+gpio_line_t *gpio_backend_request(const gpio_name_t *name, gpio_use_t use)
 {
-    gpio_name_t parsed;
-    if (!gpio_name_parse(name, &parsed, error, error_size)) {
-        return NULL;
-    }
-    gpio_line_t *line = calloc(1, sizeof *line);
-    if (line == NULL) {
-        abort();
-    }
     const struct gpiod_line_request_config request = {
         .consumer = "pmdrive",
         .request_type = request_type(use),
-        .flags = (parsed.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0) |
+        .flags = (name->active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0) |
                  (use == GPIO_OPEN_DRAIN ? GPIOD_LINE_REQUEST_FLAG_OPEN_DRAIN : 0),
     };
-    line->chip = gpiod_chip_open_lookup(parsed.chip);
-    line->line = line->chip != NULL ? gpiod_chip_get_line(line->chip, parsed.offset) : NULL;
+    gpio_line_t *line = calloc(1, sizeof *line);
+    if (line == NULL) {
+        return NULL;
+    }
+    line->chip = gpiod_chip_open_lookup(name->chip);
+    line->line = line->chip != NULL ? gpiod_chip_get_line(line->chip, name->offset) : NULL;
     if (line->line == NULL || gpiod_line_request(line->line, &request, use == GPIO_OUTPUT_ON) != 0) {
-        snprintf(error, error_size, "GPIO line %s: %s", name, strerror(errno));
+        const int reason = errno;
         line->line = NULL;
         gpio_line_close(line);
+        errno = reason;
         return NULL;
     }
     return line;

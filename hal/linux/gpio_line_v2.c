@@ -1,11 +1,10 @@
 /* libgpiod 2.x */
-#include "hal/linux/gpio_line.h"
+#include "hal/linux/gpio_backend.h"
 
 #include <errno.h>
 #include <gpiod.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 struct gpio_line {
     struct gpiod_line_request *request;
@@ -58,22 +57,19 @@ static struct gpiod_line_request *request_line(const gpio_name_t *name, gpio_use
     return request;
 }
 
-gpio_line_t *gpio_line_open(const char *name, gpio_use_t use, char *error, size_t error_size)
+gpio_line_t *gpio_backend_request(const gpio_name_t *name, gpio_use_t use)
 {
-    gpio_name_t parsed;
-    if (!gpio_name_parse(name, &parsed, error, error_size)) {
-        return NULL;
-    }
     gpio_line_t *line = calloc(1, sizeof *line);
     if (line == NULL) {
-        abort();
+        return NULL;
     }
-    line->offset = parsed.offset;
+    line->offset = name->offset;
     line->events = gpiod_edge_event_buffer_new(16);
-    line->request = request_line(&parsed, use);
+    line->request = request_line(name, use);
     if (line->request == NULL || line->events == NULL) {
-        snprintf(error, error_size, "GPIO line %s: %s", name, strerror(errno));
+        const int reason = errno;
         gpio_line_close(line);
+        errno = reason;
         return NULL;
     }
     return line;

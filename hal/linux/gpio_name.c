@@ -1,4 +1,4 @@
-#include "hal/linux/gpio_line.h"
+#include "hal/linux/gpio_backend.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -33,13 +33,6 @@ void cpu_get_core(const cpu_t *cpu, uint32_t registers[16])
     }
 }
 
-void cpu_spend(cpu_t *cpu, cycles_t cycles)
-{
-    cpu->total.low += cycles.low;
-    cpu->total.typical += cycles.typical;
-    cpu->total.high += cycles.high;
-}
-
 static void fail(cpu_t *cpu, uint32_t pc, const char *text)
 {
     if (cpu->failed) {
@@ -89,7 +82,8 @@ static bool set_up(cpu_t *cpu)
 {
     uc_hook hook;
     return uc_open(UC_ARCH_ARM, (uc_mode)(UC_MODE_THUMB | UC_MODE_MCLASS), &cpu->uc) == UC_ERR_OK &&
-           uc_ctl_set_cpu_model(cpu->uc, UC_CPU_ARM_CORTEX_M4) == UC_ERR_OK && cpu_open_windows(cpu) &&
+           uc_ctl_set_cpu_model(cpu->uc, UC_CPU_ARM_CORTEX_M4) == UC_ERR_OK &&
+           uc_ctl_exits_enable(cpu->uc) == UC_ERR_OK && cpu_open_windows(cpu) &&
            cpu_hook(cpu, &hook, UC_HOOK_BLOCK, (void (*)(void))cpu_on_block, 1, 0) &&
            cpu_hook(cpu, &hook, UC_HOOK_INTR, (void (*)(void))cpu_on_interrupt, 1, 0) &&
            cpu_hook(cpu, &hook, UC_HOOK_MEM_INVALID, (void (*)(void))cpu_on_bad_memory, 1, 0);
@@ -196,11 +190,16 @@ uint32_t cpu_pc(const cpu_t *cpu)
 
 uint32_t cpu_register(const cpu_t *cpu, int n)
 {
-    return cpu_get(cpu, cpu_core_register[n & 15]);
+    return cpu_get(cpu, n == 16 ? UC_ARM_REG_XPSR : cpu_core_register[n & 15]);
 }
 
 void cpu_set_register(cpu_t *cpu, int n, uint32_t value)
 {
+    if (n == 16) {
+        const uint32_t flags = UINT32_C(0xF80F0000);
+        cpu_set(cpu, UC_ARM_REG_XPSR, (cpu_get(cpu, UC_ARM_REG_XPSR) & ~flags) | (value & flags));
+        return;
+    }
     cpu_set(cpu, cpu_core_register[n & 15], n == 15 ? value | 1U : value);
 }
 

@@ -1,32 +1,47 @@
 #include "sim_plant/board/cpu_state.h"
 
+#include <assert.h>
 #include <stdlib.h>
 
-cpu_block_t *cpu_block_at(cpu_t *cpu, uint32_t address, uint32_t size)
+static cpu_block_t *make(cpu_t *cpu, cpu_region_t *region, uint32_t address, uint32_t size)
 {
-    cpu_region_t *region = cpu_region_of(cpu, address);
-    if (region == NULL || address - region->is.base + size > region->is.size) {
-        return NULL;
-    }
-    cpu_slot_t *slot = &region->block[(address - region->is.base) / 2];
-    cpu_block_t *block = slot->at;
-    if (block != NULL && block->size == size) {
-        return block;
-    }
+    const uint32_t at = address - region->is.base;
+    cpu_block_t *block = region->block[at / 2].at;
     if (block == NULL) {
-        block = calloc(1, sizeof *block);
+        static_assert(sizeof *block == CPU_LINE, "one line");
+        block = aligned_alloc(CPU_LINE, sizeof *block);
         if (block == NULL) {
             return NULL;
         }
-        slot->at = block;
+        *block = (cpu_block_t){.hits = 0};
+        region->block[at / 2].at = block;
     }
+    cpu_stores_meet_code(cpu, region, at / CPU_PAGE, (at + size - 1) / CPU_PAGE);
     /* The same start with another length: the newest counts, its hits go on. */
     block->address = address;
     block->size = size;
     block->region = region;
     block->attention = true;
-    cycles_of_block(&block->cost, region->host + (address - region->is.base), size);
+    cycles_of_block(&block->cost, region->host + at, size);
     return block;
+}
+
+cpu_block_t *cpu_block_at(cpu_t *cpu, uint32_t address, uint32_t size)
+{
+    cpu_block_t *guess = cpu->block != NULL ? cpu->block->after : NULL;
+    if (guess != NULL && guess->address == address && guess->size == size) {
+        return guess;
+    }
+    cpu_region_t *region = cpu->executes_from;
+    if (region == NULL || address - region->is.base >= region->is.size) {
+        region = cpu_region_of(cpu, address);
+        cpu->executes_from = region;
+    }
+    if (region == NULL || address - region->is.base + size > region->is.size) {
+        return NULL;
+    }
+    cpu_block_t *block = region->block[(address - region->is.base) / 2].at;
+    return block != NULL && block->size == size ? block : make(cpu, region, address, size);
 }
 
 /* Calls `act` for every block there is. */

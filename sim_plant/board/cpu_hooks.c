@@ -126,8 +126,12 @@ static void account(cpu_t *cpu, cpu_block_t *block)
     cpu->total.instructions += block->cost.instructions;
     cpu->event = cpu->event || block->cost.sends_event;
     block->hits++;
+    if (cpu->block != NULL) {
+        cpu->block->after = block;
+    }
     cpu->block = block;
     cpu->block_end = block->address + block->size;
+    __builtin_prefetch(block->after);
 }
 
 /* unicorn's PC may be stale in here, so that a stop remembers the address. */
@@ -139,13 +143,13 @@ void cpu_on_block(uc_engine *uc, uint64_t where, uint32_t size, void *user)
     if (cpu->block != NULL && cpu->block->cost.ends_in_branch_if && cpu->block_end != address) {
         cpu_spend(cpu, cycles_taken());
     }
+    cpu_block_t *block = cpu_block_at(cpu, address, size); /* in any case: it has been translated */
     if (cpu->want_stop || cpu->total.typical >= cpu->stop_at ||
         (cpu->nvic.candidate != 0 && exceptions_next(cpu) != 0)) {
         cpu->block = NULL; /* the branch has been counted */
         stop_before(cpu, address);
         return;
     }
-    cpu_block_t *block = cpu_block_at(cpu, address, size);
     if (block == NULL) {
         cpu_fail_at(cpu, address, "executed outside memory");
         stop_before(cpu, address);
@@ -160,6 +164,11 @@ void cpu_on_block(uc_engine *uc, uint64_t where, uint32_t size, void *user)
     if (block->attention && attend(cpu, block)) {
         cpu->block = block;
         cpu->block_end = 0;
+        stop_before(cpu, address);
+        return;
+    }
+    if (cpu->debug.call != NULL && cpu_debug_stops_block(cpu, address)) {
+        cpu->block = NULL;
         stop_before(cpu, address);
         return;
     }

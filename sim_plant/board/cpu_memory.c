@@ -44,8 +44,6 @@ bool cpu_store(cpu_t *cpu, uint32_t address, uint32_t value)
     return true;
 }
 
-enum { MPU_FINEST = 32 }; /* bytes of its smallest region */
-
 static uint32_t permissions_of(const cpu_t *cpu, const cpu_region_t *region, uint32_t page)
 {
     uint32_t permissions = UC_PROT_EXEC;
@@ -87,8 +85,7 @@ static void find_runs(const cpu_t *cpu, cpu_region_t *region)
 
 void cpu_map(cpu_t *cpu, cpu_region_t *region)
 {
-    static cpu_region_t fresh; /* large for a stack */
-    fresh = *region;
+    cpu_region_t fresh = *region;
     find_runs(cpu, &fresh);
     if (same_runs(&fresh, region)) {
         return;
@@ -167,7 +164,8 @@ void cpu_add_memory(cpu_t *cpu, const cpu_memory_t *memory)
         }
     }
     region->block = calloc(memory->size / 2, sizeof region->block[0]);
-    if (region->host == NULL || region->block == NULL) {
+    region->holds_code = calloc(memory->size / CPU_PAGE, sizeof region->holds_code[0]);
+    if (region->host == NULL || region->block == NULL || region->holds_code == NULL) {
         cpu_fail(cpu, "no memory on the host for %s", memory->name);
         return;
     }
@@ -179,6 +177,7 @@ void cpu_free_memory(cpu_t *cpu)
 {
     for (unsigned i = 0; i < cpu->regions; i++) {
         cpu_free_blocks(&cpu->region[i]);
+        free(cpu->region[i].holds_code);
         if (cpu->region[i].original == &cpu->region[i]) {
             free(cpu->region[i].host);
         }

@@ -119,7 +119,7 @@ bool mpu_is_open(const mpu_t *mpu, uint32_t address, uint32_t size)
     if ((mpu->control & ENABLE) == 0) {
         return true;
     }
-    for (uint32_t at = 0; at < size; at += 32) { /* the smallest region */
+    for (uint32_t at = 0; at < size; at += MPU_FINEST) {
         if (!mpu_allows(mpu, address + at, MPU_READ, false) ||
             !mpu_allows(mpu, address + at, MPU_WRITE, false)) {
             return false;

@@ -9,7 +9,7 @@
 extern "C" {
 #endif
 
-enum { MPU_REGIONS = 8 };
+enum { MPU_REGIONS = 8, MPU_FINEST = 32 /* bytes of the smallest region */ };
 
 typedef enum { MPU_READ, MPU_WRITE, MPU_EXECUTE } mpu_access_t;
 

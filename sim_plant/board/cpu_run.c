@@ -11,8 +11,6 @@ enum {
     UNICORN_EXCEPTION_EXIT = 8,
 };
 
-#define NOWHERE UINT64_C(0xFFFFFFFE) /* an address that is never executed: runs end by stopping */
-
 static void take_breakpoint(cpu_t *cpu)
 {
     const uint32_t pc = cpu_get(cpu, UC_ARM_REG_PC) & ~1U;
@@ -64,7 +62,8 @@ static void execute(cpu_t *cpu)
 {
     cpu->interrupt = -1;
     cpu->stopped = false;
-    const uc_err error = uc_emu_start(cpu->uc, cpu_get(cpu, UC_ARM_REG_PC) | 1U, NOWHERE, 0, 0);
+    const uc_err error =
+        uc_emu_start(cpu->uc, cpu_get(cpu, UC_ARM_REG_PC) | 1U, 0, 0, 0); /* there are no exits */
     if (cpu->stopped) {
         cpu_set(cpu, UC_ARM_REG_PC, cpu->stop_pc | 1U);
         if (cpu->block != NULL && cpu->block->address == cpu->stop_pc && cpu->block_end == 0) {
@@ -74,7 +73,9 @@ static void execute(cpu_t *cpu)
         }
         return;
     }
-    if (cpu->divided_by_zero) {
+    if (cpu->debug.call != NULL && cpu_debug_stopped(cpu)) {
+        /* the debugger's turn */
+    } else if (cpu->divided_by_zero) {
         end_of_division(cpu);
     } else if (cpu->interrupt >= 0) {
         take_interrupt(cpu);
@@ -152,7 +153,7 @@ static bool ended(const cpu_t *cpu)
     return cpu->failed || cpu->reset_asked || cpu->locked_up;
 }
 
-bool cpu_run(cpu_t *cpu, uint64_t until_cycle)
+static void run(cpu_t *cpu, uint64_t until_cycle)
 {
     while (!ended(cpu)) {
         settle(cpu);
@@ -160,6 +161,10 @@ bool cpu_run(cpu_t *cpu, uint64_t until_cycle)
         }
         if (ended(cpu)) {
             break;
+        }
+        if (cpu->debug.due) {
+            cpu_serve_debugger(cpu);
+            continue;
         }
         cpu->stop_at = earlier(until_cycle, cpu->alarms.next);
         const bool waits = cpu->halted || cpu->wait_until > cpu->total.typical;
@@ -186,5 +191,12 @@ bool cpu_run(cpu_t *cpu, uint64_t until_cycle)
             execute(cpu);
         }
     }
+}
+
+bool cpu_run(cpu_t *cpu, uint64_t until_cycle)
+{
+    cpu_stores_begin(cpu);
+    run(cpu, until_cycle);
+    cpu_stores_end();
     return !cpu->failed;
 }

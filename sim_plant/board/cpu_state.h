@@ -14,18 +14,29 @@
 #include "sim_plant/board/nvic.h"
 #include "sim_plant/board/system_block.h"
 
-enum { CPU_MEMORIES = 8, CPU_RUNS = 64, CPU_PAGE = 1024, CPU_WATCHES = 32, CPU_FLASH_WRITES = 64 };
+enum {
+    CPU_MEMORIES = 8,
+    CPU_RUNS = 64,
+    CPU_PAGE = 1024,
+    CPU_WATCHES = 32,
+    CPU_FLASH_WRITES = 64,
+    CPU_LINE = 64
+};
+enum { CPU_BREAKS = 32, CPU_STEP_STOPS = 5 };
 
 typedef struct cpu_region cpu_region_t;
 
-/* A run of instructions that the processor executes as one; from its address to the first branch. */
-typedef struct {
+/* A run of instructions that the processor executes as one; from its address to the first branch. It is
+ * within one line of the host's cache: these lines are much of what a block costs. */
+typedef struct cpu_block cpu_block_t;
+struct cpu_block {
     uint32_t address, size;
     cycles_block_t cost;
     cpu_region_t *region;
+    cpu_block_t *after; /* the one that was executed after it, the last time */
     uint64_t hits;
     bool attention; /* look before executing: new, watched, or the MPU has changed */
-} cpu_block_t;
+};
 
 typedef struct {
     cpu_block_t *at; /* NULL: none begins here */
@@ -36,6 +47,7 @@ struct cpu_region {
     uint8_t *host;
     cpu_region_t *original; /* of an alias; else itself */
     cpu_slot_t *block;      /* by half-word; of its own addresses alone */
+    bool *holds_code;       /* by page: a block there has been executed, or was about to be */
     cycles_flash_t fetch;
     uint64_t stalled_until;
     struct {
@@ -65,8 +77,15 @@ typedef struct {
     cpu_watch_t call;
 } cpu_watch_entry_t;
 
+/* Where the run is to stop. */
+typedef struct {
+    uint32_t address;
+    uc_hook hook;
+} cpu_stop_t;
+
 struct cpu {
     uc_engine *uc;
+    void *engine; /* unicorn's own name of it; NULL: not known */
     nvic_t nvic;
     bus_t bus;
     alarms_t alarms;
@@ -89,7 +108,8 @@ struct cpu {
     bool close_again; /* a read was allowed in a page that is not all open */
     char error[256];
 
-    cpu_block_t *block; /* present or last */
+    cpu_block_t *block;          /* present or last */
+    cpu_region_t *executes_from; /* the last block's */
     uint32_t block_end;
     uint32_t hooked[256]; /* divisions with a hook */
     unsigned hooks;
@@ -124,6 +144,16 @@ struct cpu {
         void *owner;
         cpu_breakpoint_t call;
     } breakpoint;
+    struct {
+        void *owner;
+        cpu_debugger_t call; /* NULL: there is none */
+        bool due, stepping;
+        uint32_t resumed;    /* the debugger has left off before this instruction, which has not begun yet */
+        uint32_t passing;    /* it is the first of this block: no stop before it again */
+        uint32_t stopped_at; /* by a hook */
+        cpu_stop_t stop[CPU_BREAKS], ahead[CPU_STEP_STOPS];
+        unsigned stops, aheads;
+    } debug;
 };
 
 /* cpu.c */
@@ -131,7 +161,13 @@ extern const int cpu_core_register[16]; /* unicorn's names of r0 to r15 */
 uint32_t cpu_get(const cpu_t *cpu, int unicorn_register);
 void cpu_set(cpu_t *cpu, int unicorn_register, uint32_t value);
 void cpu_get_core(const cpu_t *cpu, uint32_t registers[16]);
-void cpu_spend(cpu_t *cpu, cycles_t cycles);
+static inline void cpu_spend(cpu_t *cpu, cycles_t cycles)
+{
+    cpu->total.low += cycles.low;
+    cpu->total.typical += cycles.typical;
+    cpu->total.high += cycles.high;
+}
+
 bool cpu_hook(cpu_t *cpu, uc_hook *hook, int type, void (*call)(void), uint64_t begin, uint64_t end);
 __attribute__((format(printf, 3, 4))) void cpu_fail_at(cpu_t *cpu, uint32_t pc, const char *format, ...);
 
@@ -139,6 +175,17 @@ __attribute__((format(printf, 3, 4))) void cpu_fail_at(cpu_t *cpu, uint32_t pc, 
 void cpu_on_block(uc_engine *uc, uint64_t where, uint32_t size, void *user);
 void cpu_on_interrupt(uc_engine *uc, uint32_t number, void *user);
 void cpu_serve_attention(cpu_t *cpu, cpu_block_t *block); /* with the processor at rest */
+
+/* cpu_debug.c */
+void cpu_serve_debugger(cpu_t *cpu);                      /* with the processor at rest */
+bool cpu_debug_stops_block(cpu_t *cpu, uint32_t address); /* before a block begins */
+bool cpu_debug_stopped(cpu_t *cpu);                       /* within a block; puts the PC there */
+
+/* cpu_stores.c: between begin and end of a run this processor's pages without code take stores the fast way
+ */
+void cpu_stores_begin(cpu_t *cpu);
+void cpu_stores_end(void);
+void cpu_stores_meet_code(cpu_t *cpu, cpu_region_t *region, uint32_t first, uint32_t last); /* pages */
 
 /* cpu_window.c */
 bool cpu_open_windows(cpu_t *cpu);
@@ -167,7 +214,9 @@ void cpu_on_any_memory(uc_engine *uc, uc_mem_type type, uint64_t where, int size
 void cpu_take_error(cpu_t *cpu, uc_err error);
 void cpu_take_fetch_fault(cpu_t *cpu, bool protection);
 uint32_t cpu_access_pc(cpu_t *cpu, uint32_t address, bool write, uint32_t *it);
-bool cpu_is_urgent(const cpu_t *cpu); /* in HardFault, NMI or with FAULTMASK */
+void cpu_take_back_after(cpu_t *cpu, uint32_t pc); /* what was counted of the block but not executed */
+uint32_t cpu_it_at(const cpu_block_t *block, uint32_t pc); /* state of an IT block there */
+bool cpu_is_urgent(const cpu_t *cpu);                      /* in HardFault, NMI or with FAULTMASK */
 
 /* cpu_stats.c */
 void cpu_stats_enter(cpu_t *cpu, int exception);

@@ -48,6 +48,9 @@ int exceptions_next(const cpu_t *cpu)
 
 bool exceptions_wake(const cpu_t *cpu)
 {
+    if (cpu->nvic.candidate == 0) {
+        return false;
+    }
     nvic_masks_t masks = exceptions_masks(cpu);
     masks.primask = false;
     return nvic_next(&cpu->nvic, nvic_execution_priority(&cpu->nvic, &masks)) != 0;
@@ -74,14 +77,8 @@ void exceptions_raise_usage(cpu_t *cpu, uint32_t status)
     exceptions_raise(cpu, EXCEPTION_USAGE_FAULT);
 }
 
-/* Words of a frame go past the MPU; the first failure ends it and becomes a fault of its own. */
 static bool stack_word(cpu_t *cpu, uint32_t address, uint32_t *value, bool write)
 {
-    if (!mpu_allows(&cpu->mpu, address, write ? MPU_WRITE : MPU_READ, cpu_is_urgent(cpu))) {
-        cpu->system.cfsr |= write ? CFSR_MSTKERR : CFSR_MUNSTKERR;
-        exceptions_raise(cpu, EXCEPTION_MEM_MANAGE);
-        return false;
-    }
     if (!(write ? cpu_store(cpu, address, *value) : cpu_load(cpu, address, value))) {
         cpu->system.cfsr |= write ? CFSR_STKERR : CFSR_UNSTKERR;
         exceptions_raise(cpu, EXCEPTION_BUS_FAULT);
@@ -90,10 +87,20 @@ static bool stack_word(cpu_t *cpu, uint32_t address, uint32_t *value, bool write
     return true;
 }
 
+/* Words of a frame go past the MPU, whose regions begin and end at multiples of MPU_FINEST; the first failure
+ * ends it and becomes a fault of its own. */
 static bool stack_words(cpu_t *cpu, uint32_t address, uint32_t *words, unsigned count, bool write)
 {
+    const bool urgent = cpu_is_urgent(cpu);
     for (unsigned i = 0; i < count; i++) {
-        if (!stack_word(cpu, address + 4 * i, &words[i], write)) {
+        const uint32_t at = address + 4 * i;
+        if ((i == 0 || at % MPU_FINEST == 0) &&
+            !mpu_allows(&cpu->mpu, at, write ? MPU_WRITE : MPU_READ, urgent)) {
+            cpu->system.cfsr |= write ? CFSR_MSTKERR : CFSR_MUNSTKERR;
+            exceptions_raise(cpu, EXCEPTION_MEM_MANAGE);
+            return false;
+        }
+        if (!stack_word(cpu, at, &words[i], write)) {
             return false;
         }
     }

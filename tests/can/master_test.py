@@ -90,7 +90,7 @@ class Master(unittest.TestCase):
         machine = self.node.sdo["machine"]
         machine["R_s"].phys = 6.2
         self.assertEqual(machine["R_s"].raw, 6200000)
-        self.assertEqual(self.node.sdo["supported_modes"].raw, 0x1000C)
+        self.assertEqual(self.node.sdo["supported_modes"].raw, 0x3000C)
         self.assertTrue(self.node.is_op_mode_supported("PROFILED VELOCITY"))
         self.node.sdo["profile_acceleration"].phys = 123.0
         self.assertEqual(self.node.sdo["control"]["acceleration"].phys, 123.0)

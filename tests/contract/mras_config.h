@@ -11,10 +11,6 @@ inline mras_config_t mras_config(const Machine &m, const Base &b, double lag_rad
 {
     mras_config_t c = {};
     c.model = model(m, b);
-    c.resistance.k = fixed(0.125 / 0.16, 26);
-    c.resistance.min = c.model.R / 2;
-    c.resistance.max = c.model.R * 2;
-    c.resistance.omega = PM_Q(0.06);
     c.k = fixed(bandwidth_rad_s * b.period_s, 32);
     c.emf_min = fixed(0.02 * m.psi_m_Wb / b.psi_Wb(), 28);
     c.turn =

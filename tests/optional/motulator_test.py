@@ -20,10 +20,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
-import motulator_environment  # noqa: E402
+import python_environment  # noqa: E402
 
 if __name__ == "__main__":
-    motulator_environment.enter(sys.argv[2])
+    python_environment.enter("motulator", sys.argv[2])
 
 import numpy as np  # noqa: E402
 from motulator.drive import model  # noqa: E402

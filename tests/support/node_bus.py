@@ -82,7 +82,7 @@ class SerialBus:
 class Remote:
     """What a CiA 402 master says to the drive with its default process data, and hears from it."""
 
-    NMT, COMMAND, STATUS, HEARTBEAT = 0x000, 0x201, 0x181, 0x701
+    NMT, COMMAND, STATUS, SDO, HEARTBEAT = 0x000, 0x201, 0x181, 0x601, 0x701
     PERIOD_S = 0.5  # of the heartbeat, in the drive's time
     TIMEOUT_S = 0.5  # after which the drive goes off
     VELOCITY = 3  # mode of operation
@@ -116,6 +116,11 @@ class Remote:
         return "running" if word & 0x6F == 0x27 else "off"
 
     @classmethod
+    def heartbeat(cls, period_s):
+        """Writes 1017h."""
+        return cls.SDO, struct.pack("<BHBI", 0x2B, 0x1017, 0, round(1e3 * period_s))
+
+    @classmethod
     def is_beat(cls, frame):
         return frame[0] == cls.HEARTBEAT
 
@@ -128,11 +133,12 @@ class Remote:
 class Node:
     """The program and what it prints."""
 
-    def __init__(self, pmsim, bus, *options, scenario=SCENARIO):
+    def __init__(self, pmsim, bus, *options, scenario=SCENARIO, image=None):
+        what = ["node"] if image is None else ["board", image]  # the latter on the emulated board
         self.process = subprocess.Popen(
-            [pmsim, "node", scenario, "--can", bus, *map(str, options)],
+            [pmsim, *what, scenario, "--can", bus, *map(str, options)],
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-        self.lines, self.news, self.mark = [], threading.Condition(), 0
+        self.lines, self.came, self.news, self.mark = [], [], threading.Condition(), 0
         self.reader = threading.Thread(target=self._read, daemon=True)
         self.reader.start()
         self.where = self.wait_for(r"node on (.*); Ctrl-C ends").group(1)
@@ -141,9 +147,11 @@ class Node:
         for line in self.process.stdout:
             with self.news:
                 self.lines.append(line.rstrip())
+                self.came.append(time.monotonic())
                 self.news.notify_all()
         with self.news:
             self.lines.append(None)
+            self.came.append(time.monotonic())
             self.news.notify_all()
 
     def wait_for(self, pattern, timeout_s=60.0):
@@ -163,6 +171,15 @@ class Node:
     def time_of(self, what, timeout_s=60.0):
         """Simulated time of the next such line."""
         return float(self.wait_for(rf"([0-9.]+) s  {what}", timeout_s).group(1))
+
+    def now_s(self):
+        """Simulated time, from the last line that told one: it follows the clock of the wall but for what is lost."""
+        with self.news:
+            for line, came in zip(reversed(self.lines), reversed(self.came)):
+                told = re.match(r" *([0-9.]+) s  ", line or "")
+                if told:
+                    return float(told.group(1)) + time.monotonic() - came
+        raise AssertionError(f"no line with a time in:\n{self.text()}")
 
     def since(self, mark):
         """What has happened since that many lines."""
@@ -189,8 +206,7 @@ class Master:
         self.bus = bus
         Remote.enabled = False
         self.frames, self.silent = Remote.command(False), False
-        self.state, self.drive_s = None, 0.0  # by its own clock, counted from the first status
-        self.entered_s = {}  # state: when it was last entered
+        self.state = None
         self.news, self.done = threading.Condition(), False
         self.threads = [threading.Thread(target=run, daemon=True) for run in (self._speak, self._listen)]
         for thread in self.threads:
@@ -212,10 +228,7 @@ class Master:
             state = Remote.state(frame) if frame else None
             if state:
                 with self.news:
-                    if state != self.state:
-                        self.entered_s[state] = self.drive_s
                     self.state = state
-                    self.drive_s += Remote.PERIOD_S
                     self.news.notify_all()
 
     def say(self, enable, speed_rad_s=0.0, clear=False):

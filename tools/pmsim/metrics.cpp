@@ -197,6 +197,8 @@ static const std::vector<SpecialMetric> &special_metrics()
         std::vector<SpecialMetric> list = motion_metrics();
         const std::vector<SpecialMetric> drive = drive_metrics();
         list.insert(list.end(), drive.begin(), drive.end());
+        const std::vector<SpecialMetric> identify = identify_metrics();
+        list.insert(list.end(), identify.begin(), identify.end());
         return list;
     }();
     return table;

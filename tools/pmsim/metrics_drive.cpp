@@ -127,6 +127,27 @@ class LimitTime : public Metric
     uint32_t mask_ = 0;
 };
 
+class DrivenTime : public Metric
+{
+  public:
+    DrivenTime(const Expectation &, const Setup &setup) : period_s_(1.0 / setup.plant.inverter.f_pwm_Hz)
+    {
+    }
+
+    void add(const Sample &s) override
+    {
+        time_s_ += s.rig.driven ? period_s_ : 0.0;
+    }
+
+    MetricValue value() const override
+    {
+        return {time_s_, ""};
+    }
+
+  private:
+    double period_s_, time_s_ = 0.0;
+};
+
 // The plant's own honesty: what goes in, minus losses, mechanical work and stored field energy.
 class EnergyResidual : public Metric
 {
@@ -188,6 +209,7 @@ std::vector<SpecialMetric> drive_metrics()
           false,
           {}},
          make_special<Faults>},
+        {{"driven_s", "s", "time with the bridge on", false, false, {}}, make_special<DrivenTime>},
         {{"restarts", "1", "starts after the first fault of the window", false, false, {}},
          make_special<Faults>},
         {{"energy_residual_rel",

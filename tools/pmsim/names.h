@@ -17,7 +17,7 @@ inline const std::vector<std::string> &state_names()
 
 inline const std::vector<std::string> &mode_names()
 {
-    static const std::vector<std::string> names = {"speed", "torque", "current"};
+    static const std::vector<std::string> names = {"speed", "torque", "current", "identify"};
     return names;
 }
 
@@ -30,6 +30,20 @@ inline const std::vector<std::string> &fault_names()
 #include "firmware/drive/fault.def"
 #undef PM_FAULT
     };
+    return names;
+}
+
+// By commissioning_state_t and commissioning_reason_t.
+inline const std::vector<std::string> &identify_state_names()
+{
+    static const std::vector<std::string> names = {"idle", "running", "done", "failed"};
+    return names;
+}
+
+inline const std::vector<std::string> &identify_reason_names()
+{
+    static const std::vector<std::string> names = {"NONE",        "NO_CURRENT",  "UNEVEN",
+                                                   "IMPLAUSIBLE", "NOT_TURNING", "ABORTED"};
     return names;
 }
 

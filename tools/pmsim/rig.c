@@ -35,7 +35,7 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         rig_destroy(rig);
         return NULL;
     }
-    rig->scale = rig_scale(&rig->loop.app.drive.config.base, params->pole_pairs);
+    rig->scale = rig_scale(&rig->loop.app.drive.config.base, params->pole_pairs, rig->loop.app.slow_divider);
     return rig;
 }
 
@@ -77,7 +77,12 @@ void rig_set_hw_fault(rig_t *rig, bool held)
 
 void rig_set_break(rig_t *rig, double i_break_A)
 {
-    rig->loop.hal.i_break_A = i_break_A;
+    plant_break_t levels = {.delay_s = 0.0};
+    for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
+        levels.above_A[leg] = i_break_A;
+        levels.below_A[leg] = i_break_A;
+    }
+    plant_set_break(rig->loop.hal.plant, i_break_A > 0.0 ? &levels : NULL);
 }
 
 bool rig_send(rig_t *rig, const hal_can_frame_t *frame)

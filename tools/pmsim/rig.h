@@ -17,7 +17,7 @@
 
 /* In the order of drive_state_t and drive_mode_t; rig.c checks it. */
 enum { RIG_OFF, RIG_CALIBRATING, RIG_FINDING, RIG_RUNNING, RIG_STOPPING, RIG_FAULT, RIG_STATES };
-enum { RIG_SPEED, RIG_TORQUE, RIG_CURRENT, RIG_MODES };
+enum { RIG_SPEED, RIG_TORQUE, RIG_CURRENT, RIG_IDENTIFY, RIG_MODES };
 
 typedef struct {
     bool enable;
@@ -26,6 +26,15 @@ typedef struct {
     double torque_Nm;
     double current_A;
 } rig_command_t;
+
+/* What the drive has found out about its machine; 0: nothing yet. */
+typedef struct {
+    int state, reason; /* COMMISSIONING_... */
+    double R_s_ohm, lost_V;
+    double L_d_H, L_q_H, L_q_rated_H, L_dq_rated_H;
+    double psi_m_Wb;
+    double J_kgm2, viscous_Nms, coulomb_Nm;
+} rig_identified_t;
 
 typedef struct {
     plant_truth_t truth;    /* at the sample instant, without the voltages of nodes */
@@ -42,6 +51,7 @@ typedef struct {
     double v_dc_hat_V;
     double weight, quality;
     bool driven; /* any leg, in the output of this period */
+    rig_identified_t identified;
 } rig_sample_t;
 
 typedef struct rig rig_t;
@@ -57,7 +67,7 @@ void rig_command(rig_t *rig, const rig_command_t *command);
 bool rig_clear_fault(rig_t *rig);
 void rig_set_temperature(rig_t *rig, double temperature_degC);
 void rig_set_hw_fault(rig_t *rig, bool held);
-void rig_set_break(rig_t *rig, double i_break_A);
+void rig_set_break(rig_t *rig, double i_break_A); /* over-current comparators; 0: none */
 
 /* Frames to and from the drive's node; false: its ring is full, none waits. Its status also becomes known by
  * them. */

@@ -9,17 +9,28 @@ _Static_assert((int)RIG_OFF == (int)DRIVE_OFF && (int)RIG_CALIBRATING == (int)DR
                    (int)RIG_STOPPING == (int)DRIVE_STOPPING && (int)RIG_FAULT == (int)DRIVE_FAULT,
                "states");
 _Static_assert((int)RIG_SPEED == (int)DRIVE_MODE_SPEED && (int)RIG_TORQUE == (int)DRIVE_MODE_TORQUE &&
-                   (int)RIG_CURRENT == (int)DRIVE_MODE_CURRENT,
+                   (int)RIG_CURRENT == (int)DRIVE_MODE_CURRENT &&
+                   (int)RIG_IDENTIFY == (int)DRIVE_MODE_IDENTIFY,
                "modes");
 
 static const double two_pi = 6.283185307179586;
 
-rig_scale_t rig_scale(const drive_base_t *base, int32_t pole_pairs)
+static double si(pm_num_t base)
 {
+    return ldexp((double)base.m, base.e);
+}
+
+rig_scale_t rig_scale(const drive_base_t *base, int32_t pole_pairs, uint32_t slow_divider)
+{
+    const double omega_mech = si(base->omega) / pole_pairs;
+    const double t_slow_s = slow_divider * si(base->t_s);
     return (rig_scale_t){
-        .v_V = ldexp((double)base->v.m, base->v.e - PM_Q_BITS),
-        .i_A = ldexp((double)base->i.m, base->i.e - PM_Q_BITS),
-        .omega_mech = ldexp((double)base->omega.m, base->omega.e - PM_Q_BITS) / pole_pairs,
+        .v_V = si(base->v) / PM_ONE,
+        .i_A = si(base->i) / PM_ONE,
+        .omega_mech = omega_mech / PM_ONE,
+        .psi_Wb = si(base->psi) / PM_ONE,
+        .torque_Nm = si(base->torque) / PM_ONE,
+        .J_kgm2 = si(base->torque) * COMMISSIONING_J_STEPS * t_slow_s / omega_mech / PM_ONE,
         .fault_seen = UINT32_MAX,
     };
 }
@@ -53,6 +64,27 @@ static drive_fault_t fault_now(rig_scale_t *scale, const drive_t *drive)
     return record->period != scale->fault_seen ? record->fault : DRIVE_FAULT_NONE;
 }
 
+static rig_identified_t identified(const rig_scale_t *scale, const commissioning_report_t *report)
+{
+    const commissioning_result_t *r = &report->result;
+    const double R_ohm = scale->v_V / scale->i_A / PM_ONE;
+    const double L_H = scale->psi_Wb / scale->i_A / PM_ONE;
+    return (rig_identified_t){
+        .state = report->state,
+        .reason = report->reason,
+        .R_s_ohm = R_ohm * r->R,
+        .lost_V = scale->v_V * r->lost,
+        .L_d_H = L_H * r->L_d,
+        .L_q_H = L_H * r->L_q,
+        .L_q_rated_H = L_H * r->L_q_rated,
+        .L_dq_rated_H = L_H * r->L_dq_rated,
+        .psi_m_Wb = scale->psi_Wb * r->psi_m,
+        .J_kgm2 = scale->J_kgm2 * r->J,
+        .viscous_Nms = scale->torque_Nm / scale->omega_mech / PM_ONE * r->viscous,
+        .coulomb_Nm = scale->torque_Nm * r->coulomb,
+    };
+}
+
 void rig_fill_sample(rig_scale_t *scale, const drive_t *drive, const drive_out_t *out, rig_sample_t *sample)
 {
     const drive_status_t *status = drive_status(drive);
@@ -74,6 +106,7 @@ void rig_fill_sample(rig_scale_t *scale, const drive_t *drive, const drive_out_t
     sample->weight = (double)status->weight / PM_ONE;
     sample->quality = (double)status->quality / PM_ONE;
     sample->driven = out->driven[0] || out->driven[1] || out->driven[2];
+    sample->identified = identified(scale, &drive->commissioning_report);
 }
 
 void rig_record_legs(const drive_in_t *in, const drive_out_t *out, record_period_t *record)

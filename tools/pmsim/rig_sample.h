@@ -7,10 +7,11 @@
 
 typedef struct {
     double v_V, i_A, omega_mech; /* SI value of one step of a signal */
-    uint32_t fault_seen;         /* period of the last fault that the status has shown */
+    double psi_Wb, torque_Nm, J_kgm2;
+    uint32_t fault_seen; /* period of the last fault that the status has shown */
 } rig_scale_t;
 
-rig_scale_t rig_scale(const drive_base_t *base, int32_t pole_pairs);
+rig_scale_t rig_scale(const drive_base_t *base, int32_t pole_pairs, uint32_t slow_divider);
 
 /* sample->truth stands; everything else follows. */
 void rig_fill_sample(rig_scale_t *scale, const drive_t *drive, const drive_out_t *out, rig_sample_t *sample);

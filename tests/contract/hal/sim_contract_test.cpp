@@ -4,15 +4,12 @@
 
 #include <gtest/gtest.h>
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpedantic"
-#pragma GCC diagnostic ignored "-Wc++20-extensions"
+#include "tests/support/application.h"
+#include "tests/support/plants.h"
+
 extern "C" {
-#include "hal/sim/port.h"
 #include "tests/contract/hal/hal_contract.h"
 }
-#pragma GCC diagnostic pop
-#include "tests/support/plants.h"
 
 namespace
 {

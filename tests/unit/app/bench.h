@@ -9,14 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpedantic"
-#pragma GCC diagnostic ignored "-Wc++20-extensions"
-extern "C" {
-#include "firmware/params/store.h"
-#include "hal/sim/sim_loop.h"
-}
-#pragma GCC diagnostic pop
+#include "tests/support/application.h"
 #include "tests/support/plants.h"
 
 namespace app_test
@@ -195,6 +188,19 @@ inline drive_params_t defaults()
     drive_params_default(&params);
     return params;
 }
+
+// A drive that runs at 30 rad/s, held by its RPDO
+class Running : public Bench
+{
+  public:
+    Running()
+    {
+        const drive_params_t params = defaults();
+        boot(&params);
+        run_enabled_ms(700);
+        EXPECT_EQ(loop.app.drive.state, DRIVE_RUNNING);
+    }
+};
 
 } // namespace app_test
 

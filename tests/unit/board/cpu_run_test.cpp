@@ -81,6 +81,18 @@ TEST_F(CpuRun, CodeWrittenOverIsExecuted)
     EXPECT_EQ(r(0), 9U);
 }
 
+/* The page has been data alone so far, so that stores to it have taken the fast way. */
+TEST_F(CpuRun, CodeWrittenIntoDataIsExecutedAndCanBeWrittenOver)
+{
+    start({0x8035 /* strh r5, [r6] */, 0x8077 /* strh r7, [r6, #2] */, 0x8035, 0x47A0 /* blx r4 */, 0x3505,
+           0x8035, 0x47A0, here},
+          {0, 0, 0, 0, (ram + 0x801) | 1, movs(0, 4), ram + 0x800, bx_lr});
+    run(12);
+    EXPECT_EQ(r(0), 4U);
+    run(50);
+    EXPECT_EQ(r(0), 9U);
+}
+
 /* As a start-up copies code: unicorn does not see it at once, but from reset on. */
 TEST_F(CpuRun, CodeWrittenThroughTheOtherViewIsExecutedAfterReset)
 {

@@ -180,7 +180,7 @@ TEST(Cia402, OnlyModesThatThereAre)
 {
     Profile x;
     for (int mode = -128; mode < 128; ++mode) {
-        const bool known = mode == -1 || mode == 0 || mode == 3 || mode == 4;
+        const bool known = mode == -2 || mode == -1 || mode == 0 || mode == 3 || mode == 4;
         EXPECT_EQ(x.put(OD_LIVE_MODE, mode), known ? 0U : 0x06090030U) << mode;
     }
 }

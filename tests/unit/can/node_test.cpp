@@ -188,6 +188,53 @@ TEST(Heartbeat, OfItsOwnIdIsACollision)
     EXPECT_TRUE(x.alarms.empty());
 }
 
+// Heartbeat or boot-up, and an answer of an SDO server
+TEST(Namesake, KeepsTheNodeOutOfOperational)
+{
+    const std::vector<std::pair<uint16_t, Bytes>> signs = {
+        {0x709, {5}}, {0x709, {0}}, {0x589, {0x4B, 0x41, 0x60, 0, 0, 0, 0, 0}}};
+    for (const auto &[id, data] : signs) {
+        Bench x(9);
+        x.give(id, data);
+        x.run_ms(1);
+        EXPECT_EQ(x.value(0x1003, 1), 0x8150U) << id;
+        EXPECT_EQ(x.value(0x1001), 0x11U);
+        x.nmt(1);
+        EXPECT_EQ(node_nmt(&x.node), NODE_PRE_OPERATIONAL);
+        x.nmt(130);
+        EXPECT_EQ(x.value(0x1001), 0U);
+        x.nmt(1);
+        EXPECT_EQ(node_nmt(&x.node), NODE_OPERATIONAL);
+        x.give(id, data); // it is still there
+        EXPECT_EQ(node_nmt(&x.node), NODE_PRE_OPERATIONAL);
+    }
+}
+
+TEST(Namesake, DoesNotStopWhatRuns)
+{
+    Bench x(9);
+    x.operational();
+    x.on = true;
+    x.give(0x709, {5});
+    EXPECT_EQ(node_nmt(&x.node), NODE_OPERATIONAL);
+    EXPECT_TRUE(x.alarms.empty());
+    x.on = false;
+    x.give(0x709, {5});
+    EXPECT_EQ(node_nmt(&x.node), NODE_PRE_OPERATIONAL);
+}
+
+TEST(Namesake, IsNobodyElse)
+{
+    Bench x(9);
+    x.give(0x708, {5});
+    x.give(0x588, Bytes(8, 0));
+    x.give(0x709, {5, 0}); // no heartbeat
+    x.give(0x589, {0x60});
+    x.give(0x609, {0x40, 0, 0x10, 0, 0, 0, 0, 0}); // a request to this node
+    EXPECT_EQ(x.take(0x589).size(), 1U);
+    EXPECT_EQ(x.value(0x1001), 0U);
+}
+
 TEST(Emcy, TellsErrorsAndTheirEnd)
 {
     Bench x;

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 extern "C" {
-#include "hal/linux/gpio_line.h"
+#include "hal/linux/gpio_backend.h"
 }
 
 namespace

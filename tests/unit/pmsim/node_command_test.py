@@ -14,6 +14,7 @@ from node_bus import SCENARIO, Master, Node, Remote, SerialBus  # noqa: E402
 
 PMSIM = sys.argv[1]
 DRIFT_S = 1e-3
+BEAT_S = 0.02  # so many that some of them are in time on a busy computer
 
 
 def summary(node):
@@ -45,12 +46,15 @@ def drift(arrivals, period_s):
 
 
 def simulated_time_keeps_up_with_the_clock():
-    """The heartbeat comes every 500 ms of the drive's time: over 5 s no drift but what the node reports as lost, of which
-    some may have been lost when nobody listened yet."""
+    """The heartbeat, made quick, comes every 20 ms of the drive's time: over 5 s no drift but what the node reports as
+    lost, of which some may have been lost when nobody listened yet."""
     node = Node(PMSIM, "slcan:")
-    arrivals = beats(SerialBus(node.where), 5.0)
+    bus = SerialBus(node.where)
+    bus.send(*Remote.heartbeat(BEAT_S))
+    beats(bus, 2 * Remote.PERIOD_S)
+    arrivals = beats(bus, 5.0)
     _, latest_s, lost_s = stop(node)
-    drift_s = drift(arrivals, Remote.PERIOD_S)
+    drift_s = drift(arrivals, BEAT_S)
     print(f"      {len(arrivals)} beats, drift {1e3 * drift_s:.3f} ms, latest {1e3 * latest_s:.1f} ms, "
           f"lost {1e3 * lost_s:.0f} ms")
     assert -DRIFT_S < drift_s < DRIFT_S + lost_s, drift_s

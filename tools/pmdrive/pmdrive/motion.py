@@ -7,14 +7,14 @@ import struct
 import time
 
 from . import dictionary
-from .drive import state_of
+from .drive import error_text, state_of
 from .errors import FaultError, NotDone, UsageError
 
 PERIOD_S = 0.1
 WATCH_MS = 500
-MODES = {"speed": 3, "torque": 4, "current": -1}
+MODES = {"speed": 3, "torque": 4, "current": -1, "identify": -2}
 MAPPED = (0x60400010, 0x60600008, 0x60FF0020)
-SHUTDOWN, SWITCH_ON, ENABLE = 0x06, 0x07, 0x0F
+SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP = 0x06, 0x07, 0x0F, 0x0B
 
 
 class Motion:
@@ -74,10 +74,15 @@ class Motion:
         while self.drive.state() != wanted:
             self.check_fault()
             if time.monotonic() > end:
-                ready = self.drive.entry("parameters_ready")
-                raise NotDone(f"the drive does not go to `{wanted}`, it is `{self.drive.state()}`",
-                              f"parameters_ready says: {ready.text(self.drive.read(ready))}")
+                raise NotDone(f"the drive does not go to `{wanted}`, it is `{self.drive.state()}`", self._hindrance())
             time.sleep(0.02)
+
+    def _hindrance(self):
+        """An error of the communication that is there, or what the parameters lack."""
+        if self.drive.read("error_register") and self.drive.read("error_history.count"):
+            return f"the newest error says: {error_text(self.drive.read('error_history.1'))}"
+        ready = self.drive.entry("parameters_ready")
+        return f"parameters_ready says: {ready.text(self.drive.read(ready))}"
 
     def check_fault(self):
         if "fault" in state_of(self.drive.read("statusword")):
@@ -89,6 +94,9 @@ class Motion:
     def set_speed(self, speed):
         self.speed = speed
         self._send(self.controlword)
+
+    def quick_stop(self):
+        self._send(QUICK_STOP)
 
     def stop(self, seconds=30.0):
         """Slows down, then off; the commands go on until it is off."""

@@ -5,8 +5,8 @@ import shlex
 from . import dictionary, names
 from .errors import PmdriveError
 
-WORDS = ("scan", "info", "get", "set", "dump", "load", "diff", "save", "restore", "reset", "faults", "monitor", "run",
-         "stop", "trace", "eds", "shell", "completion")
+WORDS = ("scan", "info", "list", "get", "set", "dump", "load", "diff", "save", "restore", "reset", "faults", "monitor", "run",
+         "identify", "tune", "stop", "trace", "flash", "eds", "shell", "completion", "help")
 OBJECTS = sorted([*(e.name for e in dictionary.ENTRIES), *names.RECORDS])
 
 
@@ -34,10 +34,8 @@ class Shell(cmd.Cmd):
             pass
         return None
 
-    def do_help(self, _):
-        from . import cli
-
-        cli.parser().print_help()
+    def do_help(self, topic):
+        self.default(f"help {topic}")
 
     def emptyline(self):
         pass

@@ -1,0 +1,126 @@
+/* Identification on the bus: what is asked for, and the results in the units of the dictionary. */
+#include <stddef.h>
+
+#include "firmware/app/app_parts.h"
+
+typedef enum { IN_OHM, IN_VOLT, IN_HENRY, IN_WEBER, IN_INERTIA, IN_VISCOUS, IN_TORQUE } base_t;
+
+typedef struct {
+    uint16_t slot;
+    uint8_t offset; /* in the result */
+    uint8_t base, exponent;
+} result_row_t;
+
+#define AT(member) (uint8_t) offsetof(commissioning_result_t, member)
+
+static const result_row_t results[] = {
+    {OD_LIVE_IDENTIFICATION_R_S, AT(R), IN_OHM, 6},
+    {OD_LIVE_IDENTIFICATION_DEAD_VOLTAGE, AT(lost), IN_VOLT, 3},
+    {OD_LIVE_IDENTIFICATION_L_D, AT(L_d), IN_HENRY, 9},
+    {OD_LIVE_IDENTIFICATION_L_Q, AT(L_q), IN_HENRY, 9},
+    {OD_LIVE_IDENTIFICATION_L_Q_RATED, AT(L_q_rated), IN_HENRY, 9},
+    {OD_LIVE_IDENTIFICATION_L_DH_RATED, AT(L_d), IN_HENRY, 9},
+    {OD_LIVE_IDENTIFICATION_L_DQH_RATED, AT(L_dq_rated), IN_HENRY, 9},
+    {OD_LIVE_IDENTIFICATION_PSI_M, AT(psi_m), IN_WEBER, 9},
+    {OD_LIVE_IDENTIFICATION_J, AT(J), IN_INERTIA, 9},
+    {OD_LIVE_IDENTIFICATION_FRICTION, AT(viscous), IN_VISCOUS, 9},
+    {OD_LIVE_IDENTIFICATION_COULOMB, AT(coulomb), IN_TORQUE, 6},
+};
+
+static pm_num_t base_of(const drive_config_t *config, base_t base)
+{
+    const drive_base_t *b = &config->base;
+    const pm_num_t per_speed = pm_num_div(config->pole_pairs, b->omega);
+    switch (base) {
+    case IN_OHM:
+        return pm_num_div(b->v, b->i);
+    case IN_VOLT:
+        return b->v;
+    case IN_HENRY:
+        return pm_num_div(b->psi, b->i);
+    case IN_WEBER:
+        return b->psi;
+    case IN_INERTIA: {
+        const pm_num_t time =
+            pm_num_mul(b->t_s, pm_num((int32_t)config->slow_divider * COMMISSIONING_J_STEPS));
+        return pm_num_mul(pm_num_mul(b->torque, time), per_speed);
+    }
+    case IN_VISCOUS:
+        return pm_num_mul(b->torque, per_speed);
+    case IN_TORQUE:
+    default:
+        return b->torque;
+    }
+}
+
+static int32_t in_row(const app_t *app, const result_row_t *row)
+{
+    const uint8_t *memory = (const uint8_t *)&app->drive.commissioning_report.result;
+    const pm_q_t x = *(const int32_t *)(const void *)&memory[row->offset];
+    return app_in_units(x, base_of(&app->drive.config, (base_t)row->base), row->exponent);
+}
+
+/* L_q(i) = L_q + (L_q_rated - L_q) (i / i_rated)^2 is psi / i: its tangent at a part of the rated current has
+ * three times the change. */
+static pm_q_t tangent(const commissioning_result_t *r, int32_t of_16)
+{
+    return r->L_q + 3 * (r->L_q_rated - r->L_q) / 16 * of_16;
+}
+
+bool app_identify_value(const app_t *app, uint16_t slot, int32_t *value)
+{
+    const commissioning_report_t *report = &app->drive.commissioning_report;
+    const commissioning_result_t *r = &report->result;
+    for (uint32_t n = 0; n < sizeof results / sizeof results[0]; n++) {
+        if (results[n].slot == slot) {
+            *value = in_row(app, &results[n]);
+            return true;
+        }
+    }
+    switch (slot) {
+    case OD_LIVE_IDENTIFICATION_COMMAND:
+        *value = app->routines;
+        return true;
+    case OD_LIVE_IDENTIFICATION_STATE:
+        *value = report->state;
+        return true;
+    case OD_LIVE_IDENTIFICATION_PROGRESS:
+        *value = report->progress;
+        return true;
+    case OD_LIVE_IDENTIFICATION_REASON:
+        *value = report->reason;
+        return true;
+    case OD_LIVE_IDENTIFICATION_L_QH_RATED:
+        *value = app_in_units(tangent(r, 16), base_of(&app->drive.config, IN_HENRY), 9);
+        return true;
+    case OD_LIVE_IDENTIFICATION_CROSS_HALF: {
+        const pm_num_t part = pm_num_ratio(r->L_dq_rated / 2, tangent(r, 4));
+        (void)pm_num_to_fixed(pm_num_mul(part, pm_num(1000000)), 0, value);
+        return true;
+    }
+    default:
+        return false;
+    }
+}
+
+bool app_identify_put(app_t *app, uint16_t slot, int32_t value)
+{
+    if (slot != (uint16_t)OD_LIVE_IDENTIFICATION_COMMAND) {
+        return false;
+    }
+    app->routines = (uint8_t)value;
+    return true;
+}
+
+/* The rated current and 30 % of the highest speed unless told otherwise. */
+void app_identify_command(const app_t *app, drive_command_t *command)
+{
+    command->mode = DRIVE_MODE_IDENTIFY;
+    command->routines = app->routines;
+    if (command->current_mA == 0) {
+        command->current_mA = app->params.i_rated;
+    }
+    if (command->speed_mrad_s == 0) {
+        command->speed_mrad_s = app->params.speed_max / 10 * 3;
+    }
+}

@@ -1,0 +1,214 @@
+/* The sequence of the identification. */
+#include "firmware/drive/commissioning/commissioning.h"
+
+#include <stddef.h>
+
+#include "firmware/drive/commissioning/commissioning_parts.h"
+
+#define HOLD_MS 500U
+
+/* What others read of the position stays as it was. */
+_Static_assert(offsetof(drive_t, identify.work) + sizeof(commissioning_t) <=
+                   offsetof(drive_t, position.weight),
+               "fits beside the loop's speed and the quality");
+
+enum {
+    SWEEP,
+    LEVELS,
+    SMALL_D,
+    HOLD_1,
+    SMALL_Q,
+    HOLD_2,
+    UP,
+    FULL,
+    LESS,
+    DOWN,
+    HOLD_3,
+    RATED_Q,
+    END,
+};
+
+pm_q_t commissioning_current(const drive_t *drive)
+{
+    return pm_clamp(pm_abs(drive->i_target), drive->config.i_max / 16, drive->config.i_max);
+}
+
+/* k_theta is 16 / (2 pi) of it, Q30. */
+pm_q_t commissioning_period(const drive_t *drive)
+{
+    return pm_frac(drive->config.k_theta, PM_FRAC(0.0981747704));
+}
+
+/* What the parts need that is not to be identified is taken from the last results, else from the parameters.
+ */
+static void know(drive_t *drive)
+{
+    commissioning_t *self = &drive->identify.work;
+    const commissioning_result_t *r = &drive->commissioning_report.result;
+    const current_control_config_t *c = &drive->config.current;
+    self->L_d = r->L_d != 0 ? r->L_d : c->L_d;
+    self->L_q = r->L_q != 0 ? r->L_q : c->L_q;
+    self->lost = r->lost;
+    /* of the current control: kb = R T_s / L */
+    self->R = r->R != 0 ? r->R : pm_div(pm_unit(c->L_d, c->d.kb), commissioning_period(drive));
+    commissioning_set_gains(drive);
+}
+
+static bool is_wanted(uint8_t routines, uint32_t phase)
+{
+    const bool turning = (routines & ((uint8_t)COMMISSIONING_FLUX | (uint8_t)COMMISSIONING_MECHANICS)) != 0U;
+    const bool inductance = (routines & (uint8_t)COMMISSIONING_INDUCTANCE) != 0U;
+    switch (phase) {
+    case LEVELS:
+        return (routines & (uint8_t)COMMISSIONING_RESISTANCE) != 0U;
+    case SMALL_D:
+    case HOLD_1:
+    case SMALL_Q:
+    case HOLD_3:
+    case RATED_Q:
+        return inductance;
+    case HOLD_2:
+    case UP:
+    case FULL:
+    case LESS:
+    case DOWN:
+        return turning;
+    default:
+        return true;
+    }
+}
+
+static void enter(drive_t *drive, uint8_t phase)
+{
+    commissioning_t *self = &drive->identify.work;
+    self->phase = phase;
+    self->part = 0;
+    self->ms = 0;
+    commissioning_clear_sums(self);
+    switch (phase) {
+    case SWEEP:
+        sweep_enter(drive);
+        break;
+    case LEVELS:
+        levels_enter(drive);
+        break;
+    case SMALL_D:
+        inductance_enter(drive, false, false);
+        break;
+    case SMALL_Q:
+        inductance_enter(drive, true, false);
+        break;
+    case RATED_Q:
+        inductance_enter(drive, true, true);
+        break;
+    case HOLD_1:
+    case HOLD_2:
+    case HOLD_3:
+        if (self->kind != (uint8_t)KIND_CURRENT) {
+            commissioning_start_current(drive);
+        }
+        break;
+    case UP:
+        rotation_enter(drive);
+        break;
+    default:
+        break;
+    }
+}
+
+/* With the vector, the rotor goes back to phase A; then it has time to come to rest. */
+static phase_result_t hold(drive_t *drive, bool full)
+{
+    commissioning_t *self = &drive->identify.work;
+    const pm_q_t i = full ? commissioning_current(drive) : commissioning_current(drive) / 2;
+    const int32_t left = pm_angle_diff(0U, drive->theta_open);
+    const int32_t most = (int32_t)(PM_TURN(0.5) / HOLD_MS);
+    drive->theta_open += (pm_angle_t)pm_clamp(left, -most, most);
+    self->ms = left == 0 ? self->ms : 0U;
+    drive->i_ref.d = commissioning_approach(drive->i_ref.d, i, i / 64 + 1);
+    return (phase_result_t){.done = self->ms > HOLD_MS};
+}
+
+static phase_result_t phase_slow(drive_t *drive)
+{
+    switch (drive->identify.work.phase) {
+    case SWEEP:
+        return sweep_slow(drive);
+    case LEVELS:
+        return levels_slow(drive);
+    case SMALL_D:
+        return inductance_slow(drive, false, false);
+    case SMALL_Q:
+        return inductance_slow(drive, true, false);
+    case RATED_Q:
+        return inductance_slow(drive, true, true);
+    case HOLD_1:
+    case HOLD_3:
+        return hold(drive, true);
+    case HOLD_2:
+        return hold(drive, false);
+    case UP:
+        return rotation_up(drive);
+    case FULL:
+        return rotation_full(drive);
+    case LESS:
+        return rotation_less(drive);
+    case DOWN:
+    default:
+        return rotation_down(drive);
+    }
+}
+
+static void finish(drive_t *drive, commissioning_state_t state, commissioning_reason_t reason)
+{
+    drive->stage = STAGE_OFF;
+    drive->commissioning_report.state = (uint8_t)state;
+    drive->commissioning_report.reason = (uint8_t)reason;
+}
+
+void commissioning_start(drive_t *drive)
+{
+    commissioning_report_t *report = &drive->commissioning_report;
+    report->routines = drive->command.routines == 0U ? (uint8_t)COMMISSIONING_ALL : drive->command.routines;
+    report->state = (uint8_t)COMMISSIONING_RUNNING;
+    report->reason = (uint8_t)COMMISSIONING_NO_REASON;
+    report->progress = 0;
+    drive->identify.work = (commissioning_t){.kind = KIND_VOLTAGE};
+    drive->omega_open = 0;
+    know(drive);
+    enter(drive, SWEEP);
+    drive->stage = STAGE_IDENTIFY;
+}
+
+void commissioning_slow(drive_t *drive)
+{
+    commissioning_t *self = &drive->identify.work;
+    if (drive->stage != STAGE_IDENTIFY) {
+        return;
+    }
+    self->ms++;
+    const phase_result_t result = phase_slow(drive);
+    if (result.failed != COMMISSIONING_NO_REASON) {
+        finish(drive, COMMISSIONING_FAILED, result.failed);
+    } else if (result.done) {
+        uint8_t next = self->phase;
+        do {
+            next++;
+        } while (!is_wanted(drive->commissioning_report.routines, next));
+        drive->commissioning_report.progress = (uint8_t)(100U * next / (uint32_t)END);
+        if (next == (uint8_t)END) {
+            finish(drive, COMMISSIONING_DONE, COMMISSIONING_NO_REASON);
+        } else {
+            enter(drive, next);
+        }
+    } else {
+        /* goes on */
+    }
+}
+
+void commissioning_abort(drive_t *drive)
+{
+    if (drive->commissioning_report.state == (uint8_t)COMMISSIONING_RUNNING) {
+        finish(drive, COMMISSIONING_FAILED, COMMISSIONING_ABORTED);
+    }
+}

@@ -1,0 +1,54 @@
+/* What the parts of the identification ask of each other. */
+#ifndef DRIVE_COMMISSIONING_COMMISSIONING_PARTS_H
+#define DRIVE_COMMISSIONING_COMMISSIONING_PARTS_H
+
+#include "firmware/drive/drive_parts.h"
+
+/* What a period does with the bridge. */
+enum { KIND_VOLTAGE, KIND_CURRENT, KIND_SQUARE };
+
+/* bridge.c */
+void commissioning_start_current(drive_t *drive); /* current control in the frame of theta_open */
+void commissioning_set_gains(drive_t *drive);     /* by R and L_d */
+void commissioning_clear_sums(commissioning_t *self);
+pm_q_t commissioning_mean(const commissioning_t *self, uint32_t n); /* of sum n over what was taken */
+
+/* square.c: one period of the square wave; what is summed up, beside currents and fluxes in w = v - R i -
+ * lost per T_s. */
+#define SQUARE_LONGEST 256U /* periods of half a wave */
+enum { SUM_FLUX, SUM_CURRENT, SUM_D_FLUX, SUM_D_CURRENT, SUM_SQUARE };
+void square_step(drive_t *drive, pm_ab_t v_past);
+
+/* One millisecond of a phase each; PM_RUNNING, PM_DONE, or else the phase has failed by *reason. */
+typedef struct {
+    bool done;
+    commissioning_reason_t failed;
+} phase_result_t;
+
+/* resistance.c */
+void sweep_enter(drive_t *drive);
+phase_result_t sweep_slow(drive_t *drive);
+void levels_enter(drive_t *drive);
+phase_result_t levels_slow(drive_t *drive);
+
+/* inductance.c */
+void inductance_enter(drive_t *drive, bool on_q, bool rated);
+phase_result_t inductance_slow(drive_t *drive, bool on_q, bool rated);
+
+/* rotation.c */
+void rotation_enter(drive_t *drive);
+phase_result_t rotation_up(drive_t *drive);
+phase_result_t rotation_full(drive_t *drive);
+phase_result_t rotation_less(drive_t *drive);
+phase_result_t rotation_down(drive_t *drive);
+
+/* The current of the test; a period in radians of the base speed. */
+pm_q_t commissioning_current(const drive_t *drive);
+pm_q_t commissioning_period(const drive_t *drive);
+
+static inline pm_q_t commissioning_approach(pm_q_t x, pm_q_t target, pm_q_t step)
+{
+    return x + pm_clamp(target - x, -step, step);
+}
+
+#endif

@@ -1,0 +1,111 @@
+/* Inductances: flux over current of a square wave of voltage along one axis, the rotor standing on phase A.
+ *
+ *   L = sum s T_s (v - R i - lost) / sum s (i_k - i_k-1), s the sign of v: from -i to i and back, without
+ * mean The torque of a wave on q has no mean either, and a half wave is too short to turn the rotor. Half
+ * waves get longer until 0.4 v_dc drives the current wanted; the shortest makes R and lost voltage matter
+ * least. A small wave gives L at zero current, one at the test current, with the i_d of most torque per
+ * ampere, the apparent L_q there and by psi_d = L_d i_d + k i_q^2 / 2:    k = sum (dpsi_d - L_d di_d) x / sum
+ * x^2, x = i_q di_q the cross inductance k i_q. */
+#include "firmware/drive/commissioning/commissioning_parts.h"
+#include "firmware/math/root.h"
+
+#define SHORTEST    2U
+#define SHARE_SMALL PM_Q(0.3)
+
+/* The i_d of most torque per ampere: h - sqrt(h^2 + i^2), h = psi_m / (2 (L_q - L_d)), but so much
+ * that its leg's current has a sign; none without saliency. */
+static pm_q_t best_i_d(const drive_t *drive, pm_q_t i_q)
+{
+    const commissioning_result_t *r = &drive->commissioning_report.result;
+    const pm_q_t dL = r->L_q - r->L_d;
+    if (dL < r->L_q / 20) {
+        return 0;
+    }
+    const pm_q_t psi = r->psi_m != 0 ? r->psi_m : drive->config.psi_m;
+    const pm_q_t h = pm_div(psi / 2, dL);
+    return pm_min(h > PM_Q(7.0) ? 0 : h - pm_hypot(h, i_q), -i_q / 8);
+}
+
+/* By the inductance at zero current: four fifths of the voltage that will be needed. */
+static void foresee(const drive_t *drive, square_t *square)
+{
+    const pm_q_t flux = 2 * pm_mul(drive->identify.work.L_q, square->wanted);
+    const pm_q_t top = pm_mul(drive->status.v_dc, PM_Q(0.3));
+    const pm_q_t step = pm_max(pm_mul(top, commissioning_period(drive)), 1);
+    const uint32_t half = (uint32_t)(flux / step) + 1U;
+    square->half = (uint16_t)(half < SHORTEST ? SHORTEST : (half > SQUARE_LONGEST ? SQUARE_LONGEST : half));
+    square->voltage = pm_mul(pm_mul(top, pm_div(flux, step * square->half)), PM_Q(0.8));
+}
+
+void inductance_enter(drive_t *drive, bool on_q, bool rated)
+{
+    commissioning_t *self = &drive->identify.work;
+    const pm_q_t i = commissioning_current(drive);
+    self->of.square = (square_t){
+        .half = SHORTEST,
+        .on_q = on_q,
+        .leading = true,
+        .voltage = drive->status.v_dc / 128,
+        .wanted = rated ? i : pm_mul(i, SHARE_SMALL),
+        .bias = rated ? -best_i_d(drive, i) : 0,
+    };
+    if (rated) {
+        foresee(drive, &self->of.square);
+    }
+    self->of.square.count = (uint16_t)((uint32_t)self->of.square.half * 646U / 1000U);
+    self->v = (pm_ab_t){0, 0};
+    self->kind = KIND_SQUARE;
+    current_control_reset(&drive->current, (pm_dq_t){0, 0});
+}
+
+static pm_q_t per_unit(const drive_t *drive)
+{
+    const commissioning_t *self = &drive->identify.work;
+    const pm_q_t flux = pm_mul(commissioning_mean(self, SUM_FLUX), commissioning_period(drive));
+    return pm_div(flux, commissioning_mean(self, SUM_CURRENT));
+}
+
+static pm_q_t cross(const drive_t *drive)
+{
+    const commissioning_t *self = &drive->identify.work;
+    const pm_q_t flux = pm_mul(commissioning_mean(self, SUM_D_FLUX), commissioning_period(drive));
+    const pm_q_t current =
+        pm_mul(commissioning_mean(self, SUM_D_CURRENT), drive->commissioning_report.result.L_d);
+    const pm_q_t slope = pm_div(flux - current, commissioning_mean(self, SUM_SQUARE));
+    return pm_mul_sat(slope, commissioning_current(drive));
+}
+
+static void conclude(drive_t *drive, bool on_q, bool rated, pm_q_t L)
+{
+    commissioning_t *self = &drive->identify.work;
+    commissioning_result_t *r = &drive->commissioning_report.result;
+    if (rated) {
+        r->L_q_rated = L;
+        r->L_dq_rated = self->of.square.bias != 0 ? cross(drive) : 0;
+    } else if (on_q) {
+        r->L_q = L;
+        r->L_q_rated = L; /* until that has been measured */
+        r->L_dq_rated = 0;
+        self->L_q = L;
+    } else {
+        r->L_d = L;
+        self->L_d = L;
+        commissioning_set_gains(drive);
+    }
+}
+
+phase_result_t inductance_slow(drive_t *drive, bool on_q, bool rated)
+{
+    const commissioning_t *self = &drive->identify.work;
+    if (self->of.square.failed) {
+        return (phase_result_t){.failed = COMMISSIONING_NO_CURRENT};
+    }
+    if (!self->of.square.done) {
+        return (phase_result_t){.done = false};
+    }
+    if (self->sum[SUM_FLUX] <= 0 || self->sum[SUM_CURRENT] <= 0) {
+        return (phase_result_t){.failed = COMMISSIONING_IMPLAUSIBLE};
+    }
+    conclude(drive, on_q, rated, per_unit(drive));
+    return (phase_result_t){.done = true};
+}

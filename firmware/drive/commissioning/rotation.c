@@ -1,0 +1,173 @@
+/* Magnet flux, inertia and friction: a current vector turns and takes the rotor along (METHODS.md 1.3.1.3).
+ *
+ * In the vector's frame psi = (v - R i) / (j omega), and psi - L_q i is the active flux psi_m + (L_d - L_q)
+ * i_d on the rotor's axis, wherever the load has turned it. Two currents give psi_m without L_d. Torque is
+ * 1.5 P i (v_d - R i) / omega; speeding up and down at the same rate and speeds, its
+ * half difference is J times the acceleration, and neither R nor friction are in it. Friction at two speeds
+ * gives the viscous part. */
+#include "firmware/drive/commissioning/commissioning_parts.h"
+#include "firmware/math/root.h"
+#include "firmware/math/trig.h"
+
+#define RAMP_MS   2000
+#define SETTLE_MS 600U
+#define MEAN_MS   600U
+
+enum { U_D, U_Q, I_D, I_Q, TORQUE }; /* of the sums */
+
+typedef struct {
+    pm_q_t length, i_d;
+    bool follows;
+} active_t;
+
+void rotation_enter(drive_t *drive)
+{
+    commissioning_t *self = &drive->identify.work;
+    self->of.rotation.omega =
+        pm_clamp(drive->omega_target, -drive->config.omega_max, drive->config.omega_max);
+    self->of.rotation.count = 0;
+}
+
+static pm_q_t ramp_step(const commissioning_t *self)
+{
+    return pm_abs(self->of.rotation.omega) / RAMP_MS + 1;
+}
+
+/* Torque over 1.5 P i, with what R takes: power over omega. i_q is what ramps leave of it. */
+static pm_q_t torque_voltage(const commissioning_t *self, pm_q_t omega)
+{
+    const pm_q_t i_d = pm_max(commissioning_mean(self, I_D), 1);
+    const pm_q_t turned = pm_mul(commissioning_mean(self, U_Q), pm_div(commissioning_mean(self, I_Q), i_d));
+    return pm_div(commissioning_mean(self, U_D) + turned, omega);
+}
+
+/* Between half the speed and nine tenths. */
+static void take_torque(drive_t *drive)
+{
+    commissioning_t *self = &drive->identify.work;
+    const pm_q_t top = pm_abs(self->of.rotation.omega);
+    const pm_q_t omega = pm_abs(drive->omega_open);
+    if (omega > top / 2 && omega < top - top / 10) {
+        self->sum[TORQUE] += torque_voltage(self, omega);
+        self->of.rotation.count++;
+    }
+    const int64_t torque = self->sum[TORQUE];
+    commissioning_clear_sums(self);
+    self->sum[TORQUE] = torque;
+}
+
+static pm_q_t mean_torque(const commissioning_t *self)
+{
+    const int32_t count = self->of.rotation.count;
+    return count == 0 ? 0 : (pm_q_t)(self->sum[TORQUE] / count);
+}
+
+phase_result_t rotation_up(drive_t *drive)
+{
+    commissioning_t *self = &drive->identify.work;
+    take_torque(drive);
+    drive->omega_open = commissioning_approach(drive->omega_open, self->of.rotation.omega, ramp_step(self));
+    self->of.rotation.tau_up = mean_torque(self);
+    return (phase_result_t){.done = drive->omega_open == self->of.rotation.omega};
+}
+
+static active_t active_flux(const drive_t *drive)
+{
+    const commissioning_t *self = &drive->identify.work;
+    const pm_q_t omega = self->of.rotation.omega;
+    const pm_q_t speed = pm_abs(omega);
+    const pm_q_t i = commissioning_mean(self, I_D);
+    const pm_q_t e_d = commissioning_mean(self, U_D) - pm_mul(self->R, i);
+    const pm_q_t e_q = omega < 0 ? -commissioning_mean(self, U_Q) : commissioning_mean(self, U_Q);
+    const pm_q_t d = pm_div(e_q, speed) - pm_mul(self->L_q, i);
+    const pm_q_t q = pm_div(e_d, speed);
+    const pm_q_t length = pm_hypot(d, q);
+    const bool follows = d > pm_mul(self->L_q, i) / 8 && pm_abs(q) < 2 * d;
+    return (active_t){.length = length, .i_d = pm_mul(i, pm_div(d, pm_max(length, 1))), .follows = follows};
+}
+
+static bool is_measured(commissioning_t *self)
+{
+    if (self->ms == SETTLE_MS) {
+        commissioning_clear_sums(self);
+    }
+    return self->ms >= SETTLE_MS + MEAN_MS;
+}
+
+static const phase_result_t running = {.done = false};
+static const phase_result_t stuck = {.failed = COMMISSIONING_NOT_TURNING};
+
+phase_result_t rotation_full(drive_t *drive)
+{
+    commissioning_t *self = &drive->identify.work;
+    if (!is_measured(self)) {
+        return running;
+    }
+    const active_t active = active_flux(drive);
+    if (!active.follows) {
+        return stuck;
+    }
+    self->of.rotation.tau_even = torque_voltage(self, pm_abs(drive->omega_open));
+    return (phase_result_t){.done = true};
+}
+
+/* At a quarter of the current, where what the saliency and its saturation take is small. */
+phase_result_t rotation_less(drive_t *drive)
+{
+    commissioning_t *self = &drive->identify.work;
+    commissioning_result_t *r = &drive->commissioning_report.result;
+    const pm_q_t half = commissioning_current(drive) / 4;
+    drive->i_ref.d = commissioning_approach(drive->i_ref.d, half, half / 64 + 1);
+    if (!is_measured(self)) {
+        return running;
+    }
+    const active_t active = active_flux(drive);
+    if (!active.follows) {
+        return stuck;
+    }
+    const pm_q_t psi = active.length + pm_mul(self->L_q - self->L_d, active.i_d);
+    r->psi_m = psi;
+    return (phase_result_t){.done = true};
+}
+
+static void conclude_mechanics(drive_t *drive, pm_q_t tau_down, pm_q_t i)
+{
+    const commissioning_t *self = &drive->identify.work;
+    commissioning_result_t *r = &drive->commissioning_report.result;
+    const pm_q_t tau_up = self->of.rotation.tau_up;
+    r->J = pm_div(pm_mul(tau_up - tau_down, i) / 2, ramp_step(self) * COMMISSIONING_J_STEPS);
+
+    /* what R takes, over the speeds of the window (mean of 1 / omega: 1.469) and at the top */
+    const pm_q_t top = pm_abs(self->of.rotation.omega);
+    const pm_q_t at_top = pm_div(pm_mul(self->R, i), top);
+    const pm_q_t even = self->of.rotation.tau_even - at_top;
+    const pm_q_t middle = pm_mean(tau_up, tau_down) - pm_mul(at_top, PM_Q(1.46947));
+    r->viscous = pm_div(pm_mul(even - middle, i), pm_mul(top, PM_Q(0.3)));
+    r->coulomb = pm_mul(even, i) - pm_mul(r->viscous, top);
+}
+
+phase_result_t rotation_down(drive_t *drive)
+{
+    commissioning_t *self = &drive->identify.work;
+    const pm_q_t full = commissioning_current(drive) / 2;
+    if (self->ms < SETTLE_MS) {
+        drive->i_ref.d = commissioning_approach(drive->i_ref.d, full, full / 64 + 1);
+        commissioning_clear_sums(self);
+        self->of.rotation.count = 0;
+        return running;
+    }
+    take_torque(drive);
+    drive->omega_open = commissioning_approach(drive->omega_open, 0, ramp_step(self));
+    if (drive->omega_open != 0) {
+        return running;
+    }
+    const pm_q_t tau_down = mean_torque(self);
+    const bool wanted = (drive->commissioning_report.routines & (uint8_t)COMMISSIONING_MECHANICS) != 0U;
+    if (wanted) {
+        conclude_mechanics(drive, tau_down, full);
+        if (drive->commissioning_report.result.J <= 0) {
+            return (phase_result_t){.failed = COMMISSIONING_NOT_TURNING};
+        }
+    }
+    return (phase_result_t){.done = true};
+}

@@ -1,0 +1,125 @@
+/* The square wave that measures an inductance, period by period: inductance.c. */
+#include "firmware/drive/commissioning/commissioning_parts.h"
+
+#define SETTLE_CYCLES 3U
+#define CYCLES        24U
+#define BIASED_CYCLES 2U
+/* Currents below tell no sign: four steps of a 12-bit converter. */
+#define NO_SIGN PM_Q(8.0 / 4096.0)
+/* Of products, so that the sum of thousands fits. */
+#define FINE 65536
+
+static int32_t sign_of(pm_q_t i)
+{
+    if (pm_abs(i) < 4 * NO_SIGN) {
+        return 0;
+    }
+    return i < 0 ? -1 : 1;
+}
+
+/* Sum of the signs of a leg's current at its two edges. The current moves while legs differ: the leg that is
+ * up longest switches before and after that, the one that is up shortest in the middle of it. */
+static int32_t signs(pm_q_t from, pm_q_t to, pm_q_t u, pm_q_t edge)
+{
+    if (u > edge) {
+        return sign_of(4 * from) + sign_of(4 * to);
+    }
+    if (u < -edge) {
+        return 2 * sign_of(2 * from + 2 * to);
+    }
+    return sign_of(3 * from + to) + sign_of(from + 3 * to);
+}
+
+static pm_ab_t lost(const drive_t *drive, const commissioning_t *self, pm_ab_t v)
+{
+    const pm_q_t half = self->lost / 2;
+    const pm_q_t edge = self->of.square.voltage / 4;
+    const pm_abc_t u = pm_clarke_inverse(v);
+    const pm_abc_t x = {
+        .a = signs(self->i_last.a, drive->i_abc.a, u.a, edge) * half,
+        .b = signs(self->i_last.b, drive->i_abc.b, u.b, edge) * half,
+        .c = signs(self->i_last.c, drive->i_abc.c, u.c, edge) * half,
+    };
+    return pm_clarke(x);
+}
+
+static void take(drive_t *drive, pm_ab_t v)
+{
+    commissioning_t *self = &drive->identify.work;
+    const pm_ab_t last = pm_clarke(self->i_last);
+    const pm_ab_t di = {.alpha = drive->i_ab.alpha - last.alpha, .beta = drive->i_ab.beta - last.beta};
+    const pm_ab_t mean = {.alpha = last.alpha + di.alpha / 2, .beta = last.beta + di.beta / 2};
+    self->taken++;
+    const pm_ab_t gone = lost(drive, self, v);
+    const pm_ab_t w = {.alpha = v.alpha - pm_mul(self->R, mean.alpha) - gone.alpha,
+                       .beta = v.beta - pm_mul(self->R, mean.beta) - gone.beta};
+    if (self->of.square.on_q) {
+        self->sum[SUM_FLUX] += v.beta < 0 ? -w.beta : w.beta;
+        self->sum[SUM_CURRENT] += v.beta < 0 ? -di.beta : di.beta;
+        const pm_q_t x = pm_mul(mean.beta, di.beta);
+        self->sum[SUM_D_FLUX] += (int64_t)w.alpha * x / FINE;
+        self->sum[SUM_D_CURRENT] += (int64_t)di.alpha * x / FINE;
+        self->sum[SUM_SQUARE] += (int64_t)x * x / FINE;
+    } else {
+        self->sum[SUM_FLUX] += v.alpha < 0 ? -w.alpha : w.alpha;
+        self->sum[SUM_CURRENT] += v.alpha < 0 ? -di.alpha : di.alpha;
+    }
+}
+
+/* With negative i_d the rotor stands on its edge: it must not be long. */
+static uint32_t settling(const square_t *square)
+{
+    return square->bias != 0 ? 1U : SETTLE_CYCLES;
+}
+
+/* A whole wave has ended. */
+static void judge(drive_t *drive, square_t *square)
+{
+    const uint32_t cycles = square->bias != 0 ? BIASED_CYCLES : CYCLES;
+    if (square->found) {
+        square->cycles++;
+        square->done = square->cycles >= settling(square) + cycles;
+    } else if (square->peak >= square->wanted) {
+        square->found = true;
+        commissioning_clear_sums(&drive->identify.work);
+    } else {
+        square->voltage += square->voltage / 8;
+        if (square->voltage > pm_mul(drive->status.v_dc, PM_Q(0.4))) {
+            square->voltage /= 2;
+            square->half = (uint16_t)(2U * square->half);
+            square->failed = square->half > SQUARE_LONGEST;
+        }
+    }
+    square->peak = 0;
+}
+
+void square_step(drive_t *drive, pm_ab_t v_past)
+{
+    commissioning_t *self = &drive->identify.work;
+    square_t *square = &self->of.square;
+    const pm_q_t i = pm_abs(square->on_q ? drive->i_ab.beta : drive->i_ab.alpha);
+    if (!square->begun) { /* what flowed before goes first */
+        square->begun = i < square->wanted / 8;
+        return;
+    }
+    square->peak = pm_max(square->peak, i);
+    if (square->found && square->cycles >= settling(square) && !square->done) {
+        take(drive, v_past);
+    }
+    if (square->count >= square->half) {
+        /* The first waves are such that the rotor has no speed when the current is at its peaks: then its
+         * mean speed is zero, too. */
+        square->count = square->leading ? (uint16_t)((uint32_t)square->half * 146U / 1000U) : 0U;
+        square->up = !square->up;
+        const bool judged = square->up && !square->leading;
+        square->leading = false;
+        if (judged && !square->done) {
+            judge(drive, square);
+        }
+    }
+    square->count++;
+    const bool quiet = square->done || square->failed;
+    const pm_q_t v = quiet ? 0 : square->voltage;
+    pm_q_t *axis = square->on_q ? &self->v.beta : &self->v.alpha;
+    *axis = square->up ? v : -v;
+}

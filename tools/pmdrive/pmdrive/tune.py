@@ -1,0 +1,64 @@
+"""Controllers, position loop and start from what is known of the machine.
+
+The rules are those by which the machine files of sim_plant/machines were set by hand; docs/identify.md says why.
+"""
+import math
+
+from .errors import UsageError
+
+BOARD = ("f_pwm", "i_full_scale", "i_noise")
+MACHINE = ("pole_pairs", "i_rated", "i_max", "speed_max", "v_dc_nominal", "R_s", "L_d", "L_q", "L_q_rated", "psi_m", "J")
+SALIENT = 0.05  # the drive's own limit for injection
+STEPS = 4096    # of the converter
+
+
+def _injection(x):
+    """Its answer 45 degrees off is seven steps of the converter, as far as the link leaves room: then whether it may lead."""
+    step, dL = 2 * x["i_full_scale"] / STEPS, x["L_q"] - x["L_d"]
+    top = 0.57 * x["v_dc_nominal"] / math.sqrt(3)
+    if dL <= SALIENT * x["L_q"]:
+        return 0.2 * top, False
+    v = 7 * step * 2 * x["L_d"] * x["L_q"] * x["f_pwm"] / dL
+    answer = min(v, top) * dL / (2 * x["L_d"] * x["L_q"] * x["f_pwm"])
+    return min(v, top), answer > max(4 * x["i_noise"], 2 * step)
+
+
+def values(x, bandwidth=None):
+    """{name: SI value} from {name: SI value} of BOARD and MACHINE. Bandwidth of the current control in Hz."""
+    highest = x["f_pwm"] / 10
+    if bandwidth is not None and not 10 <= bandwidth <= highest:
+        raise UsageError(f"{bandwidth:g} Hz is no bandwidth for the current", f"10 to {highest:g} Hz, a tenth of f_pwm")
+    rated_speed = 0.8 * x["speed_max"]
+    torque = 1.5 * x["pole_pairs"] * x["psi_m"] * x["i_rated"]
+    jerk = torque / x["J"]  # rad/s2 at rated torque
+    v_injection, leads = _injection(x)
+    position_Hz = min(max(math.sqrt(0.8 * jerk * x["pole_pairs"]) / (2 * math.pi), 25.0), 60.0)
+    lag = 0.12 * (2 * math.pi * position_Hz) ** 2 / x["pole_pairs"]  # acceleration for 0.12 rad behind
+    low, high = (0.18, 0.34) if leads else (0.05, 0.10)
+    return {
+        "current_bandwidth": bandwidth or min(x["f_pwm"] / 20, 1500.0),
+        "speed_bandwidth": min(max(6 * jerk / rated_speed / (2 * math.pi), 2.0), 10.0),
+        "acceleration": min(0.3 * jerk, lag),
+        "flux_bandwidth": position_Hz,
+        "flux_gain": 0.5 if x["L_q_rated"] < 0.985 * x["L_q"] else 1.0,
+        "speed_low": low * rated_speed,
+        "speed_high": high * rated_speed,
+        "i_d_light": 0.05 * x["i_rated"],
+        "i_fw_max": 0.5 * x["i_rated"],
+        "comp_zone": 12 * 2 * x["i_full_scale"] / STEPS,
+        "v_injection": v_injection,
+        "i_pulse": x["i_rated"],
+        "start_method": 0 if leads else 2,
+        "i_open_loop": 0.5 * x["i_rated"],
+        "t_align": 0.5,
+        "open_loop_acceleration": min(0.05 * jerk, high * rated_speed / 0.6),
+    }
+
+
+def changes(drive, bandwidth=None):
+    """{entry: integer} for Drive.load()."""
+    from .identify import raw_values
+
+    known = {name: float(drive.get(name)) for name in BOARD + MACHINE}
+    return raw_values(values(known, bandwidth))
+

@@ -1,0 +1,178 @@
+// What the drive has identified against the plant's own data.
+#include "tools/pmsim/metrics_special.h"
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "tools/pmsim/names.h"
+
+namespace pmsim
+{
+namespace
+{
+
+// The energy form at a pair of currents: flux linkages by Newton, and their tangent.
+class Point
+{
+  public:
+    Point(const plant_machine_t &m, double i_d_A, double i_q_A) : m_(m)
+    {
+        const double i_f_A = m.psi_m_Wb / m.L_d0_H + m.c_A_Wb5 * std::pow(m.psi_m_Wb, 5);
+        psi_d_ = m.psi_m_Wb + m.L_d0_H * i_d_A;
+        psi_q_ = m.L_q0_H * i_q_A;
+        for (int n = 0; n < 50; ++n) {
+            const double s = psi_d_ * psi_d_ + psi_q_ * psi_q_;
+            const double e_d = i_d_A + i_f_A - psi_d_ / m.L_d0_H - m.c_A_Wb5 * psi_d_ * s * s;
+            const double e_q = i_q_A - psi_q_ / m.L_q0_H - m.c_A_Wb5 * psi_q_ * s * s;
+            tangent(s);
+            const double D = dd_ * qq_ - dq_ * dq_;
+            psi_d_ += (qq_ * e_d - dq_ * e_q) / D;
+            psi_q_ += (dd_ * e_q - dq_ * e_d) / D;
+        }
+        tangent(psi_d_ * psi_d_ + psi_q_ * psi_q_);
+    }
+
+    double psi_q() const
+    {
+        return psi_q_;
+    }
+
+    double L_dh() const
+    {
+        return qq_ / (dd_ * qq_ - dq_ * dq_);
+    }
+
+    double L_qh() const
+    {
+        return dd_ / (dd_ * qq_ - dq_ * dq_);
+    }
+
+    double L_dqh() const
+    {
+        return -dq_ / (dd_ * qq_ - dq_ * dq_);
+    }
+
+  private:
+    void tangent(double s)
+    {
+        const double k = 4 * m_.c_A_Wb5 * s;
+        dd_ = 1 / m_.L_d0_H + m_.c_A_Wb5 * s * s + k * psi_d_ * psi_d_;
+        qq_ = 1 / m_.L_q0_H + m_.c_A_Wb5 * s * s + k * psi_q_ * psi_q_;
+        dq_ = k * psi_d_ * psi_q_;
+    }
+
+    plant_machine_t m_;
+    double psi_d_, psi_q_, dd_ = 0, qq_ = 0, dq_ = 0;
+};
+
+// At rated current and the i_d of most torque per ampere by the inductances at zero current.
+Point rated_point(const Setup &setup)
+{
+    const plant_machine_t &m = setup.plant.machine;
+    const Point zero(m, 0, 0);
+    const double i_A = setup.rated.i_rated_A;
+    const double dL_H = zero.L_qh() - zero.L_dh();
+    const double h_A = dL_H > 0.05 * zero.L_qh() ? m.psi_m_Wb / (2 * dL_H) : 0;
+    return {m, h_A > 0 ? h_A - std::hypot(h_A, i_A) : 0, i_A};
+}
+
+class Identified : public Metric
+{
+  public:
+    Identified(const Expectation &e, const Setup &setup) : kind_(e.metric), setup_(setup)
+    {
+    }
+
+    void add(const Sample &s) override
+    {
+        last_ = s.rig.identified;
+    }
+
+    MetricValue value() const override
+    {
+        if (kind_ == "identify_state") {
+            return {double(last_.state), name_of(identify_state_names(), last_.state)};
+        }
+        if (kind_ == "identify_reason") {
+            return {double(last_.reason), name_of(identify_reason_names(), last_.reason)};
+        }
+        return {error(), ""};
+    }
+
+  private:
+    static double relative(double found, double truth)
+    {
+        return found == 0 ? std::numeric_limits<double>::quiet_NaN() : found / truth - 1;
+    }
+
+    double error() const
+    {
+        const plant_machine_t &m = setup_.plant.machine;
+        const plant_inverter_t &inverter = setup_.plant.inverter;
+        const Point zero(m, 0, 0);
+        if (kind_ == "identify_R_s_error_rel") {
+            return relative(last_.R_s_ohm, m.R_s_ohm + inverter.r_on_ohm);
+        }
+        if (kind_ == "identify_L_d_error_rel") {
+            return relative(last_.L_d_H, zero.L_dh());
+        }
+        if (kind_ == "identify_L_q_error_rel") {
+            return relative(last_.L_q_H, zero.L_qh());
+        }
+        if (kind_ == "identify_L_q_rated_error_rel") {
+            return relative(last_.L_q_rated_H, rated_point(setup_).psi_q() / setup_.rated.i_rated_A);
+        }
+        if (kind_ == "identify_L_dq_error_rel") { // of L_q
+            return (last_.L_dq_rated_H - rated_point(setup_).L_dqh()) / zero.L_qh();
+        }
+        if (kind_ == "identify_psi_m_error_rel") {
+            return relative(last_.psi_m_Wb, m.psi_m_Wb);
+        }
+        if (kind_ == "identify_J_error_rel") {
+            return relative(last_.J_kgm2, setup_.plant.mech.J_kgm2);
+        }
+        if (kind_ == "identify_lost_error_rel") {
+            const double gap = inverter.dead_time_s * inverter.f_pwm_Hz;
+            const double lost_V = gap * setup_.plant.dclink.v_source_V + inverter.v_switch_V * (1 - 2 * gap) +
+                                  inverter.v_diode_V * 2 * gap;
+            return relative(last_.lost_V, lost_V);
+        }
+        const double speed_rad_s = setup_.rated.speed_rated_rad_s; // friction at rated speed, of rated torque
+        const double truth_Nm = setup_.plant.mech.B_Nms * speed_rad_s + setup_.plant.mech.T_coulomb_Nm;
+        const double found_Nm = last_.viscous_Nms * speed_rad_s + last_.coulomb_Nm;
+        return (found_Nm - truth_Nm) / setup_.rated.torque_rated_Nm;
+    }
+
+    std::string kind_;
+    const Setup &setup_;
+    rig_identified_t last_{};
+};
+
+SpecialMetric number(const std::string &name, const std::string &help)
+{
+    return {{name, "1", help, false, false, {}}, make_special<Identified>};
+}
+
+} // namespace
+
+std::vector<SpecialMetric> identify_metrics()
+{
+    return {
+        {{"identify_state", "", "of the identification", true, false, identify_state_names()},
+         make_special<Identified>},
+        {{"identify_reason", "", "why the identification failed", true, false, identify_reason_names()},
+         make_special<Identified>},
+        number("identify_R_s_error_rel", "resistance found against winding and switch"),
+        number("identify_lost_error_rel", "voltage that a leg loses, found against dead time and drops"),
+        number("identify_L_d_error_rel", "L_d at zero current, found against the plant's"),
+        number("identify_L_q_error_rel", "L_q at zero current, found against the plant's"),
+        number("identify_L_q_rated_error_rel", "psi_q / i_q at rated current, found against the plant's"),
+        number("identify_L_dq_error_rel", "error of the cross inductance at rated current, of L_q"),
+        number("identify_psi_m_error_rel", "magnet flux found against the plant's"),
+        number("identify_J_error_rel", "inertia found against the plant's"),
+        number("identify_friction_error_rel", "error of the friction at rated speed, of rated torque"),
+    };
+}
+
+} // namespace pmsim
