@@ -11,25 +11,34 @@ void loop_slow(loop_t *self, const loop_config_t *config, pm_q_t weight)
 {
     self->direct = weight == PM_ONE;
     self->k_acceleration = pm_mul(config->k_acceleration, weight);
-    if (weight == 0) {
-        self->acceleration = 0;
+    if (weight == 0 || (config->id == LOOP_ARCTANGENT && !self->direct)) {
+        self->inner = 0;
     }
 }
 
-static pm_q_t arctangent(const loop_config_t *config, pm_pll_t *pll, pm_q_t eps)
+/* The PLL follows theta, from which it is inner away. */
+static void arctangent(loop_t *self, pm_pll_t *pll, const pm_pll_config_t *gains, pm_q_t eps)
 {
-    pll->theta += (pm_angle_t)pm_rad_to_angle(eps);
-    pll->omega = pm_sat(pll->omega + pm_shl(pm_mulh(eps, config->k_omega), 2), PM_Q_BITS + 1);
-    return 0;
+    const pm_angle_t turn = (pm_angle_t)pm_rad_to_angle(eps);
+    pm_pll_t inner = {.theta = (pm_angle_t)self->inner - turn, .omega = pll->omega};
+    pm_pll_correct(&inner, gains, pm_angle_to_rad(pm_angle_diff(0, inner.theta)));
+    pll->theta += turn;
+    pll->omega = inner.omega;
+    self->inner = (int32_t)inner.theta;
 }
 
-pm_q_t loop_correct_other(loop_t *self, const loop_config_t *config, pm_pll_t *pll, pm_q_t eps)
+pm_q_t loop_correct_other(loop_t *self, const loop_config_t *config, pm_pll_t *pll,
+                          const pm_pll_config_t *gains, pm_q_t eps)
 {
     if (config->id == LOOP_ARCTANGENT) {
-        return self->direct ? arctangent(config, pll, eps) : eps;
+        if (!self->direct) {
+            return eps;
+        }
+        arctangent(self, pll, gains, eps);
+        return 0;
     }
     const int32_t change = pm_shl(pm_sat(pm_mulh(eps, self->k_acceleration), 26), 4);
-    self->acceleration = pm_add_sat(self->acceleration, change);
-    pll->omega = pm_mulh_add(pll->omega, self->acceleration, TO_Q28);
+    self->inner = pm_add_sat(self->inner, change);
+    pll->omega = pm_mulh_add(pll->omega, self->inner, TO_Q28);
     return eps;
 }

@@ -28,6 +28,8 @@ void mras_current_tie(mras_current_t *self, const mras_current_config_t *config)
 {
     (void)config;
     self->adapt = 0;
+    self->inverse = 0; /* an imposed position says nothing of an error */
+    self->inverse_model = 0;
 }
 
 void mras_current_reset(mras_current_t *self, const mras_current_config_t *config, const obs_in_t *in)
@@ -35,7 +37,7 @@ void mras_current_reset(mras_current_t *self, const mras_current_config_t *confi
     *self = (mras_current_t){.i = in->i, .omega_f = in->omega};
     self->emf = pm_mul(in->omega, observer_active_flux(&config->model, in->i_dq.d));
     set_operating_point(self, config, in);
-    mras_current_tie(self, config);
+    self->adapt = 0;
 }
 
 static inline void describe(const mras_current_t *self, pm_dq_t change, obs_out_t *out)
@@ -89,6 +91,6 @@ void mras_current_slow(mras_current_t *self, const mras_current_config_t *config
     }
     set_operating_point(self, config, in);
     if (weight == 0) {
-        mras_current_tie(self, config);
+        self->adapt = 0;
     }
 }

@@ -24,8 +24,11 @@ static void set_operating_point(mras_simple_t *self, const mras_simple_config_t 
 
 void mras_simple_tie(mras_simple_t *self, const mras_simple_config_t *config)
 {
-    (void)self;
     (void)config;
+    self->inverse = 0; /* an imposed position says nothing of an error */
+    self->offset = 0;
+    self->resistive = 0;
+    self->reactive = 0;
 }
 
 /* The period before is taken for one of the steady state. */

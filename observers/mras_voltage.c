@@ -24,13 +24,15 @@ void mras_voltage_tie(mras_voltage_t *self, const mras_voltage_config_t *config)
 {
     (void)config;
     self->adapt = 0;
+    self->inverse = 0; /* an imposed position says nothing of an error */
+    self->inverse_omega = 0;
 }
 
 void mras_voltage_reset(mras_voltage_t *self, const mras_voltage_config_t *config, const obs_in_t *in)
 {
     *self = (mras_voltage_t){.i = in->i, .omega = in->omega, .omega_f = in->omega};
     set_operating_point(self, config, in);
-    mras_voltage_tie(self, config);
+    self->adapt = 0;
 }
 
 static inline void describe(const mras_voltage_t *self, pm_dq_t difference, obs_out_t *out)
@@ -81,6 +83,6 @@ void mras_voltage_slow(mras_voltage_t *self, const mras_voltage_config_t *config
     }
     set_operating_point(self, config, in);
     if (weight == 0) {
-        mras_voltage_tie(self, config);
+        self->adapt = 0;
     }
 }

@@ -39,11 +39,6 @@ static void make_loop(maker_t *m, position_config_t *c)
     c->loop = (loop_config_t){.id = (loop_id_t)m->params->position_observer};
     if (c->loop.id == LOOP_SIMPLIFIED_EKF) {
         c->pll_high = make_ekf(m, &c->loop.k_acceleration);
-    } else if (c->loop.id == LOOP_ARCTANGENT) {
-        const pm_num_t corner = pm_num_div(angular(m, DRIVE_PARAM_flux_bandwidth), m->base.omega);
-        c->loop.k_omega = gain(m, corner, 30, DRIVE_PARAM_flux_bandwidth);
-    } else {
-        /* the loop alone */
     }
 }
 

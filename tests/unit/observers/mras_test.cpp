@@ -472,6 +472,28 @@ TYPED_TEST(MrasWithModel, LedAlongItLearnsNothing)
     EXPECT_EQ(adapted(state), before);
 }
 
+// Led along in an open-loop start, a rotor that swings beside the imposed position is no lost position.
+TYPED_TEST(Mras, LedAlongItClaimsNoError)
+{
+    const Fixture f = ipm();
+    Rotation rotation(f.machine, f.base, 0.5, {0, 2});
+    obs_in_t in = rotation.seen(0, rotation.omega_rad_s);
+    typename TypeParam::State state;
+    TypeParam::reset(&state, &f.config, &in);
+    obs_out_t out = {};
+    for (int k = 0; k < 20; ++k) {
+        TypeParam::tie(&state, &f.config);
+        rotation.advance();
+        in = rotation.seen(rotation.theta_rad - 1.0, 0.8 * rotation.omega_rad_s);
+        TypeParam::step(&state, &f.config, &in, &out);
+        EXPECT_EQ(out.eps, 0);
+        EXPECT_EQ(out.misfit, 0);
+    }
+    TypeParam::slow(&state, &f.config, &in, &out, PM_ONE);
+    TypeParam::step(&state, &f.config, &in, &out);
+    EXPECT_GT(real(out.eps), 0.1); // it has seen it all the time
+}
+
 // (L_q - L_d) i_q / psi_a is 2.2 rad at 16 A: a lag of less runs away, a longer one does not (mras.h).
 TYPED_TEST(MrasWithModel, TheLagOfTheSpeedKeepsItStable)
 {
