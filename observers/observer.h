@@ -23,6 +23,7 @@
 #include "observers/back_emf.h"
 #include "observers/extended_emf.h"
 #include "observers/extended_emf_ab.h"
+#include "observers/flux_linkage.h"
 #include "observers/mras_current.h"
 #include "observers/mras_simple.h"
 #include "observers/mras_voltage.h"

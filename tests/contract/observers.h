@@ -38,6 +38,12 @@ inline void configure(emf_config_t &c, const Machine &m, const Base &b)
     c = emf_config(m, b);
 }
 
+inline void configure(flux_linkage_config_t &c, const Machine &m, const Base &b)
+{
+    c.flux = flux_config(m, b);
+    c.g = PM_Q(0.5);
+}
+
 // The three of observers/mras.h have one configuration.
 inline void configure(mras_config_t &c, const Machine &m, const Base &b)
 {
