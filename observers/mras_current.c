@@ -18,7 +18,7 @@ static void set_operating_point(mras_current_t *self, const mras_current_config_
         pm_shl(pm_sat(pm_mul_sat(b, mras_cross(config, self->omega_f, in->i_dq.q)), PM_Q_BITS + 2), 1);
     self->half = mras_half_turn(config, in->omega);
     self->emf_per_change = pm_div(PM_ONE / 16, b); /* Q28 of a sixteenth is Q24 */
-    self->adapt = pm_shl(pm_sat(pm_mulh(self->emf_per_change, config->k), 27), 4);
+    self->adapt = pm_shl(pm_sat(pm_mulh(self->emf_per_change, config->k), 26), 4); /* < 4 */
     self->emf_model = pm_mul(in->omega, observer_active_flux(m, in->i_dq.d));
     self->inverse_model = mras_inverse(config, self->emf_model);
     self->inverse = mras_inverse(config, self->emf);
