@@ -11,9 +11,11 @@ void loop_slow(loop_t *self, const loop_config_t *config, pm_q_t weight)
 {
     self->direct = weight == PM_ONE;
     self->k_acceleration = pm_mul(config->k_acceleration, weight);
-    if (weight == 0 || (config->id == LOOP_ARCTANGENT && !self->direct)) {
+    const bool changed = self->id != (uint8_t)config->id;
+    if (changed || weight == 0 || (config->id == LOOP_ARCTANGENT && !self->direct)) {
         self->inner = 0;
     }
+    self->id = (uint8_t)config->id;
 }
 
 /* The PLL follows theta, from which it is inner away. */

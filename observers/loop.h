@@ -9,6 +9,8 @@
  * and all of the noise, rms = noise / |e|. Its speed serves prediction and control, and is as quiet as the
  * PLL's: a first-order filter of the difference would answer 0.1 rad of noise with 0.1 w_n.
  * Behind an EMF at low speed its noise shakes the current control; behind a flux it holds everywhere.
+ * Harmonics of EMF and current (3.3, rows 24 and 25) come at 6 k times the angle: the arctangent shows them
+ * whole, the others attenuate them beyond w_n.
  *
  * Simplified EKF: the constant gains that a Kalman filter with white jerk ends with, all poles at r:
  *   K_1 = r^3 T^2, K_2 = 2 r^2 T, K_3 = 2 r T
@@ -35,6 +37,7 @@ typedef struct {
     int32_t inner;          /* W, Q36 per period; arctangent: the PLL before theta, turns of 2^32 */
     int32_t k_acceleration; /* with the share, Q36 */
     bool direct;            /* the arctangent leads */
+    uint8_t id;             /* whose inner it is */
 } loop_t;
 
 void loop_reset(loop_t *self);

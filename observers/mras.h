@@ -11,6 +11,8 @@
  * The error signal is divided by E as E / max(|E|, emf_min)^2: its sign is right in both directions and it
  * fades to nothing at standstill, where nothing is to be seen. The quotient is renewed at 1 kHz.
  *
+ * Wrong parameters (3.5.1, row 28), d = machine minus model: the angle errs by
+ *   asin[(dR i_d - omega dL_q i_q) / (omega psi_a)] to first order; L_d and psi_m move none.
  * R is the one given: what a square-wave carrier and p i_q leave on the q-axis at low speed would pass for
  * more than the resistance itself.
  *

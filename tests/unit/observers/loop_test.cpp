@@ -299,6 +299,34 @@ TEST(Loop, TheOthersShareIsThePlls)
     }
 }
 
+// By parameter on a running drive: what one kept means nothing to the other.
+TEST(Loop, ChangedWithoutAJump)
+{
+    for (const loop_id_t to : {LOOP_PLL, LOOP_SIMPLIFIED_EKF}) {
+        Loop loop(LOOP_ARCTANGENT, 157);
+        double theta = 0;
+        const auto run = [&](int periods, double disturbance) {
+            double worst = 0;
+            for (int k = 0; k < periods; ++k) {
+                theta += 0.3 * kBase_rad_s * kPeriod_s;
+                loop.predict();
+                worst = std::max(worst, std::abs(bench::wrapped(theta - loop.theta())));
+                loop.correct(std::sin(theta - loop.theta() + disturbance));
+            }
+            return worst;
+        };
+        loop.pll.omega = fixed(0.3, 28);
+        run(1000, 0);
+        run(10, 0.2); // the PLL within hangs behind
+        const Loop other(to, 157);
+        loop.config = other.config;
+        loop.gains = other.gains;
+        loop_slow(&loop.loop, &loop.config, PM_ONE);
+        EXPECT_LT(run(3000, 0), 0.25) << to;
+        EXPECT_LT(run(100, 0), 1e-3) << to;
+    }
+}
+
 TEST(Loop, LargestErrorsSaturate)
 {
     for (const double eps : {1.0, -1.0}) {
