@@ -17,7 +17,8 @@
  * No error under a constant acceleration. Noise bandwidth 5/3 r against (4 zeta^2 + 1) / (4 zeta) w_n of the
  * PLL: equal for r = 0.707 w_n at zeta = 0.9.
  *
- * loop_correct() takes the place of pm_pll_correct(); the PLL costs two instructions more than alone. While
+ * loop_correct() takes the place of pm_pll_correct(); the PLL costs two instructions more than alone,
+ * the others a call and 18 (simplified EKF) or 28. While
  * another source has a share, the arctangent is the PLL of the given gains; K_1 grows with the share.
  * Range: |W| < 1/32 per period. Tests: tests/unit/observers/loop_test.cpp,
  * tests/scenario/position_observers.yaml. */
