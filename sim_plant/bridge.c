@@ -11,6 +11,44 @@
 #define ZONE          (1.0 / 2000.0)
 #define R_THROUGH_OHM 1e-3 /* least resistance of a switch that shorts the link */
 
+/* Bytes of bridge_t.kinds */
+enum { UPPER, BY_HIGH_DIODE, BY_LOW_DIODE, SWINGS, FLOATS, SHORTS, GIVEN };
+#define KIND(byte) ((uint64_t)1 << (8 * (byte)))
+
+/* What each kind of leg is */
+typedef struct {
+    uint64_t kinds; /* of leg 0 */
+    double upper;
+    double switched;
+} facts_t;
+
+static const facts_t facts[] = {
+    [LEG_FLOATING] = {.kinds = KIND(FLOATS)},
+    [LEG_SWINGING] = {.kinds = KIND(SWINGS)},
+    [LEG_LOW] = {.switched = 1.0},
+    [LEG_HIGH] = {.kinds = KIND(UPPER), .switched = 1.0, .upper = 1.0},
+    [LEG_BOTH] = {.kinds = KIND(SHORTS), .upper = 0.5},
+    [LEG_DIODE_LOW] = {.kinds = KIND(BY_LOW_DIODE)},
+    [LEG_DIODE_HIGH] = {.kinds = KIND(UPPER) | KIND(BY_HIGH_DIODE), .upper = 1.0},
+    [LEG_SOURCE] = {.kinds = KIND(GIVEN)},
+};
+
+static unsigned legs_of(const bridge_t *b, int kind)
+{
+    return (unsigned)(b->kinds >> (8 * kind)) & 63u;
+}
+
+static void count(bridge_t *b)
+{
+    b->kinds = 0u;
+    for (int k = 0; k < b->legs; k++) {
+        const facts_t *is = &facts[b->leg[k]];
+        b->kinds |= is->kinds << k;
+        b->inv_zone_1_A[k] = is->switched * b->switched_1_A;
+        b->upper[k] = is->upper;
+    }
+}
+
 void bridge_init(bridge_t *bridge, const plant_config_t *config, int legs)
 {
     *bridge = (bridge_t){
@@ -20,56 +58,39 @@ void bridge_init(bridge_t *bridge, const plant_config_t *config, int legs)
         .c_leg_F = config->inverter.c_leg_F,
         .inv_c_leg_1_F = config->inverter.c_leg_F > 0.0 ? 1.0 / config->inverter.c_leg_F : 0.0,
         .zone_A = ZONE * config->sensor.i_full_scale_A,
+        .no_current_A = NO_CURRENT * config->sensor.i_full_scale_A,
         .switched_1_A = 1.0 / (ZONE * config->sensor.i_full_scale_A),
         .legs = legs,
     };
     for (int k = 0; k < legs; k++) {
         bridge->leg[k] = bridge->c_leg_F > 0.0 ? LEG_SWINGING : LEG_FLOATING;
     }
+    count(bridge);
 }
 
-/* What each kind of leg is */
-typedef struct {
-    unsigned counts; /* 4 bits each: floating, swinging, diode, both, source */
-    unsigned masks;  /* a byte each: tied to the upper rail; by a diode to it, and to the lower one; swings */
-    double upper;
-    double switched;
-} facts_t;
+/* Voltages that the legs have whatever the currents, by coordinate; only where all are tied or swing. Those
+ * of a machine whose phases are alike, who alone asks for them. */
+enum { OF_THREE = 2, OF_SIX = 4 };
 
-static const facts_t facts[] = {
-    [LEG_FLOATING] = {.counts = 0x1},
-    [LEG_SWINGING] = {.counts = 0x10, .masks = 0x1000000},
-    [LEG_LOW] = {.switched = 1.0},
-    [LEG_HIGH] = {.switched = 1.0, .masks = 0x1, .upper = 1.0},
-    [LEG_BOTH] = {.counts = 0x1000, .upper = 0.5},
-    [LEG_DIODE_LOW] = {.counts = 0x100, .masks = 0x10000},
-    [LEG_DIODE_HIGH] = {.counts = 0x100, .masks = 0x101, .upper = 1.0},
-    [LEG_SOURCE] = {.counts = 0x10000},
-};
-
-/* Voltages that the legs have whatever the currents, by coordinate; only where all are tied or swing. Of a
- * single star the other side adds nothing. */
-static void sum_rails(bridge_t *b, const winding_t *w)
+static void sum_three(bridge_t *b, const winding_t *w, unsigned upper, unsigned high, unsigned low)
 {
-    const double *upper = w->side[0][b->masks[0] & 7u];
-    const double *other = w->side[1][b->masks[1] & 7u];
-    double rail[ACTIVE];
-    for (int a = 0; a < ACTIVE; a++) {
-        rail[a] = upper[a] + other[a];
+    for (int a = 0; a < OF_THREE; a++) {
+        b->rail[a] = w->side[0][upper][a];
+        b->diode_V[a] = b->v_diode_V * (w->side[0][high][a] - w->side[0][low][a]);
+    }
+}
+
+static void sum_six(bridge_t *b, const winding_t *w, unsigned upper, unsigned high, unsigned low)
+{
+    const double *upper_1[] = {w->side[0][upper & 7u], w->side[1][upper >> 3]};
+    const double *high_1[] = {w->side[0][high & 7u], w->side[1][high >> 3]};
+    const double *low_1[] = {w->side[0][low & 7u], w->side[1][low >> 3]};
+    double rail[OF_SIX], diode_V[OF_SIX];
+    for (int a = 0; a < OF_SIX; a++) {
+        rail[a] = upper_1[0][a] + upper_1[1][a];
+        diode_V[a] = b->v_diode_V * (high_1[0][a] - low_1[0][a] + (high_1[1][a] - low_1[1][a]));
     }
     memcpy(b->rail, rail, sizeof rail);
-}
-
-static void sum_diodes(bridge_t *b, const winding_t *w)
-{
-    double diode_V[ACTIVE] = {0.0};
-    for (int side = 0; side < b->legs / 3; side++) {
-        const double *high = w->side[side][b->masks[side] >> 8 & 7u];
-        const double *low = w->side[side][b->masks[side] >> 16 & 7u];
-        for (int a = 0; a < ACTIVE; a++) {
-            diode_V[a] += b->v_diode_V * (high[a] - low[a]);
-        }
-    }
     memcpy(b->diode_V, diode_V, sizeof diode_V);
 }
 
@@ -83,31 +104,32 @@ static void sum_sources(bridge_t *b, const winding_t *w)
     }
 }
 
-void bridge_summarise(bridge_t *b, const winding_t *w)
+void bridge_put(bridge_t *b, int k, leg_t leg)
 {
-    unsigned counts = 0u, masks[PLANT_SETS] = {0u};
-    for (int side = 0; side < b->legs / 3; side++) {
-        for (int n = 0; n < 3; n++) {
-            const facts_t *is = &facts[b->leg[3 * side + n]];
-            counts += is->counts;
-            masks[side] |= is->masks << n;
-            b->inv_zone_1_A[3 * side + n] = is->switched * b->switched_1_A;
-            b->upper[3 * side + n] = is->upper;
-        }
+    const facts_t *was = &facts[b->leg[k]], *is = &facts[leg];
+    b->leg[k] = leg;
+    b->kinds ^= (was->kinds ^ is->kinds) << k;
+    b->inv_zone_1_A[k] = is->switched * b->switched_1_A;
+    b->upper[k] = is->upper;
+}
+
+void bridge_sum(bridge_t *b, const winding_t *w)
+{
+    unsigned upper = legs_of(b, UPPER), high = legs_of(b, BY_HIGH_DIODE), low = legs_of(b, BY_LOW_DIODE);
+    bool sources = legs_of(b, GIVEN) != 0u;
+    b->floating = legs_of(b, FLOATS);
+    b->swinging = legs_of(b, SWINGS);
+    b->diodes = high | low;
+    b->both = legs_of(b, SHORTS);
+    b->g_through_S = 0.0;
+    if (b->both != 0u) {
+        b->g_through_S = 0.5 * __builtin_popcount(b->both) / fmax(b->r_on_ohm, R_THROUGH_OHM);
     }
-    b->floating = (int)(counts & 15u);
-    b->swinging = (int)(counts >> 4 & 15u);
-    b->diodes = (int)(counts >> 8 & 15u);
-    b->both = (int)(counts >> 12 & 15u);
-    bool sources = counts >> 16 > 0u;
-    b->g_through_S = b->both > 0 ? 0.5 * b->both / fmax(b->r_on_ohm, R_THROUGH_OHM) : 0.0;
     b->r_series_ohm = sources ? 0.0 : (w->legs > w->phases ? 2.0 : 1.0) * b->r_on_ohm;
-    memcpy(b->masks, masks, sizeof masks);
-    b->diode_legs = ((masks[0] >> 8 | masks[0] >> 16) & 7u) | ((masks[1] >> 8 | masks[1] >> 16) & 7u) << 3;
-    b->swinging_legs = (masks[0] >> 24) | (masks[1] >> 24) << 3;
-    sum_rails(b, w);
-    if (b->v_diode_V != 0.0) {
-        sum_diodes(b, w);
+    if (w->legs == 3) {
+        sum_three(b, w, upper, high, low);
+    } else {
+        sum_six(b, w, upper, high, low);
     }
     if (sources || b->sources) {
         sum_sources(b, w);
@@ -115,14 +137,15 @@ void bridge_summarise(bridge_t *b, const winding_t *w)
     b->sources = sources;
 }
 
-static double no_current_A(const bridge_t *bridge)
+void bridge_summarise(bridge_t *b, const winding_t *w)
 {
-    return NO_CURRENT / ZONE * bridge->zone_A;
+    count(b);
+    bridge_sum(b, w);
 }
 
 leg_t bridge_released(const bridge_t *bridge, double i_A)
 {
-    if (fabs(i_A) <= no_current_A(bridge)) {
+    if (fabs(i_A) <= bridge->no_current_A) {
         return bridge->c_leg_F > 0.0 ? LEG_SWINGING : LEG_FLOATING;
     }
     return i_A > 0.0 ? LEG_DIODE_LOW : LEG_DIODE_HIGH;
@@ -144,12 +167,6 @@ leg_t bridge_commutated(const bridge_t *bridge, int k, gate_t gate, double i_A)
     bool same_rail =
         (leg == LEG_LOW && diode == LEG_DIODE_LOW) || (leg == LEG_HIGH && diode == LEG_DIODE_HIGH);
     return bridge->c_leg_F == 0.0 || same_rail ? diode : LEG_SWINGING;
-}
-
-double bridge_reverse(const bridge_t *bridge, int k, double i_A)
-{
-    double reverse_A = bridge->leg[k] == LEG_DIODE_LOW ? -i_A : i_A;
-    return reverse_A * ZONE * bridge->switched_1_A - NO_CURRENT;
 }
 
 double bridge_beyond_V(const bridge_t *bridge, double v_dc_V, double v_leg_V)

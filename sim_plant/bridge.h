@@ -1,4 +1,5 @@
-/* The legs: which rail each motor terminal is tied to, and through what (METHODS.md 0.2 E6, E7, E10).
+/* The legs: which rail each motor terminal is tied to, and through what (METHODS.md 0.2 E6, E7, E10; rows 57
+ * to 59).
  *
  * A leg is tied to a rail by a closed switch (either direction of current, drop v_switch against it), or by
  * a diode (one direction, drop v_diode); all paths have r_on in series. With neither it floats: without
@@ -33,20 +34,20 @@ typedef struct {
     double c_leg_F, inv_c_leg_1_F;
     double zone_A;
     double switched_1_A; /* 1 / zone_A */
+    double no_current_A; /* what counts as none */
     int legs;
     leg_t leg[PLANT_LEGS];
     bool off_wire[PLANT_LEGS];
     double v_source_V[PLANT_LEGS];
     /* what follows from leg[] */
-    int floating, swinging, diodes, both;
+    uint64_t kinds;                            /* a byte for each, of which bit k is leg k; see bridge.c */
+    unsigned floating, swinging, diodes, both; /* legs, bit k for leg k */
     bool sources;
-    unsigned diode_legs, swinging_legs; /* bit k for leg k */
-    unsigned masks[PLANT_SETS]; /* of three legs each: tied to the upper rail, and by diodes; see bridge.c */
-    double rail[ACTIVE];        /* by active coordinate: share of the upper rail, */
-    double source_V[ACTIVE];    /* of given sources */
-    double diode_V[ACTIVE];     /* and of diode drops, with their sign */
-    double r_series_ohm;        /* of every phase: r_on of its legs, or none with sources */
-    double upper[PLANT_LEGS];   /* 1: tied to the upper rail */
+    double rail[ACTIVE];             /* by active coordinate: share of the upper rail, */
+    double source_V[ACTIVE];         /* of given sources */
+    double diode_V[ACTIVE];          /* and of diode drops, with their sign */
+    double r_series_ohm;             /* of every phase: r_on of its legs, or none with sources */
+    double upper[PLANT_LEGS];        /* 1: tied to the upper rail */
     double inv_zone_1_A[PLANT_LEGS]; /* 0: no switch closed */
     double g_through_S;              /* of legs with both switches closed */
 } bridge_t;
@@ -56,14 +57,15 @@ void bridge_init(bridge_t *bridge, const plant_config_t *config, int legs);
 /* Brings up to date what follows from leg[]. */
 void bridge_summarise(bridge_t *bridge, const winding_t *winding);
 
+/* The same for those who change legs by bridge_put() alone: once after some of these. */
+void bridge_put(bridge_t *bridge, int k, leg_t leg);
+void bridge_sum(bridge_t *bridge, const winding_t *winding);
+
 /* Leg k after a change of its gate; i_A is its current. */
 leg_t bridge_commutated(const bridge_t *bridge, int k, gate_t gate, double i_A);
 
 /* A leg without gate anew after a jump of its current. */
 leg_t bridge_released(const bridge_t *bridge, double i_A);
-
-/* Reverse current of a diode leg beyond what counts as none, in units of full scale; above zero: it stops. */
-double bridge_reverse(const bridge_t *bridge, int k, double i_A);
 
 /* How far a terminal is beyond the nearer diode's threshold, V. */
 double bridge_beyond_V(const bridge_t *bridge, double v_dc_V, double v_leg_V);
@@ -85,6 +87,12 @@ static inline double bridge_switch_share(double x)
     x = x > 1.0 ? 1.0 : x;
     x = x < -1.0 ? -1.0 : x;
     return x * (1.5 - 0.5 * x * x);
+}
+
+/* Reverse current of a diode leg beyond what counts as none, A; above zero: it stops. */
+static inline double bridge_reverse_A(const bridge_t *bridge, int k, double i_A)
+{
+    return (bridge->leg[k] == LEG_DIODE_LOW ? -i_A : i_A) - bridge->no_current_A;
 }
 
 /* Voltage of a leg that is tied to something, against the negative rail. */

@@ -96,7 +96,7 @@ void circuit_wire(circuit_t *c, int leg, bool off)
 {
     double before_J = circuit_field_J(c);
     c->bridge.off_wire[leg] = off;
-    c->bridge.leg[leg] = LEG_FLOATING; /* back on: its gate or a diode takes it again */
+    bridge_put(&c->bridge, leg, LEG_FLOATING); /* back on: its gate or a diode takes it again */
     circuit_summarise(c);
     circuit_project(c);
     c->jump_device_J += before_J - circuit_field_J(c);

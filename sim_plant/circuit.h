@@ -98,9 +98,10 @@ void circuit_settle(circuit_t *circuit);
 
 /* The gates of the legs in the mask have changed. */
 void circuit_switch(circuit_t *circuit, const gates_t *gates, unsigned legs);
-/* Whether that change, within_s ahead, would not show: legs pass between a diode and the switch across it,
- * with the same drop, and their currents cannot come near zero until then. */
-bool circuit_ignores(const circuit_t *circuit, const gates_t *gates, unsigned legs, double within_s);
+/* The same within_s ahead of that change, if nothing shows it: legs pass between a diode and the switch
+ * across it, with the same drop, and their currents cannot come near zero until then. False: nothing was
+ * done. */
+bool circuit_switch_early(circuit_t *circuit, const gates_t *gates, unsigned legs, double within_s);
 void circuit_wire(circuit_t *circuit, int leg, bool off);
 void circuit_short(circuit_t *circuit, int leg_a, int leg_b, double R_ohm);
 void circuit_sources(circuit_t *circuit, const double v_leg_V[]);

@@ -25,6 +25,9 @@ typedef struct {
 
 void circuit_legs(const circuit_t *circuit, const point_t *point, circuit_legs_t *legs);
 
+/* Voltages of all terminals where some float, without what neutrals need beyond. */
+void circuit_terminals(const circuit_t *circuit, const point_t *point, double v_leg_V[PLANT_LEGS]);
+
 /* Currents, torque and rates of any machine, bridge, link and shaft; t_s since the start. */
 void circuit_general(const circuit_t *circuit, double t_s, point_t *point, double rate[ELEMENTS]);
 
@@ -75,8 +78,8 @@ static inline mechanics_motion_t circuit_motion(const circuit_t *c, const point_
 /* What steps_symmetrical() can do: every leg tied or swinging, and nothing that needs the time. */
 static inline bool circuit_symmetrical(const circuit_t *c)
 {
-    return c->machine.symmetrical && c->machine.winding.branch < 0 && c->bridge.floating == 0 &&
-           c->bridge.both == 0 && mechanics_plain(&c->mech) && dclink_plain(&c->link);
+    return c->machine.symmetrical && c->machine.winding.branch < 0 && c->bridge.floating == 0u &&
+           c->bridge.both == 0u && mechanics_plain(&c->mech) && dclink_plain(&c->link);
 }
 
 #endif

@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-#define SLOPE_MARGIN  4.0   /* of v_dc / L: EMF, saturation */
+#define SLOPE_MARGIN  4.0   /* of v_dc / L of a leg against the others: EMF, saturation */
 #define SMALL_CURRENT 1e-12 /* of the converter's full scale: nothing, for a floating leg */
 
 /* Leg k becomes another kind. What its capacitance holds more or less afterwards has come from the link if
@@ -12,11 +12,11 @@
 static void set_leg(circuit_t *c, int k, leg_t leg)
 {
     bridge_t *b = &c->bridge;
-    double before_V = circuit_output_V(c, k);
+    double before_V = b->c_leg_F > 0.0 ? circuit_output_V(c, k) : 0.0;
     if ((leg == LEG_LOW || leg == LEG_DIODE_LOW) && b->leg[k] != LEG_LOW && b->leg[k] != LEG_DIODE_LOW) {
         c->low_since_s[k] = c->t_s;
     }
-    b->leg[k] = leg;
+    bridge_put(b, k, leg);
     if (b->c_leg_F == 0.0) {
         return;
     }
@@ -24,7 +24,6 @@ static void set_leg(circuit_t *c, int k, leg_t leg)
         c->now.x[V_LEG(k)] = before_V;
         return;
     }
-    b->upper[k] = leg == LEG_HIGH || leg == LEG_DIODE_HIGH ? 1.0 : (leg == LEG_BOTH ? 0.5 : 0.0);
     double after_V = circuit_output_V(c, k);
     double charge_C = b->upper[k] == 1.0 ? b->c_leg_F * (after_V - before_V) : 0.0;
     double in_J = charge_C * c->now.x[V_DC];
@@ -39,9 +38,6 @@ static void drop_lone_diodes(circuit_t *c)
 {
     bridge_t *b = &c->bridge;
     const winding_t *w = &c->machine.winding;
-    if (b->diodes == 0 || b->floating == 0 || b->c_leg_F > 0.0 || w->branch >= 0) {
-        return;
-    }
     int size = w->legs > w->phases ? 2 : 3;
     int stride = w->legs > w->phases ? 3 : 1;
     for (int group = 0; group < w->legs / size; group++) {
@@ -56,16 +52,19 @@ static void drop_lone_diodes(circuit_t *c)
             high += leg == LEG_DIODE_HIGH;
         }
         for (int n = 0; n < size && (conducting == low || conducting == high); n++) {
-            b->leg[first + n * stride] = LEG_FLOATING;
+            bridge_put(b, first + n * stride, LEG_FLOATING);
         }
     }
-    bridge_summarise(b, w);
+    bridge_sum(b, w);
 }
 
 void circuit_summarise(circuit_t *c)
 {
-    bridge_summarise(&c->bridge, &c->machine.winding);
-    drop_lone_diodes(c);
+    const bridge_t *b = &c->bridge;
+    bridge_sum(&c->bridge, &c->machine.winding);
+    if (b->diodes != 0u && b->floating != 0u && b->c_leg_F == 0.0 && c->machine.winding.branch < 0) {
+        drop_lone_diodes(c);
+    }
 }
 
 void circuit_switch(circuit_t *c, const gates_t *gates, unsigned legs)
@@ -91,29 +90,44 @@ static bool high_side(leg_t leg)
     return leg == LEG_HIGH || leg == LEG_DIODE_HIGH;
 }
 
-bool circuit_ignores(const circuit_t *c, const gates_t *gates, unsigned legs, double within_s)
+/* Whether a gate leaves leg k at the rail that it is at, whatever its current. */
+static bool keeps_rail(gate_t gate, leg_t leg)
+{
+    return gate == GATE_OFF || (gate == GATE_LOW && low_side(leg)) || (gate == GATE_HIGH && high_side(leg));
+}
+
+bool circuit_switch_early(circuit_t *c, const gates_t *gates, unsigned legs, double within_s)
 {
     const bridge_t *b = &c->bridge;
-    if (b->v_diode_V != b->v_switch_V || b->floating > 0 || b->swinging > 0) {
+    leg_t to[PLANT_LEGS];
+    if (b->v_diode_V != b->v_switch_V || b->floating != 0u || b->swinging != 0u) {
         return false;
     }
-    double slope_A_s = SLOPE_MARGIN * c->machine.gamma_sum_1_H * fabs(c->now.x[V_DC]);
-    for (; legs != 0u; legs &= legs - 1u) {
-        int k = bridge_first(legs);
+    for (unsigned rest = legs; rest != 0u; rest &= rest - 1u) {
+        int k = bridge_first(rest);
+        gate_t gate = gates_conducting(gates, k);
+        if (!keeps_rail(gate, b->leg[k])) {
+            return false;
+        }
         double i_A = circuit_leg_A(c, &c->now, k);
-        leg_t leg = bridge_commutated(b, k, gates_conducting(gates, k), i_A);
-        bool same = (low_side(leg) && low_side(b->leg[k])) || (high_side(leg) && high_side(b->leg[k]));
-        if (!same || fabs(i_A) < 2.0 * b->zone_A + slope_A_s * within_s) {
+        double slope_A_s = SLOPE_MARGIN * c->machine.gamma_leg_1_H * fabs(c->now.x[V_DC]);
+        to[k] = bridge_commutated(b, k, gate, i_A);
+        if (low_side(to[k]) != low_side(b->leg[k]) || high_side(to[k]) != high_side(b->leg[k]) ||
+            fabs(i_A) < 2.0 * b->zone_A + slope_A_s * within_s) {
             return false;
         }
     }
+    for (; legs != 0u; legs &= legs - 1u) {
+        set_leg(c, bridge_first(legs), to[bridge_first(legs)]);
+    }
+    circuit_summarise(c);
     return true;
 }
 
 void circuit_sources(circuit_t *c, const double v_leg_V[])
 {
     for (int k = 0; k < c->bridge.legs; k++) {
-        c->bridge.leg[k] = LEG_SOURCE;
+        bridge_put(&c->bridge, k, LEG_SOURCE);
         c->bridge.v_source_V[k] = v_leg_V[k];
     }
     circuit_summarise(c);
@@ -131,9 +145,9 @@ void circuit_project(circuit_t *c)
 static void stop_diodes(circuit_t *c)
 {
     bool stopped = false;
-    for (unsigned legs = c->bridge.diode_legs; legs != 0u; legs &= legs - 1u) {
+    for (unsigned legs = c->bridge.diodes; legs != 0u; legs &= legs - 1u) {
         int k = bridge_first(legs);
-        if (bridge_reverse(&c->bridge, k, circuit_leg_A(c, &c->now, k)) > 0.0) {
+        if (bridge_reverse_A(&c->bridge, k, circuit_leg_A(c, &c->now, k)) > 0.0) {
             set_leg(c, k, c->bridge.c_leg_F > 0.0 ? LEG_SWINGING : LEG_FLOATING);
             stopped = true;
         }
@@ -147,7 +161,7 @@ static void stop_diodes(circuit_t *c)
 static void catch_swinging(circuit_t *c)
 {
     bool caught = false;
-    for (unsigned legs = c->bridge.swinging_legs; legs != 0u; legs &= legs - 1u) {
+    for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
         int k = bridge_first(legs);
         if (circuit_swing_excess(c, &c->now, k) > 0.0) {
             bool up = c->now.x[V_LEG(k)] > 0.5 * c->now.x[V_DC];
@@ -163,33 +177,33 @@ static void catch_swinging(circuit_t *c)
 /* The floating leg furthest beyond a diode's threshold starts to conduct; true when there was one. */
 static bool start_diode(circuit_t *c)
 {
-    circuit_nodes_t nodes;
-    circuit_nodes(c, &c->now, &nodes);
+    double v_leg_V[PLANT_LEGS];
+    circuit_terminals(c, &c->now, v_leg_V);
     int first = -1;
     double most_V = 0.0;
     for (int k = 0; k < c->bridge.legs; k++) {
         if (c->bridge.leg[k] == LEG_FLOATING && !c->bridge.off_wire[k]) {
-            double beyond_V = bridge_beyond_V(&c->bridge, c->now.x[V_DC], nodes.v_leg_V[k]);
+            double beyond_V = bridge_beyond_V(&c->bridge, c->now.x[V_DC], v_leg_V[k]);
             first = beyond_V > most_V ? k : first;
             most_V = fmax(beyond_V, most_V);
         }
     }
     if (first >= 0) {
-        set_leg(c, first, nodes.v_leg_V[first] > 0.5 * c->now.x[V_DC] ? LEG_DIODE_HIGH : LEG_DIODE_LOW);
-        bridge_summarise(&c->bridge, &c->machine.winding);
+        set_leg(c, first, v_leg_V[first] > 0.5 * c->now.x[V_DC] ? LEG_DIODE_HIGH : LEG_DIODE_LOW);
+        bridge_sum(&c->bridge, &c->machine.winding);
     }
     return first >= 0;
 }
 
 void circuit_settle_legs(circuit_t *c)
 {
-    if (c->bridge.diodes > 0) {
+    if (c->bridge.diodes != 0u) {
         stop_diodes(c);
     }
-    if (c->bridge.swinging > 0) {
+    if (c->bridge.swinging != 0u) {
         catch_swinging(c);
     }
-    if (c->bridge.floating > 0) {
+    if (c->bridge.floating != 0u) {
         circuit_project(c);
         for (int n = 0; n < PLANT_LEGS && start_diode(c); n++) {
         }

@@ -7,7 +7,7 @@
 static double swing_excess(const circuit_t *c, const point_t *p)
 {
     double excess = -1.0;
-    for (unsigned legs = c->bridge.swinging_legs; legs != 0u; legs &= legs - 1u) {
+    for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
         excess = larger(excess, circuit_swing_excess(c, p, bridge_first(legs)));
     }
     return excess;
@@ -17,11 +17,11 @@ static double floating_excess(const circuit_t *c, const point_t *p)
 {
     const bridge_t *b = &c->bridge;
     double worst = -1.0;
-    circuit_nodes_t nodes;
-    circuit_nodes(c, p, &nodes);
+    double v_leg_V[PLANT_LEGS];
+    circuit_terminals(c, p, v_leg_V);
     for (int k = 0; k < b->legs; k++) {
         if (b->leg[k] == LEG_FLOATING && !b->off_wire[k]) {
-            double beyond_V = bridge_beyond_V(b, p->x[V_DC], nodes.v_leg_V[k]);
+            double beyond_V = bridge_beyond_V(b, p->x[V_DC], v_leg_V[k]);
             worst = larger(worst, beyond_V / (fabs(p->x[V_DC]) + 1.0));
         }
     }
@@ -35,15 +35,18 @@ static double other_excess(const circuit_t *c, const point_t *p)
     if (!dclink_plain(&c->link)) {
         worst = larger(worst, dclink_excess(&c->link, p->x[V_DC]));
     }
-    if (c->mech.stuck || c->mech.slide != 0.0) {
+    if (c->mech.slide != 0.0) {
+        worst = larger(worst, mechanics_sliding_excess(&c->mech, p->x[OMEGA_MECH]));
+    }
+    if (c->mech.stuck) {
         mechanics_motion_t motion = circuit_motion(c, p);
-        worst = larger(worst, mechanics_excess(&c->mech, &motion, p->torque_Nm));
+        worst = larger(worst, mechanics_stuck_excess(&c->mech, &motion, p->torque_Nm));
     }
-    for (unsigned legs = b->diode_legs; legs != 0u; legs &= legs - 1u) {
+    for (unsigned legs = b->diodes; legs != 0u; legs &= legs - 1u) {
         int k = bridge_first(legs);
-        worst = larger(worst, bridge_reverse(b, k, circuit_leg_A(c, p, k)));
+        worst = larger(worst, bridge_reverse_A(b, k, circuit_leg_A(c, p, k)) * c->inv_i_scale_1_A);
     }
-    return b->floating > 0 ? larger(worst, floating_excess(c, p)) : worst;
+    return b->floating != 0u ? larger(worst, floating_excess(c, p)) : worst;
 }
 
 excess_t steps_excess(const circuit_t *c, const point_t *p)

@@ -5,8 +5,6 @@
 #ifndef PLANT_FRAME_H
 #define PLANT_FRAME_H
 
-#define SQRT3_2 0.86602540378443864676
-
 typedef struct {
     double alpha, beta;
 } ab_t;
@@ -19,34 +17,6 @@ typedef struct {
 typedef struct {
     double c, s;
 } rotor_t;
-
-/* Directions of the phase axes: the current of leg k is axis[k] . i, and a voltage u of leg k against
- * the others adds (2/3) axis[k] u. */
-static const ab_t frame_axis[3] = {{1.0, 0.0}, {-0.5, SQRT3_2}, {-0.5, -SQRT3_2}};
-
-/* Phase values of a vector, and the vector of phase values. */
-typedef struct {
-    double x[3];
-} abc_t;
-
-static inline abc_t frame_to_abc(ab_t v)
-{
-    double half = -0.5 * v.alpha;
-    double side = SQRT3_2 * v.beta;
-    abc_t to = {{v.alpha, half + side, half - side}};
-    return to;
-}
-
-static inline ab_t frame_from_abc(abc_t v)
-{
-    ab_t to = {2.0 / 3.0 * v.x[0] - 1.0 / 3.0 * (v.x[1] + v.x[2]), 2.0 / 3.0 * SQRT3_2 * (v.x[1] - v.x[2])};
-    return to;
-}
-
-static inline double frame_dot(ab_t x, ab_t y)
-{
-    return x.alpha * y.alpha + x.beta * y.beta;
-}
 
 static inline dq_t frame_to_dq(ab_t x, rotor_t r)
 {

@@ -35,6 +35,7 @@ void gates_load(gates_t *gates, const plant_pwm_t *pwm)
 void gates_drive(gates_t *gates, const bool driven[], double t_s)
 {
     gates->drive_s = t_s;
+    gates->next_s = -1.0;
     for (int k = 0; k < gates->legs; k++) {
         gates->leg[k].to_drive = driven[k];
         gates->leg[k].next_s = -1.0;
@@ -43,6 +44,7 @@ void gates_drive(gates_t *gates, const bool driven[], double t_s)
 
 void gates_off(gates_t *gates)
 {
+    gates->next_s = -1.0;
     for (int k = 0; k < gates->legs; k++) {
         gates->leg[k].driven = false;
         gates->leg[k].to_drive = false;
@@ -115,11 +117,15 @@ static bool update_leg(gates_t *gates, int k, double t_s)
 unsigned gates_update(gates_t *gates, double t_s)
 {
     unsigned changed = 0u;
+    double late_s = t_s + gates->coincident_s;
+    double next_s = gates->period_s;
     for (int k = 0; k < gates->legs; k++) {
-        if (gates->leg[k].next_s <= t_s + gates->coincident_s) {
+        if (gates->leg[k].next_s <= late_s) {
             changed |= update_leg(gates, k, t_s) ? 1u << k : 0u;
         }
+        next_s = gates->leg[k].next_s < next_s ? gates->leg[k].next_s : next_s;
     }
+    gates->next_s = next_s;
     if (changed != 0u) {
         gates->edge_s = t_s;
     }
@@ -151,7 +157,7 @@ gate_t gates_faulty(const gates_t *gates, int k)
     return upper ? (lower ? GATE_BOTH : GATE_HIGH) : (lower ? GATE_LOW : GATE_OFF);
 }
 
-double gates_next_s(const gates_t *gates, double t_s)
+double gates_search_s(const gates_t *gates, double t_s)
 {
     double next_s = gates->period_s;
     double after_s = t_s + gates->coincident_s;

@@ -28,6 +28,7 @@ typedef struct {
     int legs;
     double edge_s;  /* the last change of any gate */
     double drive_s; /* when `driven` becomes `to_drive` */
+    double next_s;  /* nothing happens to any leg between the last update and this */
     struct {
         bool driven, to_drive;
         double rise_s, fall_s; /* command edges of this period */
@@ -63,6 +64,10 @@ static inline gate_t gates_conducting(const gates_t *gates, int k)
 }
 
 /* The next instant after t at which gates_update() has something to do; T when nothing is left. */
-double gates_next_s(const gates_t *gates, double t_s);
+double gates_search_s(const gates_t *gates, double t_s);
+static inline double gates_next_s(const gates_t *gates, double t_s)
+{
+    return gates->next_s > t_s + gates->coincident_s ? gates->next_s : gates_search_s(gates, t_s);
+}
 
 #endif

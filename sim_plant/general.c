@@ -97,7 +97,7 @@ INLINE void swing_rates(const circuit_t *c, const circuit_legs_t *legs, double r
     for (int k = 0; k < PLANT_LEGS; k++) {
         rate[V_LEG(k)] = 0.0;
     }
-    for (int k = 0; k < c->bridge.legs && c->bridge.swinging > 0; k++) {
+    for (int k = 0; k < c->bridge.legs && c->bridge.swinging != 0u; k++) {
         if (c->bridge.leg[k] == LEG_SWINGING) {
             rate[V_LEG(k)] = -legs->i_leg_A[k] * c->bridge.inv_c_leg_1_F;
         }
@@ -111,7 +111,7 @@ INLINE void general_n(const circuit_t *c, double t_s, point_t *p, shape_t shape,
     machine_point_t point;
     machine_rate_t moved;
     circuit_legs_t legs;
-    bool floating = c->bridge.floating > 0;
+    bool floating = c->bridge.floating != 0u;
     double omega_e = m->pole_pairs * p->x[OMEGA_MECH];
     machine_evaluate_n(m, &state, shape, floating || !m->loose, &point);
     circuit_take(m, &point, p);

@@ -24,7 +24,7 @@ static void set_core(machine_t *machine, const plant_machine_t *p, double psi_m_
 
 /* Whether nothing links the cores' currents but the cores: then their flux integrates the voltage straight.
  */
-static bool is_loose(machine_t *machine)
+static void find_loose(machine_t *machine)
 {
     const winding_t *w = &machine->winding;
     bool loose = machine->map == NULL && machine->gamma_eddy_d_1_H == 0.0 &&
@@ -37,7 +37,8 @@ static bool is_loose(machine_t *machine)
         }
         machine->loose_gamma_1_H[a] = inverse_or_zero(w->L_constant_H[a][a]);
     }
-    return loose;
+    machine->loose = loose;
+    machine->plain = loose && w->active == 2 && w->even;
 }
 
 /* The trace of a positive matrix bounds its eigenvalues. */
@@ -73,7 +74,7 @@ static void set_bounds(machine_t *m)
 void machine_set_branch(machine_t *machine, const double axis[PLANT_LEGS], double R_ohm)
 {
     winding_branch(&machine->winding, axis, R_ohm);
-    machine->loose = is_loose(machine);
+    find_loose(machine);
     set_bounds(machine);
 }
 
@@ -113,11 +114,10 @@ void machine_set(machine_t *machine, const plant_config_t *config, double windin
     machine->R_eddy_ohm = w->R_eddy_ohm;
     winding_init(&machine->winding, w, machine->R_s_ohm, psi_m_Wb, psi_core_Wb, magnet);
     machine->biased = machine->map != NULL || machine->gamma_eddy_d_1_H + machine->gamma_eddy_q_1_H > 0.0;
-    machine->loose = is_loose(machine);
+    find_loose(machine);
     machine->symmetrical =
         machine->winding.symmetrical && !machine->biased && machine->winding.cogging_terms == 0;
     machine->scale_Wb = fmax(psi_m_Wb, 0.1 * p->L_d0_H * config->sensor.i_full_scale_A);
-    machine->plain = machine->loose && machine->winding.active == 2 && machine->winding.even;
     set_bounds(machine);
 }
 
@@ -126,10 +126,29 @@ void machine_evaluate(const machine_t *m, const machine_state_t *s, machine_poin
     machine_evaluate_n(m, s, machine_shape(m), true, p);
 }
 
+/* Of a plain machine: the core's, in stationary coordinates. */
+static void plain_admittance(const machine_state_t *s, const core_t *core,
+                             double admittance_1_H[ACTIVE][ACTIVE])
+{
+    machine_tangent_t g = core->gamma_1_H;
+    double c2 = s->rotor.c * s->rotor.c;
+    double s2 = s->rotor.s * s->rotor.s;
+    double cs = s->rotor.c * s->rotor.s;
+    double cross = cs * (g.d - g.q) + (c2 - s2) * g.dq;
+    admittance_1_H[0][0] = c2 * g.d + s2 * g.q - 2.0 * cs * g.dq;
+    admittance_1_H[0][1] = cross;
+    admittance_1_H[1][0] = cross;
+    admittance_1_H[1][1] = s2 * g.d + c2 * g.q + 2.0 * cs * g.dq;
+}
+
 void machine_admittance(const machine_t *m, const machine_state_t *s, const machine_point_t *p,
                         double admittance_1_H[ACTIVE][ACTIVE])
 {
     int n = m->winding.active;
+    if (m->plain) {
+        plain_admittance(s, &p->core[0], admittance_1_H);
+        return;
+    }
     for (int column = 0; column < n; column++) {
         double L[ACTIVE][ACTIVE];
         double x[ACTIVE] = {0.0};
@@ -142,9 +161,26 @@ void machine_admittance(const machine_t *m, const machine_state_t *s, const mach
     }
 }
 
+/* Of a plain machine: dpsi_core/dt = v - R i - omega psi_x', and the currents move by the tangent. */
+static void plain_rates(const machine_t *m, const machine_state_t *s, const machine_point_t *p, double omega,
+                        const double v_V[ACTIVE], machine_rate_t *rate)
+{
+    machine_loose_rates_n(m, p, omega, v_V, (shape_t){2, 1, 3}, rate->u);
+    dq_t core_V = frame_to_dq((ab_t){rate->u[0] + omega * s->u[1], rate->u[1] - omega * s->u[0]}, s->rotor);
+    ab_t moved = frame_to_ab(times(p->core[0].gamma_1_H, core_V), s->rotor);
+    rate->i_A_s[0] = moved.alpha - omega * p->i_A[1];
+    rate->i_A_s[1] = moved.beta + omega * p->i_A[0];
+    rate->eddy_A_s[0] = 0.0;
+    rate->eddy_A_s[1] = 0.0;
+}
+
 void machine_rates(const machine_t *m, const machine_state_t *s, const machine_point_t *p,
                    double omega_e_rad_s, const double v_V[ACTIVE], machine_rate_t *rate)
 {
+    if (m->plain) {
+        plain_rates(m, s, p, omega_e_rad_s, v_V, rate);
+        return;
+    }
     machine_rates_n(m, s, p, omega_e_rad_s, v_V, machine_shape(m), rate);
 }
 

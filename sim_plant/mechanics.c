@@ -2,9 +2,7 @@
 
 #include <math.h>
 
-/* A motion that has just begun must not end by rounding: one part in 1e9 of a speed or torque. */
-#define REVERSED_RAD_S 1e-9
-#define BREAKAWAY      (1.0 + 1e-9)
+#define BREAKAWAY (1.0 + 1e-9) /* for the same reason */
 
 #define LOAD_HARMONICS (int)(sizeof((plant_mech_t){0}.load_angle) / sizeof(plant_harmonic_t))
 
@@ -97,7 +95,7 @@ static double rub(mechanics_t *mech, const mechanics_motion_t *motion, double to
 {
     double omega_rad_s = motion->omega_mech_rad_s;
     double moving = mech->slide * omega_rad_s;
-    if (omega_rad_s != 0.0 && (mech->slide == 0.0 || moving > -REVERSED_RAD_S)) {
+    if (omega_rad_s != 0.0 && (mech->slide == 0.0 || moving > -MECHANICS_REVERSED_RAD_S)) {
         mech->slide = mech->slide == 0.0 ? copysign(1.0, omega_rad_s) : mech->slide;
         return omega_rad_s;
     }
@@ -128,12 +126,9 @@ double mechanics_settle(mechanics_t *mech, const mechanics_motion_t *motion, dou
     return omega_rad_s;
 }
 
-double mechanics_excess(const mechanics_t *mech, const mechanics_motion_t *motion, double torque_Nm)
+double mechanics_stuck_excess(const mechanics_t *mech, const mechanics_motion_t *motion, double torque_Nm)
 {
-    if (mech->stuck) {
-        return fabs(drive_Nm(mech, motion, torque_Nm)) / mech->parameters.T_coulomb_Nm - BREAKAWAY;
-    }
-    return mech->slide != 0.0 ? -mech->slide * motion->omega_mech_rad_s - REVERSED_RAD_S : -1.0;
+    return fabs(drive_Nm(mech, motion, torque_Nm)) / mech->parameters.T_coulomb_Nm - BREAKAWAY;
 }
 
 void mechanics_rates(const mechanics_t *mech, const mechanics_motion_t *m, double torque_Nm,
@@ -150,15 +145,4 @@ void mechanics_rates(const mechanics_t *mech, const mechanics_motion_t *m, doubl
         rate->omega_load_rad_s2 = (resisting_torque_Nm - load_Nm) / p->J_load_kgm2;
         rate->twist_rad_s = m->omega_mech_rad_s - m->omega_load_rad_s;
     }
-}
-
-double mechanics_energy_J(const mechanics_t *mech, const mechanics_motion_t *m)
-{
-    const plant_mech_t *p = &mech->parameters;
-    double energy_J = 0.5 * p->J_kgm2 * m->omega_mech_rad_s * m->omega_mech_rad_s;
-    if (two_masses(mech)) {
-        energy_J += 0.5 * p->J_load_kgm2 * m->omega_load_rad_s * m->omega_load_rad_s +
-                    0.5 * p->k_shaft_Nm * m->twist_rad * m->twist_rad;
-    }
-    return energy_J;
 }

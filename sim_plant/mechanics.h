@@ -60,8 +60,22 @@ void mechanics_impose(mechanics_t *mech, double omega_mech_rad_s);
  * rests. To be called after any change of load or mode, and where mechanics_excess() passed zero. */
 double mechanics_settle(mechanics_t *mech, const mechanics_motion_t *motion, double torque_Nm);
 
+/* A motion that has just begun must not end by rounding. */
+#define MECHANICS_REVERSED_RAD_S 1e-9
+
 /* Above zero once the present kind of motion has ended; only a friction torque can end it. */
-double mechanics_excess(const mechanics_t *mech, const mechanics_motion_t *motion, double torque_Nm);
+double mechanics_stuck_excess(const mechanics_t *mech, const mechanics_motion_t *motion, double torque_Nm);
+static inline double mechanics_sliding_excess(const mechanics_t *mech, double omega_mech_rad_s)
+{
+    return -mech->slide * omega_mech_rad_s - MECHANICS_REVERSED_RAD_S;
+}
+static inline double mechanics_excess(const mechanics_t *mech, const mechanics_motion_t *motion,
+                                      double torque_Nm)
+{
+    return mech->stuck          ? mechanics_stuck_excess(mech, motion, torque_Nm)
+           : mech->slide != 0.0 ? mechanics_sliding_excess(mech, motion->omega_mech_rad_s)
+                                : -1.0;
+}
 
 /* One mass whose load is load_Nm alone: then mechanics_rate() says all. */
 static inline bool mechanics_plain(const mechanics_t *m)
@@ -78,9 +92,6 @@ static inline double mechanics_rate(const mechanics_t *m, double omega_mech_rad_
 /* Rates of any shaft and load. */
 void mechanics_rates(const mechanics_t *mech, const mechanics_motion_t *motion, double torque_Nm,
                      mechanics_motion_rate_t *rate);
-
-/* Of both masses and the shaft. */
-double mechanics_energy_J(const mechanics_t *mech, const mechanics_motion_t *motion);
 
 #ifdef __cplusplus
 }

@@ -39,7 +39,7 @@ static void all_nodes(const circuit_t *c, const point_t *p, const machine_state_
     circuit_legs_t legs;
     double omega_e = m->pole_pairs * p->x[OMEGA_MECH];
     circuit_legs(c, p, &legs);
-    if (c->bridge.floating > 0) {
+    if (c->bridge.floating != 0u) {
         floating_voltages(&c->bridge, m, state, point, omega_e, p->x[V_DC], legs.v_V, legs.v_leg_V, &moved);
     } else {
         machine_rates(m, state, point, omega_e, legs.v_V, &moved);
@@ -62,6 +62,19 @@ static bool has_plain_nodes(const circuit_t *c)
 {
     const winding_t *w = &c->machine.winding;
     return circuit_symmetrical(c) && c->machine.plain && w->flux_terms == 0 && w->inductance_terms == 0;
+}
+
+void circuit_terminals(const circuit_t *c, const point_t *p, double v_leg_V[PLANT_LEGS])
+{
+    machine_state_t state = circuit_machine_state(p);
+    machine_point_t point;
+    machine_rate_t moved;
+    circuit_legs_t legs;
+    machine_evaluate(&c->machine, &state, &point);
+    circuit_legs(c, p, &legs);
+    floating_voltages(&c->bridge, &c->machine, &state, &point, c->machine.pole_pairs * p->x[OMEGA_MECH],
+                      p->x[V_DC], legs.v_V, legs.v_leg_V, &moved);
+    memcpy(v_leg_V, legs.v_leg_V, sizeof legs.v_leg_V);
 }
 
 void circuit_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *nodes)

@@ -109,10 +109,6 @@ void plant_set_supply(plant_t *plant, bool connected); /* lost supply: the link 
 /* Ties two terminals, or one to the negative rail (leg_b < 0), through a resistance and 1 uH; R < 0 opens. */
 void plant_set_short(plant_t *plant, int leg_a, int leg_b, double R_ohm);
 
-/* Further sample instants, from the start of a period and in order of time, beside the one of plant_sample().
- */
-void plant_set_instants(plant_t *plant, const double after_s[], int count);
-
 /* A slip: flux linkages are kept, so currents jump, but for those of floating legs. */
 void plant_turn_rotor(plant_t *plant, double angle_e_rad);
 
@@ -120,7 +116,6 @@ void plant_turn_rotor(plant_t *plant, double angle_e_rad);
 void plant_sample(plant_t *plant, plant_adc_t *adc);
 void plant_set_pwm(plant_t *plant, const plant_pwm_t *pwm); /* takes effect after the coming period */
 void plant_trip(plant_t *plant);                            /* all legs off, at once, until plant_set_pwm */
-void plant_trip_after(plant_t *plant, double after_s); /* the same, so long after the coming period's start */
 void plant_run_period(plant_t *plant);
 
 /* For who follows a timer within the period, in order of time: moves the plant on to an instant of the
@@ -135,8 +130,6 @@ void plant_drive(plant_t *plant,
 void plant_set_break(plant_t *plant, const plant_break_t *comparators);
 bool plant_broke(plant_t *plant, double *after_s); /* since asked last; counts from that period's start */
 bool plant_break_held(const plant_t *plant);       /* a comparator sees too much now */
-
-void plant_sampled(plant_t *plant, int n, plant_adc_t *adc); /* further instant n of the last period */
 
 /* Comparator edges of the last period, oldest first; returns their number, at most `most` are written. */
 int plant_captured(const plant_t *plant, plant_capture_t captured[], int most);

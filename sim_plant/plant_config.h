@@ -12,7 +12,6 @@
 #define PLANT_LEGS      6  /* most; a three-phase star uses the first three */
 #define PLANT_SETS      2  /* most, of three phases each */
 #define PLANT_HARMONICS 16 /* most, of one kind */
-#define PLANT_INSTANTS  4  /* most samples of one PWM period */
 
 typedef struct {
     double R_s_ohm;

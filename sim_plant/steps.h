@@ -30,7 +30,7 @@ excess_t steps_excess(const circuit_t *circuit, const point_t *point);
 /* Whether there is anything that could. */
 static inline bool steps_watching(const circuit_t *c)
 {
-    return c->bridge.floating > 0 || c->bridge.diodes > 0 || c->bridge.swinging > 0 ||
+    return c->bridge.floating != 0u || c->bridge.diodes != 0u || c->bridge.swinging != 0u ||
            c->mech.parameters.T_coulomb_Nm > 0.0 || !dclink_plain(&c->link);
 }
 
@@ -60,7 +60,7 @@ void steps_probe(circuit_t *circuit, const point_t *to, double h);
 static inline double steps_turn_s(const circuit_t *c, double omega_e, double h)
 {
     double limit_rad =
-        c->bridge.floating > 0 || c->bridge.diodes > 0 ? WATCHED_TURN_RAD : 0.9 * FRAME_TURN_MAX_RAD;
+        c->bridge.floating != 0u || c->bridge.diodes != 0u ? WATCHED_TURN_RAD : 0.9 * FRAME_TURN_MAX_RAD;
     double turn_rad = fabs(omega_e) * h;
     return turn_rad > limit_rad ? h * (limit_rad / turn_rad) : h;
 }

@@ -66,7 +66,7 @@ static double bogacki_shampine(const circuit_t *c, const point_t *from, double h
 static double landing(const circuit_t *c, const point_t *from, double h, const double k1[], const double k2[])
 {
     double shortest = h;
-    for (int k = 0; k < c->bridge.legs && c->bridge.swinging > 0; k++) {
+    for (int k = 0; k < c->bridge.legs && c->bridge.swinging != 0u; k++) {
         double rate = k1[V_LEG(k)];
         if (c->bridge.leg[k] != LEG_SWINGING || rate == 0.0) {
             continue;
@@ -113,7 +113,7 @@ static double heun(const circuit_t *c, const point_t *from, double h, const doub
  * follow the rotor, not the voltage: that wants the better method. */
 static bool brief(const circuit_t *c, double h)
 {
-    return h <= (c->bridge.swinging > 0 ? c->calm_swing_s : c->calm_s) && c->bridge.floating == 0;
+    return h <= (c->bridge.swinging != 0u ? c->calm_swing_s : c->calm_s) && c->bridge.floating == 0u;
 }
 
 /* Whether the drop of a closed switch turns over on the way, or the link runs empty: Heun's method would not
@@ -157,7 +157,7 @@ static void retake(const circuit_t *c, const void *rate, double h, point_t *to)
 /* A swinging terminal moves nearly straight towards its diode: the step ends there. */
 static double arrival_s(const circuit_t *c, const double rate[], double h)
 {
-    for (int k = 0; k < c->bridge.legs && c->bridge.swinging > 0; k++) {
+    for (int k = 0; k < c->bridge.legs && c->bridge.swinging != 0u; k++) {
         if (c->bridge.leg[k] == LEG_SWINGING && rate[V_LEG(k)] != 0.0) {
             double end_V = rate[V_LEG(k)] > 0.0 ? c->now.x[V_DC] + c->bridge.v_diode_V : -c->bridge.v_diode_V;
             double arrival = (end_V - c->now.x[V_LEG(k)]) / rate[V_LEG(k)];
@@ -170,7 +170,7 @@ static double arrival_s(const circuit_t *c, const double rate[], double h)
 /* last: its end is that of the segment, or an event, and nobody needs the rates there. */
 static double next_step_s(const circuit_t *c, const double rate[], double left_s, bool *last)
 {
-    double calm_s = c->bridge.swinging > 0 ? c->calm_swing_s : c->calm_s;
+    double calm_s = c->bridge.swinging != 0u ? c->calm_swing_s : c->calm_s;
     double h = steps_turn_s(c, rate[THETA_E], fmin(larger(c->step_s, calm_s), left_s));
     double arrival = arrival_s(c, rate, h);
     *last = arrival < h || h > 0.999 * left_s;
@@ -234,7 +234,7 @@ double steps_general(circuit_t *c, double left_s, bool *event)
     circuit_general(c, c->t_s, &c->now, rate);
     while (left_s > 0.0 && !*event) {
         left_s -= take_step(c, left_s, rate, event);
-        if (c->bridge.floating > 0 && !*event) {
+        if (c->bridge.floating != 0u && !*event) {
             circuit_settle_legs(c);
             circuit_general(c, c->t_s, &c->now, rate);
         }

@@ -10,23 +10,13 @@
  * evaluation of the field, and a change of the legs none. Of the voltages of swinging terminals the third
  * derivative is known at the start as well, so that they gain an order. */
 #include "sim_plant/steps.h"
+#include "sim_plant/symmetrical_drops.h"
 #include "sim_plant/symmetrical_rates.h"
 
 #include <math.h>
 
 /* Of d, where all is smooth: about what the embedded solution of a Runge-Kutta pair of this order misses. */
 #define PART 0.125
-#define KINK 4.0 /* and where it is not, d says less than it should */
-
-/* Whether the drop of a closed switch has moved: then nothing is smooth. */
-INLINE bool turned_over(const bridge_t *b, const tied_t *from, const tied_t *to, shape_t shape)
-{
-    bool moved = false;
-    for (int k = 0; k < shape.legs && b->v_switch_V != 0.0; k++) {
-        moved = moved || from->share[k] != to->share[k];
-    }
-    return moved;
-}
 
 INLINE double error_norm(const circuit_t *c, const double miss[], const pair_t by[], shape_t shape,
                          bool swings)
@@ -115,14 +105,14 @@ INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape
         pair_put(&to->i_A[2 * p], f->i_A[p]);
     }
     to->torque_Nm = f->torque_Nm;
-    double part = turned_over(&c->bridge, &s->tied, &tied, shape) ? KINK : swings ? 1.0 : PART;
+    double part = drop_part(&c->bridge, &s->tied, &tied, shape, swings ? 1.0 : PART);
     return part * error_norm(c, miss, by, shape, swings);
 }
 
 static void retake(const circuit_t *c, const void *start, double h, point_t *to)
 {
     field_t f;
-    bool swings = c->bridge.swinging > 0;
+    bool swings = c->bridge.swinging != 0u;
     *to = c->now;
     switch (c->machine.winding.active) {
     case 2:
@@ -204,11 +194,14 @@ INLINE double take_steps(circuit_t *c, double left_s, shape_t shape, bool swings
         double h = swings || c->step_s > left_s ? left_s : c->step_s;
         h = steps_turn_s(c, start.rate[THETA_E], h);
         h = swings ? swing_s(c, &start, shape, h) : h;
+        double zone = zone_s(c, &start, shape, h);
+        bool smooth = zone == h;
+        h = zone;
         h = h > 0.999 * left_s ? left_s : h; /* no sliver at the end */
         double error = step(c, &start, h, shape, swings, to, &field);
         while (!(error <= 1.0) && h > 1e-9 * left_s) {
             h = steps_shorter_s(h, error);
-            c->step_s = swings ? c->step_s : h;
+            c->step_s = swings || !smooth ? c->step_s : h;
             error = step(c, &start, h, shape, swings, to, &field);
         }
         if (!swings) {
@@ -251,7 +244,7 @@ INLINE double take_steps(circuit_t *c, double left_s, shape_t shape, bool swings
 
 WIDER double steps_symmetrical(circuit_t *c, double left_s, bool *event)
 {
-    bool swings = c->bridge.swinging > 0;
+    bool swings = c->bridge.swinging != 0u;
     switch (c->machine.winding.active) {
     case 2:
         return swings ? take_steps(c, left_s, STAR, true, event) : take_steps(c, left_s, STAR, false, event);

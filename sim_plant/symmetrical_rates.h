@@ -23,7 +23,7 @@ typedef struct {
     double omega_jerk;                      /* third derivative of the angle */
     double v_leg_V_s3[PLANT_LEGS];          /* and of swinging terminals, nearly, */
     pair_t v_V_s2[PAIRS], flux_V_s2[PAIRS]; /* and what these do to voltages and linkages */
-    pair_t core_V[PLANT_SETS];
+    pair_t core_V[PLANT_SETS], i_A_s[PAIRS];
     tied_t tied;
 } start_t;
 
@@ -234,10 +234,10 @@ INLINE void swing_bends(const circuit_t *c, shape_t shape, start_t *s)
 
 INLINE void begin(const circuit_t *c, shape_t shape, bool swings, start_t *s)
 {
-    pair_t i_A_s[PAIRS];
     rates_at(c, &c->field, c->now.x, shape, swings, &s->tied, s->rate, s->flux_V);
-    field_rates(&c->machine, c->now.rotor, s->rate[THETA_E], shape, &c->field, s->flux_V, s->core_V, i_A_s);
-    bends_at(c, i_A_s, shape, swings, s);
+    field_rates(&c->machine, c->now.rotor, s->rate[THETA_E], shape, &c->field, s->flux_V, s->core_V,
+                s->i_A_s);
+    bends_at(c, s->i_A_s, shape, swings, s);
     if (swings) {
         swing_bends(c, shape, s);
     }

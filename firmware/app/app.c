@@ -36,7 +36,7 @@ static uint16_t bit_rate(const hal_t *hal)
 {
     bool has_index;
     const od_entry_t *entry = od_find(0x2080, 2, &has_index);
-    int32_t kbit_s = entry->preset;
+    int32_t kbit_s = od_values_of(entry)->preset;
     (void)app_stored_value(hal, entry->index, entry->sub, &kbit_s);
     return (uint16_t)kbit_s;
 }
@@ -68,7 +68,7 @@ drive_result_t app_configure(app_t *app, hal_t *hal, const drive_params_t *param
     (void)memset(app, 0, sizeof *app);
     app->hal = hal;
     app->slow_divider = 1;
-    app->slow_countdown = 1;
+    app->slow_at = 1;
     app->params = *params;
     app->f_pwm = params->f_pwm;
     app->stored = stored;
@@ -97,10 +97,10 @@ void app_control(app_t *app)
     drive_step(&app->drive, &app->in, &app->out);
     hal_bridge_write(app->hal, &app->out);
     trace_sample(&app->trace);
-    app->periods++;
-    app->slow_countdown--;
-    if (app->slow_countdown == 0U) {
-        app->slow_countdown = app->slow_divider;
+    const uint32_t periods = app->periods + 1U;
+    app->periods = periods;
+    if (periods == app->slow_at) {
+        app->slow_at = periods + app->slow_divider;
         app->slow_busy = true;
         hal_pend_slow(app->hal);
     }

@@ -26,8 +26,8 @@
 #include "firmware/drive/drive_state.h"
 #include "hal/hal.h"
 
-/* 8 kB: four signals, 20 kHz, 51 ms */
-#define APP_TRACE_NUMBERS 4096U
+/* 8 kB: four signals, 20 kHz, 50 ms */
+#define APP_TRACE_NUMBERS 4000U
 
 /* Whether the drive may be switched on: object parameters_ready */
 typedef enum {
@@ -46,9 +46,9 @@ struct app {
     hal_slow_t slow;
 
     hal_t *hal;
-    uint32_t slow_divider, slow_countdown; /* periods per app_slow(), and until the next */
-    volatile uint32_t periods;             /* control interrupts since start */
-    volatile bool slow_busy;               /* from its pending to its end */
+    uint32_t slow_divider, slow_at; /* periods per app_slow(), and of the next */
+    volatile uint32_t periods;      /* control interrupts since start */
+    volatile bool slow_busy;        /* from its pending to its end */
 
     volatile bool stalled;         /* the monitor has found that control has ceased */
     uint32_t seen_periods;         /* by the monitor */

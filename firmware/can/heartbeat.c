@@ -1,10 +1,9 @@
 /* Heartbeat, given and watched. */
 #include "firmware/can/node_parts.h"
 
-#define ID_HEARTBEAT   0x700U
-#define CODE_LOST      0x8130U
-#define CODE_COLLISION 0x8150U
-#define MS             1000U
+#define ID_HEARTBEAT 0x700U
+#define CODE_LOST    0x8130U
+#define MS           1000U
 
 void heartbeat_setup(node_t *node)
 {
@@ -22,10 +21,6 @@ void heartbeat_setup(node_t *node)
 void heartbeat_receive(node_t *node, const node_frame_t *frame)
 {
     const uint32_t id = (uint32_t)frame->id - ID_HEARTBEAT;
-    if (id == node->id) {
-        node_error(node, NODE_ERROR_COLLISION, CODE_COLLISION, 0);
-        return;
-    }
     bool all = true;
     for (uint32_t n = 0; n < (uint32_t)NODE_CONSUMERS; n++) {
         node_consumer_t *consumer = &node->consumer[n];

@@ -15,12 +15,14 @@ enum {
 
 #define ID_NMT       0x000U
 #define ID_SDO       0x600U
+#define ID_SDO_REPLY 0x580U
 #define ID_HEARTBEAT 0x700U
 #define ID_LSS       0x7E5U
 
-#define CODE_NMT     0x8100U
-#define CODE_PASSIVE 0x8120U
-#define CODE_BUS_OFF 0x8140U
+#define CODE_NMT       0x8100U
+#define CODE_PASSIVE   0x8120U
+#define CODE_BUS_OFF   0x8140U
+#define CODE_COLLISION 0x8150U
 
 static void drain(node_t *node)
 {
@@ -75,7 +77,7 @@ void node_boot_up(node_t *node)
             node_error(node, (node_error_t)source, 0, 0);
         }
     }
-    node->emcy_count = 0;
+    emcy_forget(node);
     node->sdo = (node_sdo_t){.state = SDO_IDLE};
     node->nmt = NODE_INITIALISING;
     communication_reset(node);
@@ -110,9 +112,10 @@ static void leave(node_t *node, node_nmt_t next)
     node->nmt = next;
 }
 
+/* Two that obey the same commands: neither may be started, but by a reset of communication. */
 static void start(node_t *node)
 {
-    if (node->nmt != NODE_OPERATIONAL) {
+    if (node->nmt != NODE_OPERATIONAL && node->error[NODE_ERROR_COLLISION] == 0U) {
         node->nmt = NODE_OPERATIONAL;
         node_error(node, NODE_ERROR_NMT, 0, 0);
         pdo_start(node);
@@ -148,6 +151,22 @@ static void nmt_receive(node_t *node, const node_frame_t *frame)
     }
 }
 
+/* What only a node with this id sends: boot-up and heartbeat, answers of its SDO server. */
+static bool is_of_namesake(const node_t *node, const node_frame_t *frame)
+{
+    return (frame->id == ID_HEARTBEAT + node->id && frame->length == 1U) ||
+           (frame->id == ID_SDO_REPLY + node->id && frame->length == 8U);
+}
+
+/* A motor that runs is not stopped by what somebody plugs in. */
+static void collide(node_t *node)
+{
+    node_error(node, NODE_ERROR_COLLISION, CODE_COLLISION, 0);
+    if (node->nmt == NODE_OPERATIONAL && !node_host_on(node->context)) {
+        node->nmt = NODE_PRE_OPERATIONAL;
+    }
+}
+
 static void process_data(node_t *node, const node_frame_t *frame)
 {
     if (node->nmt != NODE_OPERATIONAL) {
@@ -175,6 +194,8 @@ void node_receive(node_t *node, const node_frame_t *frame, uint32_t now_us)
     }
     if (frame->id == ID_NMT) {
         nmt_receive(node, frame);
+    } else if (is_of_namesake(node, frame)) {
+        collide(node);
     } else if (frame->id == ID_SDO + node->id) {
         if (frame->length == 8U && node->nmt != NODE_STOPPED) {
             sdo_receive(node, frame->data);

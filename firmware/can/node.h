@@ -15,7 +15,9 @@
  *
  * Reactions: heartbeat of a master lost, RPDO time-out, bus-off, and leaving OPERATIONAL or a reset while the
  * application is on, call node_host_alarm(). After a lost heartbeat or bus-off the node goes from OPERATIONAL
- * to PRE-OPERATIONAL as 1029h says. Tests: tests/unit/can. */
+ * to PRE-OPERATIONAL as 1029h says. Another node that is heard with this node id is an error; while the
+ * application is off the node then stays out of OPERATIONAL until communication is reset. Tests:
+ * tests/unit/can. */
 #ifndef CAN_NODE_H
 #define CAN_NODE_H
 

@@ -2,99 +2,116 @@
 
 #include <stddef.h>
 
-static int32_t limited(int32_t x)
+static inline int32_t limited(int32_t x)
 {
+#if defined(__ARM_FEATURE_SAT)
+    int32_t r;
+    __asm__("ssat %0, #16, %1" : "=r"(r) : "r"(x));
+    return r;
+#else
     const int32_t low = x < -32768 ? -32768 : x;
     return low > 32767 ? 32767 : low;
+#endif
 }
 
-static bool triggers(const trace_t *trace, int32_t now)
+static inline void put(const trace_t *trace, int16_t *sample, uint32_t n)
 {
-    const bool rises = trace->previous < trace->level && now >= trace->level;
-    const bool falls = trace->previous >= trace->level && now < trace->level;
-    switch (trace->edge) {
-    case TRACE_RISING:
-        return rises;
-    case TRACE_FALLING:
-        return falls;
-    case TRACE_BOTH:
+    const trace_channel_t *channel = &trace->channel[n];
+    sample[n] = (int16_t)limited(*channel->source >> channel->shift);
+}
+
+/* Straight, as deep as there are signals; eight are none beside eight, so that every number is a case. */
+static inline void take(const trace_t *trace, int16_t *sample)
+{
+    switch (trace->count % TRACE_SIGNALS) {
+    case 0:
+        put(trace, sample, 7);
+        __attribute__((fallthrough));
+    case 7:
+        put(trace, sample, 6);
+        __attribute__((fallthrough));
+    case 6:
+        put(trace, sample, 5);
+        __attribute__((fallthrough));
+    case 5:
+        put(trace, sample, 4);
+        __attribute__((fallthrough));
+    case 4:
+        put(trace, sample, 3);
+        __attribute__((fallthrough));
+    case 3:
+        put(trace, sample, 2);
+        __attribute__((fallthrough));
+    case 2:
+        put(trace, sample, 1);
+        __attribute__((fallthrough));
     default:
-        return rises || falls;
+        put(trace, sample, 0);
+        break;
     }
 }
 
-static void change(trace_t *trace, trace_state_t state, uint32_t samples)
+/* Not negative: the trigger signal has reached the level. */
+static inline int32_t above(const trace_t *trace, const int16_t *sample)
 {
-    trace->state = state;
-    trace->left = samples;
+    return sample[trace->trigger] - trace->level;
 }
 
-/* The sample just taken is the first that the trigger saw. */
-static void wait(trace_t *trace, int32_t now)
+/* There is enough before the trigger, or after it. */
+static inline void advance(trace_t *trace, const int16_t *sample)
 {
-    if (trace->trigger == TRACE_SIGNALS || trace->forced || triggers(trace, now)) {
-        change(trace, TRACE_TRIGGERED, trace->after - 1U);
-    }
-}
-
-static void advance(trace_t *trace, int32_t now)
-{
-    switch (trace->state) {
-    case TRACE_FILLING:
-        trace->left--;
-        if (trace->left == 0U) {
-            change(trace, TRACE_WAITING, 0);
-        }
-        break;
-    case TRACE_WAITING:
-        wait(trace, now);
-        break;
-    case TRACE_TRIGGERED:
-        trace->left--;
-        break;
-    case TRACE_OFF:
-    case TRACE_COMPLETE:
-    default:
-        break;
-    }
-    if (trace->state == TRACE_TRIGGERED && trace->left == 0U) {
-        trace->active = 0;
+    if (trace->state == TRACE_TRIGGERED) {
+        trace->countdown = 0;
         trace->state = TRACE_COMPLETE;
+        return;
     }
+    const int32_t now = above(trace, sample);
+    if (trace->edge == TRACE_BOTH) { /* the one that can come next */
+        trace->falling = now < 0 ? 0 : -1;
+    }
+    trace->before = now ^ trace->falling;
+    trace->left = trace->after;
+    trace->state = TRACE_WAITING;
 }
 
 void trace_record(trace_t *trace)
 {
-    trace->countdown--;
-    if (trace->countdown != 0U) {
-        return;
-    }
+    int16_t *sample = trace->next;
     trace->countdown = trace->divider;
-    int16_t *to = &trace->ring[trace->next];
-    const trace_signal_t *end = &trace->signal[trace->count];
-    for (const trace_signal_t *signal = trace->signal; signal < end; signal++) {
-        *to = (int16_t)limited(*signal->source >> signal->shift);
-        to++;
+    take(trace, sample);
+    int16_t *next = &sample[trace->count];
+    trace->next = next == trace->end ? trace->ring : next;
+    if (trace->state == TRACE_WAITING) {
+        const int32_t now = above(trace, sample) ^ trace->falling;
+        const int32_t passed = trace->before & ~now;
+        trace->before = now;
+        if (passed >= 0 && !trace->forced) {
+            return;
+        }
+        trace->state = TRACE_TRIGGERED;
     }
-    const int32_t now = trace->trigger < TRACE_SIGNALS ? trace->ring[trace->next + trace->trigger] : 0;
-    trace->next += trace->count;
-    if (trace->next == trace->end) {
-        trace->next = 0;
+    trace->left--;
+    if (__builtin_expect(trace->left == 0U, 0) != 0) {
+        advance(trace, sample);
     }
-    advance(trace, now);
-    trace->previous = now;
+}
+
+static uint32_t numbers(const trace_t *trace)
+{
+    return (uint32_t)(trace->end - trace->ring);
 }
 
 uint32_t trace_size(const trace_t *trace)
 {
-    return trace->state == TRACE_COMPLETE ? trace->end * 2U : 0U;
+    return trace->state == TRACE_COMPLETE ? numbers(trace) * 2U : 0U;
 }
 
 /* The oldest sample is where the next would go. */
 void trace_read(const trace_t *trace, uint32_t offset, uint8_t bytes[], uint32_t count)
 {
+    const uint32_t oldest = (uint32_t)(trace->next - trace->ring);
     for (uint32_t n = 0; n < count; n++) {
-        const uint32_t place = (trace->next + (offset + n) / 2U) % trace->end;
+        const uint32_t place = (oldest + (offset + n) / 2U) % numbers(trace);
         const uint32_t number = (uint32_t)trace->ring[place];
         bytes[n] = (uint8_t)(((offset + n) % 2U == 0U ? number : number >> 8) & 0xFFU);
     }

@@ -6,7 +6,7 @@
  * of a sample are taken in the same call.
  *
  *   trace_init(t, ring, length, context)   the ring is the caller's, `length` numbers in all
- *   trace_sample(t)    control interrupt, at its end; 3 instructions while nothing is armed
+ *   trace_sample(t)    control interrupt, at its end; cost: docs/performance.md
  *   trace_put(), trace_get(), trace_read()       thread: objects 3100h to 3103h by slot (OD_LIVE_...)
  *
  * Order: set up, arm (command 1), wait for state 4, upload. While armed, settings are refused. The divider
@@ -41,22 +41,29 @@ typedef struct {
 /* Where a dictionary entry lives; false: it cannot be traced. */
 bool trace_host_find(void *context, uint16_t index, uint8_t sub, trace_signal_t *signal);
 
+/* What the interrupt needs of a signal. */
 typedef struct {
-    volatile uint32_t active; /* not zero: filling, waiting or triggered */
-    volatile trace_state_t state;
-    volatile bool forced; /* trigger now */
-    trace_signal_t signal[TRACE_SIGNALS];
+    const volatile int32_t *source;
+    int32_t shift;
+} trace_channel_t;
+
+typedef struct {
+    volatile uint32_t countdown; /* periods up to the next sample; 0: not armed */
+    uint32_t divider;
     uint32_t count; /* signals */
-    uint32_t divider, countdown;
+    int16_t *next;  /* where the next sample goes */
+    int16_t *end;   /* of what is used of the ring: whole samples */
     int16_t *ring;
-    uint32_t end;     /* numbers of the ring that are used: whole samples */
-    uint32_t next;    /* where the next sample goes */
-    uint32_t left;    /* samples until the state changes */
-    uint32_t trigger; /* signal, TRACE_SIGNALS: at once */
-    int32_t level;    /* raw */
-    int32_t previous; /* of the trigger signal */
-    uint32_t after;   /* samples from the trigger on */
+    uint32_t left; /* samples up to the next state; while waiting, those from the trigger on */
+    volatile trace_state_t state;
+    uint32_t trigger;     /* signal */
+    int32_t falling;      /* -1: the edge that counts is falling */
+    int32_t level;        /* raw */
+    int32_t before;       /* the last sample: negative, the edge can come */
+    volatile bool forced; /* trigger as soon as there is enough before */
+    trace_channel_t channel[TRACE_SIGNALS];
     trace_edge_t edge;
+    uint32_t after; /* samples from the trigger on */
 
     /* as set */
     uint32_t size; /* of the ring */
@@ -72,8 +79,13 @@ void trace_record(trace_t *trace);
 
 static inline void trace_sample(trace_t *trace)
 {
-    if (trace->active != 0U) {
-        trace_record(trace);
+    const uint32_t countdown = trace->countdown;
+    if (countdown != 0U) {
+        if (countdown == 1U) {
+            trace_record(trace);
+        } else {
+            trace->countdown = countdown - 1U;
+        }
     }
 }
 

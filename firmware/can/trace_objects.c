@@ -23,6 +23,12 @@ void trace_init(trace_t *trace, int16_t ring[], uint32_t length, void *context)
     trace->ring = ring;
 }
 
+static bool find(const trace_t *trace, uint32_t object, trace_signal_t *signal)
+{
+    return trace_host_find(trace->context, (uint16_t)(object >> 16), (uint8_t)((object >> 8) & 0xFFU),
+                           signal);
+}
+
 static uint32_t length_of(const trace_t *trace)
 {
     return trace->count == 0U ? 0U : trace->size / trace->count;
@@ -40,9 +46,10 @@ static int32_t raw_level(const trace_t *trace, const trace_signal_t *signal)
 
 static uint32_t set_trigger(trace_t *trace)
 {
-    trace->trigger = TRACE_SIGNALS;
+    trace->trigger = 0;
     trace->level = 0;
-    if (trace->set_trigger == 0U) {
+    trace->forced = trace->set_trigger == 0U;
+    if (trace->forced) {
         return OK;
     }
     /* signals that are not set are left out of the samples */
@@ -54,23 +61,24 @@ static uint32_t set_trigger(trace_t *trace)
         return INCOMPATIBLE;
     }
     trace->trigger = place;
-    trace->level = raw_level(trace, &trace->signal[place]);
+    trace_signal_t signal = {.scale = 0};
+    (void)find(trace, trace->object[trace->set_trigger - 1U], &signal);
+    trace->level = raw_level(trace, &signal);
     return OK;
 }
 
 static uint32_t arm(trace_t *trace)
 {
-    trace->active = 0;
+    trace->countdown = 0;
     trace->state = TRACE_OFF;
     trace->count = 0;
     for (uint32_t n = 0; n < TRACE_SIGNALS; n++) {
-        const uint32_t object = trace->object[n];
-        const uint16_t index = (uint16_t)(object >> 16);
-        const uint8_t sub = (uint8_t)((object >> 8) & 0xFFU);
-        if (object != 0U) {
-            if (!trace_host_find(trace->context, index, sub, &trace->signal[trace->count])) {
+        trace_signal_t signal;
+        if (trace->object[n] != 0U) {
+            if (!find(trace, trace->object[n], &signal)) {
                 return NOT_MAPPABLE;
             }
+            trace->channel[trace->count] = (trace_channel_t){.source = signal.source, .shift = signal.shift};
             trace->count++;
         }
     }
@@ -82,17 +90,15 @@ static uint32_t arm(trace_t *trace)
     before = before >= length ? length - 1U : before;
     before = before == 0U ? 1U : before; /* an edge needs one */
     trace->after = length - before;
-    trace->end = length * trace->count;
-    trace->next = 0;
+    trace->end = &trace->ring[length * trace->count];
+    trace->next = trace->ring;
     trace->left = before;
-    trace->previous = 0;
     trace->edge = (trace_edge_t)trace->set_edge;
+    trace->falling = trace->edge == TRACE_FALLING ? -1 : 0;
     trace->divider = trace->set_divider;
-    trace->countdown = 1;
-    trace->forced = false;
     trace->state = TRACE_FILLING;
     __atomic_signal_fence(__ATOMIC_RELEASE); /* the interrupt looks at this alone, so it comes last */
-    trace->active = 1;
+    trace->countdown = 1;
     return OK;
 }
 
@@ -100,14 +106,14 @@ static uint32_t command(trace_t *trace, int32_t value)
 {
     switch (value) {
     case COMMAND_OFF:
-        trace->active = 0;
+        trace->countdown = 0;
         trace->state = TRACE_OFF;
         return OK;
     case COMMAND_ARM:
         return arm(trace);
     case COMMAND_TRIGGER:
     default:
-        if (trace->active == 0U) {
+        if (trace->countdown == 0U) {
             return STATE;
         }
         trace->forced = true;
@@ -118,9 +124,7 @@ static uint32_t command(trace_t *trace, int32_t value)
 static uint32_t put_signal(trace_t *trace, uint32_t number, uint32_t object)
 {
     trace_signal_t signal;
-    const uint16_t index = (uint16_t)(object >> 16);
-    const uint8_t sub = (uint8_t)((object >> 8) & 0xFFU);
-    if (object != 0U && !trace_host_find(trace->context, index, sub, &signal)) {
+    if (object != 0U && !find(trace, object, &signal)) {
         return NOT_MAPPABLE;
     }
     trace->object[number] = object;
@@ -167,7 +171,7 @@ bool trace_put(trace_t *trace, uint16_t slot, int32_t value, uint32_t *code)
     if (!is_setting(slot)) {
         return false;
     }
-    if (trace->active != 0U) {
+    if (trace->countdown != 0U) {
         *code = STATE;
     } else {
         trace->state = TRACE_OFF; /* the data are of other settings */
@@ -181,8 +185,7 @@ static int32_t scale_of(const trace_t *trace, uint32_t number)
     trace_signal_t signal = {.scale = 0};
     const uint32_t object = trace->object[number];
     if (object != 0U) {
-        (void)trace_host_find(trace->context, (uint16_t)(object >> 16), (uint8_t)((object >> 8) & 0xFFU),
-                              &signal);
+        (void)find(trace, object, &signal);
     }
     return signal.scale;
 }
@@ -199,7 +202,7 @@ bool trace_get(const trace_t *trace, uint16_t slot, int32_t *value)
 {
     switch (slot) {
     case OD_LIVE_TRACE_COMMAND:
-        *value = trace->active != 0U ? COMMAND_ARM : COMMAND_OFF;
+        *value = trace->countdown != 0U ? COMMAND_ARM : COMMAND_OFF;
         return true;
     case OD_LIVE_TRACE_STATE:
         *value = (int32_t)trace->state;

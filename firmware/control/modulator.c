@@ -3,22 +3,31 @@
 #include "firmware/math/compiler.h"
 #include "firmware/math/pair.h"
 
+/* Least and largest phase are +-size, or a itself when it lies beyond; c is reversed. */
+typedef struct {
+    pm_abc_t leg;
+    pm_q_t span; /* between the largest and the smallest */
+} centred_t;
+
 void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t v_dc)
 {
-    const int32_t per_volt = pm_counts_per_unit(config->per_unit, v_dc);
-    const int32_t lost = config->dead_counts + pm_mulh(config->drop, per_volt);
-    self->lost = config->compensate ? pm_shl(pm_sat(lost, PM_ZONE_BITS - 1), 32 - PM_ZONE_BITS) : 0;
+    const int32_t lost = config->dead + pm_mulh(config->drop, pm_per_volt(v_dc));
+    self->lost = config->compensate ? pm_shl(pm_sat(lost, PM_SHARE_BITS - 2), PM_HEIGHT_BITS) : 0;
 }
 
 /* What the legs have in common is free, so they are written about that of phase A that makes b = -c: then the
  * middle of the largest and the smallest is half of what a exceeds -|b| ... |b| by. */
-static inline pm_abc_t centred(pm_ab_t v)
+static inline centred_t centred(pm_ab_t v)
 {
     const pm_q_t a = v.alpha + pm_half(v.alpha);
     const pm_q_t b = pm_mulh_sub(v.beta, v.beta, PM_FRAC(0.133974596215561353)); /* 1 - sqrt(3)/2 */
     const pm_q_t size = pm_magnitude(b);
-    const pm_q_t zero = pm_half(a - pm_clamp(a, -size, size));
-    return (pm_abc_t){.a = a - zero, .b = b - zero, .c = b + zero}; /* c reversed */
+    const pm_q_t beyond = a - pm_clamp(a, -size, size);
+    const pm_q_t zero = pm_half(beyond);
+    return (centred_t){
+        .leg = {.a = a - zero, .b = b - zero, .c = b + zero},
+        .span = size + size + pm_magnitude(beyond),
+    };
 }
 
 static inline pm_abc_t lost_by(const modulator_config_t *config, pm_ab_t i)
@@ -29,57 +38,25 @@ static inline pm_abc_t lost_by(const modulator_config_t *config, pm_ab_t i)
     return (pm_abc_t){.a = a, .b = y - pm_half(a), .c = y + pm_half(a)}; /* c reversed */
 }
 
-static inline void set_legs(const modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
-                            pm_ab_t i_quarter, int32_t *on)
-{
-    const int32_t centre = pm_half(config->counts);
-    const int32_t per_volt = pm_counts_per_unit(config->per_unit, v_dc);
-    const pm_abc_t i = lost_by(config, i_quarter);
-    const pm_abc_t u = centred(v);
-    on[0] = pm_zone_add(pm_mulh_add(centre, u.a, per_volt), i.a, self->lost);
-    on[1] = pm_zone_add(pm_mulh_add(centre, u.b, per_volt), i.b, self->lost);
-    on[2] = pm_zone_sub(pm_mulh_sub(centre, u.c, per_volt), i.c, self->lost);
-}
-
-/* Scales v to the hexagon: the span of its phases becomes the link voltage. */
-static bool shorten(pm_ab_t *v, pm_q_t v_dc)
-{
-    const pm_abc_t u = pm_clarke_inverse(*v);
-    const pm_q_t top = pm_max(u.a, pm_max(u.b, u.c));
-    const pm_q_t bottom = pm_min(u.a, pm_min(u.b, u.c));
-    if (top - bottom <= v_dc) {
-        return false;
-    }
-    const pm_unit_t ratio = pm_ratio(v_dc, top - bottom);
-    *v = (pm_ab_t){.alpha = pm_unit(v->alpha, ratio), .beta = pm_unit(v->beta, ratio)};
-    return true;
-}
-
-/* Beyond the rails: by the voltage asked for, by compensation, or by rounding. */
-PM_RARE static void hold_to_rails(modulator_t *self, const modulator_config_t *config, pm_q_t v_dc,
-                                  pm_ab_t i_quarter, modulator_out_t *out)
-{
-    out->limited = shorten(&out->v, v_dc);
-    if (out->limited) {
-        self->limited = true;
-        set_legs(self, config, out->v, v_dc, i_quarter, out->on);
-    }
-    out->on[0] = pm_clamp(out->on[0], 0, config->counts);
-    out->on[1] = pm_clamp(out->on[1], 0, config->counts);
-    out->on[2] = pm_clamp(out->on[2], 0, config->counts);
-}
-
 void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
                     pm_ab_t i_quarter, modulator_out_t *out)
 {
-    const int32_t counts = config->counts;
-    int32_t on[3];
-    set_legs(self, config, v, v_dc, i_quarter, on);
-    if (pm_within(on[0], 0, counts) && pm_within(on[1], 0, counts) && pm_within(on[2], 0, counts)) {
-        *out = (modulator_out_t){.on = {on[0], on[1], on[2]}, .v = v, .limited = false};
-    } else {
-        modulator_out_t held = {.on = {on[0], on[1], on[2]}, .v = v};
-        hold_to_rails(self, config, v_dc, i_quarter, &held);
-        *out = held;
+    const centred_t u = centred(v);
+    /* beyond the hexagon the span becomes the whole period: the vector is shortened on its own direction */
+    const int32_t per_volt = pm_per_volt(pm_max(u.span, v_dc));
+    out->limited = u.span > v_dc;
+    if (pm_rarely(out->limited)) {
+        const pm_unit_t ratio = pm_share_to_unit(pm_mulh(v_dc, per_volt));
+        v = (pm_ab_t){.alpha = pm_unit(v.alpha, ratio), .beta = pm_unit(v.beta, ratio)};
+        self->limited = true;
     }
+    const pm_abc_t i = lost_by(config, i_quarter);
+    const int32_t counts = config->counts;
+    const int32_t a = pm_zone_add(pm_mulh_add(PM_SHARE_HALF, u.leg.a, per_volt), i.a, self->lost);
+    const int32_t b = pm_zone_add(pm_mulh_add(PM_SHARE_HALF, u.leg.b, per_volt), i.b, self->lost);
+    const int32_t c = pm_zone_sub(pm_mulh_sub(PM_SHARE_HALF, u.leg.c, per_volt), i.c, self->lost);
+    out->on[0] = pm_share_of(a, counts);
+    out->on[1] = pm_share_of(b, counts);
+    out->on[2] = pm_share_of(c, counts);
+    out->v = v;
 }

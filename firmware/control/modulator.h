@@ -4,9 +4,9 @@
  * Min-max zero sequence: linear up to v_dc/sqrt(3) in every direction, to the hexagon in its corners. Beyond
  * the hexagon the vector is shortened on its own direction, so the angle is kept; the realised vector is
  * returned. Compensation adds to each leg the on-time that dead time and device drops take from it, by the
- * sign of the leg's current with a linear zone around zero: +-(T_dt/T_s + V_drop/v_dc), in timer counts. The
- * returned vector is the one without compensation, which is what the motor then sees. Beyond the hexagon by
- * less than the compensation takes back, it may be returned as it was asked for.
+ * sign of the leg's current with a linear zone around zero: +-(T_dt/T_s + V_drop/v_dc), up to a quarter of
+ * the period. The returned vector is the one without compensation, which is what the motor then sees. Legs
+ * are shares of the period up to the last step, where one saturation keeps each within the timer's counts.
  *
  * modulator_step() once per period; the output holds over the next one, so i is the current expected there.
  * One division. modulator_slow() at 1 kHz with the link voltage, and once before the first step. Range:
@@ -18,17 +18,16 @@
 #include "firmware/math/root.h"
 
 typedef struct {
-    int32_t counts;       /* timer counts of half a period */
-    pm_counts_t per_unit; /* pm_counts_make(counts) */
-    int32_t zone_alpha;   /* pm_mulh(zone / 4, zone_alpha) = 2^PM_ZONE_BITS */
-    int32_t zone_beta;    /* sqrt(3)/2 zone_alpha */
-    int32_t dead_counts;  /* counts that dead time takes, per half period */
-    pm_q_t drop;          /* device drop */
+    int32_t counts;     /* timer counts of half a period */
+    int32_t zone_alpha; /* pm_mulh(zone / 4, zone_alpha) = 2^PM_ZONE_BITS */
+    int32_t zone_beta;  /* sqrt(3)/2 zone_alpha */
+    int32_t dead;       /* share of the period that dead time takes, Q20 */
+    pm_q_t drop;        /* device drop */
     bool compensate;
 } modulator_config_t;
 
 typedef struct {
-    int32_t lost; /* counts that dead time and drops take, Q(32 - PM_ZONE_BITS); below 2^(PM_ZONE_BITS - 1) */
+    int32_t lost; /* share that dead time and drops take, Q33; held below a quarter */
     bool limited; /* set when the vector was shortened; whoever reads it clears it */
 } modulator_t;
 

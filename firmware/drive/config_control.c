@@ -6,8 +6,7 @@ void make_modulator(maker_t *m, modulator_config_t *c)
     const pm_num_t duty = pm_num_mul(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm));
     const pm_num_t zone = pm_num_div(si(m, DRIVE_PARAM_comp_zone), m->base.i);
     c->counts = m->params->timer_counts;
-    c->per_unit = pm_counts_make((uint32_t)c->counts);
-    c->dead_counts = fixed(m, pm_num_mul(duty, pm_num(c->counts)), 0, DRIVE_PARAM_dead_time);
+    c->dead = fixed(m, duty, PM_SHARE_BITS, DRIVE_PARAM_dead_time);
     c->drop = per_unit(m, DRIVE_PARAM_device_drop, m->base.v);
     const pm_num_t per_zone = pm_num_div(pm_num(1), zone);
     const int bits = PM_ZONE_BITS + 32 - (Q_BITS - 2);

@@ -39,7 +39,12 @@ bool drive_same_frame(const drive_config_t *a, const drive_config_t *b)
 
 void drive_reconfigure(drive_t *drive, const drive_config_t *config)
 {
+    const observer_id_t before = drive->config.position.observer.id;
     drive->config = *config;
+    const position_config_t *position = &drive->config.position;
+    if (position->observer.id != before && drive->stage >= STAGE_OPEN_LOOP) {
+        position_change_observer(&drive->position, position, drive->i_ab, drive->status.i);
+    }
     if (drive->fault == DRIVE_FAULT_PARAMETERS) {
         drive->fault = DRIVE_FAULT_NONE;
         drive->state = DRIVE_OFF;
@@ -154,30 +159,11 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
     }
 }
 
-/* Below this speed the observer would drift on an imposed angle: it is led along. */
-static bool is_led(const drive_t *drive)
+/* Open loop at a speed where the observer has an angle of its own. */
+PM_RARE static position_out_t imposed(const drive_t *drive)
 {
-    return pm_abs(drive->omega_open) < drive->config.position.omega_low;
-}
-
-PM_RARE static void impose(drive_t *drive)
-{
-    drive->theta_open += (pm_angle_t)pm_omega_to_angle(drive->omega_open, drive->config.k_theta);
-    if (is_led(drive)) {
-        const pm_pll_t open = {.theta = drive->theta_open, .omega = drive->omega_open};
-        position_lead(&drive->position, &drive->config.position, &open);
-    }
-}
-
-PM_RARE static position_out_t imposed(drive_t *drive)
-{
-    const pm_pll_t open = {.theta = drive->theta_open, .omega = drive->omega_open};
-    if (is_led(drive)) {
-        position_follow(&drive->position, &open);
-        drive->status.theta = open.theta;
-    }
-    const pm_dir_t dir = pm_dir(open.theta);
-    return (position_out_t){.dir = dir, .i = pm_park(drive->i_ab, dir), .omega = open.omega};
+    const pm_dir_t dir = pm_dir(drive->theta_open);
+    return (position_out_t){.dir = dir, .i = pm_park(drive->i_ab, dir), .omega = drive->omega_open};
 }
 
 static inline void write_out(const modulator_out_t *m, drive_out_t *out)
@@ -225,15 +211,14 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
         const pm_ab_t next = pm_pair_ab(&drive->v_next);
         drive->v_acting.alpha = next.alpha;
         drive->v_acting.beta = next.beta;
-        const bool open = drive->stage != STAGE_VECTOR;
-        if (open) {
-            impose(drive);
-        }
         position_out_t frame;
         position_step(&drive->position, &drive->config.position, v, drive->i_ab, &frame);
         drive->status.theta = drive->position.pll.theta;
-        if (open) {
-            frame = imposed(drive);
+        if (drive->stage != STAGE_VECTOR) {
+            drive->theta_open += (pm_angle_t)drive->turn_open;
+            if (!drive->led) {
+                frame = imposed(drive);
+            }
         }
         control(drive, &frame, out);
     }
@@ -244,7 +229,15 @@ void drive_prepare(drive_t *drive)
     const drive_config_t *c = &drive->config;
     const bool open = drive->stage == STAGE_OPEN_LOOP;
     const pm_q_t v_dc = drive->status.v_dc;
-    const int32_t turn = pm_omega_to_angle(open ? drive->omega_open : drive->position.pll.omega, c->k_theta);
+    const pm_q_t omega = open ? drive->omega_open : drive->position.pll.omega;
+    const int32_t turn = pm_omega_to_angle(omega, c->k_theta);
+    /* at low speed the observer would drift on an imposed angle */
+    drive->led = open && pm_abs(omega) < c->position.omega_low;
+    if (drive->led) {
+        const pm_pll_t imposed = {.theta = drive->theta_open, .omega = omega};
+        position_lead(&drive->position, &c->position, &imposed);
+    }
+    drive->turn_open = turn;
     drive->ahead = pm_dir((pm_angle_t)turn + (pm_angle_t)pm_half(turn));
     drive->carrier = drive->stage == STAGE_VECTOR && drive->position.inject;
     drive->v_share = c->v_linear;

@@ -41,6 +41,7 @@ struct drive {
     pm_ab_t i_ab;
     bool hw_fault;
     bool carrier;      /* injection is on */
+    bool led;          /* open loop: the observer is led along */
     pm_dir_t ahead;    /* one and a half periods of rotation: from the sample to where the voltage acts */
     pm_unit_t v_share; /* share of v_dc for current control */
     pm_dq_t u;         /* voltage of the current control, without carrier; Q22 */
@@ -65,6 +66,7 @@ struct drive {
     pm_dq_t i_ref;
     pm_angle_t theta_open; /* open loop: angle of the current vector */
     pm_q_t omega_open;
+    int32_t turn_open; /* of that speed in a period */
     pm_q_t i_open;
 
     /* references in per-unit, made from the command once */

@@ -1,5 +1,5 @@
 /* The position of the rotor: injection at low speed, an observer above, one phase-locked loop
- * (METHODS.md 5.9, row 69).
+ * (METHODS.md 4.5.1 and 5.9, rows 44 and 69).
  *
  *   eps = eps_injection + weight (eps_observer - eps_injection)
  * weight goes from 0 at omega_low to 1 at omega_high; the carrier is on below omega_high and off above 1.1
@@ -50,10 +50,14 @@ typedef struct {
 void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i,
                    position_out_t *out);
 
-/* While the rotor follows a given vector (align, open-loop start) the step stands between these two:
- * `imposed` takes the place of the loop, and the observer is tied to it. */
+/* The configuration names another observer than before: it is seeded at the present position and speed, where
+ * the loop had settled with the old one, so nothing jumps. What the old one had learnt of R and of the
+ * amplitude is given up. Between two steps, with the current of the last and the same in its frame. */
+void position_change_observer(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq);
+
+/* While the rotor follows a given vector (align, open-loop start): the loop is opened, the position is
+ * `imposed` and goes on with its speed, and the observer is tied to it. Up to the next position_slow(). */
 void position_lead(position_t *self, const position_config_t *config, const pm_pll_t *imposed);
-void position_follow(position_t *self, const pm_pll_t *imposed);
 
 /* At 1 kHz, with the current of the last step and the same in its frame: weight, carrier, loop gains,
  * quality. */

@@ -2,7 +2,15 @@
 #ifndef PM_MATH_COMPILER_H
 #define PM_MATH_COMPILER_H
 
+#include <stdbool.h>
+
 #define PM_INLINE static inline __attribute__((always_inline))
 #define PM_RARE   __attribute__((noinline, cold))
+
+/* A condition of the control period that is next to never true. */
+static inline bool pm_rarely(bool x)
+{
+    return __builtin_expect((long)x, 0L) != 0L;
+}
 
 #endif

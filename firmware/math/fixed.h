@@ -81,6 +81,32 @@ static inline int32_t pm_sat(int32_t x, unsigned n)
     return pm_clamp(x, -top - 1, top);
 }
 
+/* The same for x 2^shift, whose upper bits are lost. */
+static inline int32_t pm_shl_sat(int32_t x, unsigned shift, unsigned n)
+{
+#if PM_HAS_DSP
+    if (__builtin_constant_p(n) != 0 && __builtin_constant_p(shift) != 0) {
+        int32_t r;
+        __asm__("ssat %0, %1, %2, lsl %3" : "=r"(r) : "i"(n + 1U), "r"(x), "i"(shift));
+        return r;
+    }
+#endif
+    return pm_sat(pm_shl(x, shift), n);
+}
+
+/* Within 0 ... 2^n - 1, n <= 30; a single USAT. */
+static inline int32_t pm_sat_positive(int32_t x, unsigned n)
+{
+#if PM_HAS_DSP
+    if (__builtin_constant_p(n) != 0) {
+        int32_t r;
+        __asm__("usat %0, %1, %2" : "=r"(r) : "i"(n), "r"(x));
+        return r;
+    }
+#endif
+    return pm_clamp(x, 0, (int32_t)((1U << n) - 1U));
+}
+
 #if PM_HAS_DSP
 
 static inline int32_t pm_add_sat(int32_t a, int32_t b)
@@ -202,18 +228,35 @@ static inline int32_t pm_mean(int32_t a, int32_t b)
     return pm_half(a + b);
 }
 
-/* sum +- height x / edge for |x| below edge = 2^PM_ZONE_BITS, sum +- height beyond; height in
- * Q(32 - PM_ZONE_BITS): one saturation and one multiply-accumulate. */
-#define PM_ZONE_BITS 14
+/* sum +- height x / edge for |x| below edge = 2^PM_ZONE_BITS, sum +- height beyond; |x| < 2^26, height in
+ * Q(PM_HEIGHT_BITS): one saturation and one multiply-accumulate. */
+#define PM_ZONE_BITS   14
+#define PM_ZONE_LIFT   5
+#define PM_HEIGHT_BITS (32 - PM_ZONE_BITS - PM_ZONE_LIFT)
 
 static inline int32_t pm_zone_add(int32_t sum, int32_t x, int32_t height)
 {
-    return pm_mulh_add(sum, pm_sat(x, PM_ZONE_BITS), height);
+    return pm_mulh_add(sum, pm_shl_sat(x, PM_ZONE_LIFT, PM_ZONE_BITS + PM_ZONE_LIFT), height);
 }
 
 static inline int32_t pm_zone_sub(int32_t sum, int32_t x, int32_t height)
 {
-    return pm_mulh_sub(sum, pm_sat(x, PM_ZONE_BITS), height);
+    return pm_mulh_sub(sum, pm_shl_sat(x, PM_ZONE_LIFT, PM_ZONE_BITS + PM_ZONE_LIFT), height);
+}
+
+/* A share of something, 0 ... 1 in Q20, with room for 2^11; what it is a share of as an integer below 2^15.
+ * Beyond 0 and 1 the nearest of them is taken. */
+#define PM_SHARE_BITS 20
+#define PM_SHARE_HALF ((int32_t)1 << (PM_SHARE_BITS - 1))
+
+static inline pm_unit_t pm_share_to_unit(int32_t share) /* below 1 */
+{
+    return pm_shl(share, 31 - PM_SHARE_BITS);
+}
+
+static inline int32_t pm_share_of(int32_t share, int32_t whole)
+{
+    return pm_mulh(pm_sat_positive(share, PM_SHARE_BITS), pm_shl(whole, 32 - PM_SHARE_BITS));
 }
 
 /* A small signal: Q32, +-0.5, saturating; for carrier currents, whose gains exceed pm_gain(). */

@@ -30,16 +30,15 @@ static inline pm_wide_t pm_pi_output(const pm_pi_t *self, const pm_pi_config_t *
 }
 
 /* The second half of the update alone. */
-static inline void pm_pi_follow(pm_pi_t *self, const pm_pi_config_t *c, pm_wide_t excess)
+static inline pm_wide_t pm_pi_following(const pm_pi_config_t *c, pm_wide_t integral, pm_wide_t excess)
 {
-    self->integral += pm_shl(pm_mulh(excess, c->kb), 1);
+    return integral + pm_shl(pm_mulh(excess, c->kb), 1);
 }
 
 /* excess = u_limited - u of the same step. */
 static inline void pm_pi_update(pm_pi_t *self, const pm_pi_config_t *c, pm_q_t e, pm_wide_t excess)
 {
-    self->integral = pm_gain_add(self->integral, e, c->ki);
-    pm_pi_follow(self, c, excess);
+    self->integral = pm_pi_following(c, pm_gain_add(self->integral, e, c->ki), excess);
 }
 
 #endif

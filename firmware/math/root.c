@@ -1,35 +1,12 @@
 #include "firmware/math/root.h"
 
-/* sqrt(m 2^30) for m >= 2^30, that is the root of m / 2^32 in Q31, within 1e-8 of it.
- * A cubic gives 1 / sqrt within 0.7 %, one Newton step makes that 8e-5. The root made from it is cut to 16
- * bits, so that its remainder is exact in 32 bits, and corrected by remainder / (2 root). */
-static inline uint32_t root_q31(uint32_t m)
-{
-    enum {
-        C0 = 208867893,
-        C1 = -793348095,
-        C2 = 1672337219,
-        C3 = -1309134214
-    };                                   /* Q26, times 2^n for Horner */
-    const int32_t v = (int32_t)(m >> 1); /* Q31 */
-    int32_t y = pm_mulh_add(C2, C3, v);
-    y = pm_mulh_add(C1, y, v);
-    y = pm_shl(pm_mulh_add(C0, y, v), 3); /* 1 / sqrt(v), Q29 */
-    const int32_t miss = (1 << 25) - pm_mulh(v, pm_mulh(y, y));
-    y = pm_mulh_add(y, y, pm_shl(miss, 6));
-
-    const uint32_t s = ((uint32_t)pm_mulh(v, y) + (1U << 11)) >> 12; /* Q16 */
-    const int32_t rest = (int32_t)(m - s * s);                       /* Q32 */
-    return (s << 15) + (uint32_t)pm_mulh(pm_shl(rest, 1), y);
-}
-
 pm_q_t pm_sqrt(pm_q_t x)
 {
     if (x <= 0) {
         return 0;
     }
     const unsigned n = (unsigned)__builtin_clz((uint32_t)x) >> 1;
-    const uint32_t root = root_q31((uint32_t)x << (2U * n));
+    const uint32_t root = pm_root_q29((uint32_t)x << (2U * n)) << 2;
     return (pm_q_t)((root + (1U << n)) >> (n + 1U));
 }
 
@@ -52,7 +29,8 @@ pm_q_t pm_hypot(pm_q_t x, pm_q_t y)
     if (n == 0U) { /* the sum is at least 2^62 and not scaled */
         return PM_Q_MAX;
     }
-    const uint32_t root = root_q31(m) + ((1U << (n - 1U)) >> 1); /* twice the scaled length, to be rounded */
+    const uint32_t root =
+        (pm_root_q29(m) << 2) + ((1U << (n - 1U)) >> 1); /* twice the scaled length, to be rounded */
     const uint32_t length = root >> (n - 1U);
     return length > (uint32_t)PM_Q_MAX ? PM_Q_MAX : (pm_q_t)length;
 }

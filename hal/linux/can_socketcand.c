@@ -124,6 +124,7 @@ static bool take_message(can_link_t *link, hal_can_frame_t *frame)
         link->quiet_until_s = can_now_s() + QUIET_S;
         link->started = link->peer >= 0;
     } else if (begins(link, "< send ")) {
+        link->quiet_until_s = 0.0; /* it has read our answer */
         return take_frame(link, frame);
     } else {
         /* filters and statistics are not served */

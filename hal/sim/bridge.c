@@ -16,7 +16,7 @@ void hal_bridge_write(hal_t *hal, const drive_out_t *out)
 
 bool hal_bridge_arm(hal_t *hal)
 {
-    hal->armed = hal->configured && !hal->hw_fault;
+    hal->armed = hal->configured && !hal->hw_fault && !plant_break_held(hal->plant);
     return hal->armed;
 }
 

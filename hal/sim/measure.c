@@ -1,21 +1,11 @@
 #include "hal/sim/port.h"
 
-#include <math.h>
-
-/* The comparators of a board look at the currents themselves, not at the converter's codes. */
-static bool comparators_trip(const hal_t *hal)
+/* Since the last measurement, or still. */
+static bool comparators_tripped(hal_t *hal)
 {
-    if (hal->i_break_A <= 0.0) {
-        return false;
-    }
-    plant_truth_t truth;
-    plant_truth_windings(hal->plant, &truth);
-    for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
-        if (fabs(truth.i_A[leg]) > hal->i_break_A) {
-            return true;
-        }
-    }
-    return false;
+    double after_s;
+    bool broke = plant_broke(hal->plant, &after_s);
+    return broke || plant_break_held(hal->plant);
 }
 
 void hal_measure(hal_t *hal, drive_in_t *in)
@@ -24,7 +14,7 @@ void hal_measure(hal_t *hal, drive_in_t *in)
         in->i_leg[leg] = hal->adc.i_leg[leg];
     }
     in->v_dc = hal->adc.v_dc;
-    in->hw_fault = hal->hw_fault || comparators_trip(hal);
+    in->hw_fault = comparators_tripped(hal) || hal->hw_fault;
     if (in->hw_fault) {
         hal_bridge_off(hal);
     }

@@ -1,7 +1,10 @@
 /* Port `sim`: the hardware is the plant. As many as wanted; nothing runs by itself: sim_loop.h calls.
  *
  * Converter codes go from plant to application and timer counts back unchanged, so what runs here is what
- * runs on the target. The temperature is the plant user's to set; flash is memory; frames go to two queues.
+ * runs on the target. Over-current comparators are the plant's (plant_set_break()): they switch the bridge
+ * off at their instant, and the next measurement says so. The temperature is the plant user's to set; flash
+ * is memory; frames go to two queues. Where power is lost in the midst of a double word, that reads as
+ * anything; a page that was being erased is so by half.
  */
 #ifndef HAL_SIM_PORT_H
 #define HAL_SIM_PORT_H
@@ -28,13 +31,12 @@ struct hal {
     /* for whoever holds the loop */
     int32_t temperature_dC; /* what the sensor says */
     bool hw_fault;          /* held break input */
-    double i_break_A;       /* over-current comparators; 0: none */
     bool temperature_missing;
     sim_queue_t received, sent; /* seen from the application */
     hal_can_state_t can_state;
     uint32_t can_lost, watchdog_fed;
     uint32_t store[HAL_STORE_PAGES][HAL_STORE_PAGE_SIZE / sizeof(uint32_t)];
-    uint32_t store_words_left; /* flash loses power after so many words; UINT32_MAX: never */
+    uint32_t store_bytes_left; /* flash loses power after so many bytes; UINT32_MAX: never */
     char console[SIM_CONSOLE];
     bool led, reset;
 };

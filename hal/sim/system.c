@@ -10,7 +10,7 @@ void sim_hal_init(hal_t *hal, plant_t *plant)
     hal->plant = plant;
     hal->timer_Hz = TIMER_HZ;
     hal->temperature_dC = 250;
-    hal->store_words_left = UINT32_MAX;
+    hal->store_bytes_left = UINT32_MAX;
     memset(hal->store, 0xFF, sizeof hal->store);
 }
 

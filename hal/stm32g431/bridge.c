@@ -112,26 +112,23 @@ void bridge_run(void)
     TIM1.RCR = 1U;
 }
 
+/* The legs follow each other by four bits. */
+static uint32_t legs_of(const bool driven[])
+{
+    return LEG_U * driven[0] + LEG_V * driven[1] + LEG_W * driven[2];
+}
+
 void hal_bridge_write(hal_t *hal, const drive_out_t *out)
 {
+    (void)hal; /* the address of the one there is costs less than keeping it */
     TIM1.CCR1 = out->compare[0][0];
     TIM1.CCR2 = out->compare[1][0];
     TIM1.CCR3 = out->compare[2][0];
-    uint32_t legs = 0U;
-    if (out->driven[0]) {
-        legs |= LEG_U;
-    }
-    if (out->driven[1]) {
-        legs |= LEG_V;
-    }
-    if (out->driven[2]) {
-        legs |= LEG_W;
-    }
+    port_hal.legs = legs_of(out->driven);
     if (out->trip) {
-        TIM1.BDTR = hal->bridge;
-        legs = 0U;
+        TIM1.BDTR = port_hal.bridge;
+        port_hal.legs = 0U;
     }
-    hal->legs = legs;
 }
 
 bool hal_bridge_arm(hal_t *hal)

@@ -67,11 +67,11 @@ void measure_run(void)
     ADC1.CR = ADC_CR_ADVREGEN | ADC_CR_ADSTART;
 }
 
-/* The shunt is between leg and ground: a current into the motor makes the code fall. */
+/* The shunt is between leg and ground: a current into the motor makes the code fall. One below the exact
+ * complement, so that the smallest fits; the calibration takes that as an offset. */
 static uint16_t current_code(uint32_t converted)
 {
-    const uint32_t code = 0x10000U - converted * 16U;
-    return (uint16_t)(code > 0xFFFFU ? 0xFFFFU : code);
+    return (uint16_t)(0xFFFFU - converted * 16U);
 }
 
 void hal_measure(hal_t *hal, drive_in_t *in)
@@ -82,8 +82,9 @@ void hal_measure(hal_t *hal, drive_in_t *in)
     in->i_leg[2] = current_code(ADC1.JDR2);
     in->v_dc = (uint16_t)(ADC2.JDR2 * 16U);
     const uint32_t breaks = TIM1.SR & BREAKS;
-    in->hw_fault = breaks != 0U;
-    if (breaks != 0U) {
+    in->hw_fault = false;
+    if (__builtin_expect((long)breaks, 0L) != 0L) {
+        in->hw_fault = true;
         TIM1.SR = ~breaks; /* once reported; set again while the cause lasts */
     }
 }

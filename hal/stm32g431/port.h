@@ -1,14 +1,12 @@
 /* Port for ST's B-G431B-ESC1 (STM32G431CB, 170 MHz): what the application has to allocate.
  *
- * Both halves of a carrier period are equal: compare[leg][0] serves both (HAL_EQUAL_HALVES). New compare
+ * Both halves of a carrier period are equal: compare[leg][0] serves both. New compare
  * values take effect at the centre of the zero vector, a change of the driven legs about 1 us later.
  * docs/board.md has wiring and bench checks, README.md here the registers that are used. */
 #ifndef STM32G431_PORT_H
 #define STM32G431_PORT_H
 
 #include "hal/hal.h"
-
-#define HAL_EQUAL_HALVES 1
 
 #define PORT_CONSOLE_SIZE 256U /* powers of two */
 #define PORT_CAN_FRAMES   16U

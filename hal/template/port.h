@@ -8,8 +8,6 @@
 
 #include "hal/hal.h"
 
-#define HAL_EQUAL_HALVES 1 /* 0 if your timer takes a compare value of its own for each half of a period */
-
 struct hal {
     app_t *app;   /* from hal_start(), for the interrupts */
     bool refused; /* by hal_init(): the bridge must not be armed */

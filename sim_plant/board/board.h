@@ -58,7 +58,8 @@ typedef struct {
     uint8_t data[8];
 } board_frame_t;
 bool board_can_send(board_t *board, const board_frame_t *frame); /* to the image; false: not started */
-bool board_can_receive(board_t *board, board_frame_t *frame);    /* from it, the last 256; false: none */
+unsigned board_can_waiting(board_t *board);                   /* to the image, the one on the bus included */
+bool board_can_receive(board_t *board, board_frame_t *frame); /* from it, the last 256; false: none */
 void board_can_error(board_t *board, bool bus_off);
 const char *board_console(board_t *board); /* all that the UART has said */
 bool board_led(board_t *board);

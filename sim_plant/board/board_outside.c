@@ -31,6 +31,12 @@ bool board_can_send(board_t *board, const board_frame_t *frame)
     return fdcan_put(&board_inside(board)->fdcan, &out);
 }
 
+unsigned board_can_waiting(board_t *board)
+{
+    const fdcan_queue_t *queue = &board_inside(board)->fdcan.to_image;
+    return queue->put - queue->taken;
+}
+
 bool board_can_receive(board_t *board, board_frame_t *frame)
 {
     fdcan_frame_t in;

@@ -190,11 +190,16 @@ uint32_t cpu_pc(const cpu_t *cpu)
 
 uint32_t cpu_register(const cpu_t *cpu, int n)
 {
-    return cpu_get(cpu, cpu_core_register[n & 15]);
+    return cpu_get(cpu, n == 16 ? UC_ARM_REG_XPSR : cpu_core_register[n & 15]);
 }
 
 void cpu_set_register(cpu_t *cpu, int n, uint32_t value)
 {
+    if (n == 16) {
+        const uint32_t flags = UINT32_C(0xF80F0000);
+        cpu_set(cpu, UC_ARM_REG_XPSR, (cpu_get(cpu, UC_ARM_REG_XPSR) & ~flags) | (value & flags));
+        return;
+    }
     cpu_set(cpu, cpu_core_register[n & 15], n == 15 ? value | 1U : value);
 }
 

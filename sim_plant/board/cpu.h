@@ -77,7 +77,7 @@ void cpu_halt(cpu_t *cpu, bool halted); /* as a debugger does */
 void cpu_stall(cpu_t *cpu, uint32_t base, uint64_t until_cycle);
 uint64_t cpu_now(const cpu_t *cpu);
 uint32_t cpu_pc(const cpu_t *cpu);
-uint32_t cpu_register(const cpu_t *cpu, int n); /* r0 to r15 */
+uint32_t cpu_register(const cpu_t *cpu, int n); /* r0 to r15; 16: xPSR */
 
 /* Interrupt request lines are levels: pending again after return while the line is high. CPU_NMI is one of
  * them. */
@@ -101,7 +101,16 @@ void cpu_watch(cpu_t *cpu, uint32_t address, void *owner, cpu_watch_t watch);
 /* A BKPT is an error without this. True: it has been served, go on behind it; false: the run ends. */
 typedef bool (*cpu_breakpoint_t)(void *owner, uint8_t number);
 void cpu_on_breakpoint(cpu_t *cpu, void *owner, cpu_breakpoint_t breakpoint);
-void cpu_set_register(cpu_t *cpu, int n, uint32_t value);
+void cpu_set_register(cpu_t *cpu, int n, uint32_t value); /* of xPSR, the flags */
+
+/* A debugger is called with the processor at rest, before the instruction at the PC: when asked for, at a
+ * break, after a step. Time stands until it returns; it may change registers and memory. A break within an IT
+ * block is not seen, and a step may go on to its end. A stop costs up to a block's time, no instructions. */
+typedef enum { CPU_GO, CPU_STEP } cpu_debug_t;
+typedef cpu_debug_t (*cpu_debugger_t)(void *owner);
+void cpu_debug(cpu_t *cpu, void *owner, cpu_debugger_t debugger); /* NULL: none, and no breaks */
+bool cpu_break(cpu_t *cpu, uint32_t address, bool set);           /* false: more than 32 */
+void cpu_ask_debugger(cpu_t *cpu);
 
 /* Software reset (AIRCR) or lock-up: the run ends with true, these tell. Both last until cpu_reset(). */
 bool cpu_reset_asked(const cpu_t *cpu);

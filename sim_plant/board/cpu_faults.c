@@ -28,6 +28,19 @@ static uint32_t it_advance(uint32_t it)
     return (it & 7U) == 0 ? 0 : (it & 0xE0U) | (it << 1 & 0x1FU);
 }
 
+uint32_t cpu_it_at(const cpu_block_t *block, uint32_t pc)
+{
+    const uint8_t *code = block->region->host + (block->address - block->region->is.base);
+    uint32_t state = 0;
+    for (uint32_t at = 0; at + 2 <= block->size && block->address + at < pc;) {
+        insn_t insn;
+        insn_decode_at(&insn, code + at, block->size - at);
+        state = insn.kind == INSN_IT ? insn.it : it_advance(state);
+        at += insn.length;
+    }
+    return state;
+}
+
 uint32_t cpu_access_pc(cpu_t *cpu, uint32_t address, bool write, uint32_t *it)
 {
     const cpu_block_t *block = cpu->block;
@@ -152,7 +165,7 @@ void cpu_on_any_memory(uc_engine *uc, uc_mem_type type, uint64_t where, int size
 
 /* Instructions of the block behind the one that failed were counted but not executed. Their time stays: it
  * must not run backwards. */
-static void take_back_after(cpu_t *cpu, uint32_t pc)
+void cpu_take_back_after(cpu_t *cpu, uint32_t pc)
 {
     const cpu_block_t *block = cpu->block;
     if (block == NULL || pc - block->address >= block->size) {
@@ -173,7 +186,7 @@ static void data_fault(cpu_t *cpu)
     }
     cpu->fault.pending = false;
     const uint32_t pc = cpu_access_pc(cpu, cpu->fault.address, cpu->fault.write, &it);
-    take_back_after(cpu, pc);
+    cpu_take_back_after(cpu, pc);
     const uint32_t xpsr = cpu->fault.xpsr & ~UINT32_C(0x0600FC00);
     cpu_set(cpu, UC_ARM_REG_XPSR, xpsr | (it & 3U) << 25 | (it & 0xFCU) << 8);
     cpu_set(cpu, UC_ARM_REG_PC, pc | 1U);
@@ -218,7 +231,7 @@ static void invalid_instruction(cpu_t *cpu)
         cpu->event = false;
         return;
     }
-    take_back_after(cpu, pc);
+    cpu_take_back_after(cpu, pc);
     const bool thumb = (cpu_get(cpu, UC_ARM_REG_XPSR) & UINT32_C(0x01000000)) != 0;
     exceptions_raise_usage(cpu, thumb ? CFSR_UNDEFINSTR : CFSR_INVSTATE);
 }

@@ -167,6 +167,11 @@ void cpu_on_block(uc_engine *uc, uint64_t where, uint32_t size, void *user)
         stop_before(cpu, address);
         return;
     }
+    if (cpu->debug.call != NULL && cpu_debug_stops_block(cpu, address)) {
+        cpu->block = NULL;
+        stop_before(cpu, address);
+        return;
+    }
     account(cpu, block);
 }
 

@@ -73,7 +73,9 @@ static void execute(cpu_t *cpu)
         }
         return;
     }
-    if (cpu->divided_by_zero) {
+    if (cpu->debug.call != NULL && cpu_debug_stopped(cpu)) {
+        /* the debugger's turn */
+    } else if (cpu->divided_by_zero) {
         end_of_division(cpu);
     } else if (cpu->interrupt >= 0) {
         take_interrupt(cpu);
@@ -159,6 +161,10 @@ static void run(cpu_t *cpu, uint64_t until_cycle)
         }
         if (ended(cpu)) {
             break;
+        }
+        if (cpu->debug.due) {
+            cpu_serve_debugger(cpu);
+            continue;
         }
         cpu->stop_at = earlier(until_cycle, cpu->alarms.next);
         const bool waits = cpu->halted || cpu->wait_until > cpu->total.typical;

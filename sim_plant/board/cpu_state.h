@@ -22,6 +22,7 @@ enum {
     CPU_FLASH_WRITES = 64,
     CPU_LINE = 64
 };
+enum { CPU_BREAKS = 32, CPU_STEP_STOPS = 5 };
 
 typedef struct cpu_region cpu_region_t;
 
@@ -75,6 +76,12 @@ typedef struct {
     void *owner;
     cpu_watch_t call;
 } cpu_watch_entry_t;
+
+/* Where the run is to stop. */
+typedef struct {
+    uint32_t address;
+    uc_hook hook;
+} cpu_stop_t;
 
 struct cpu {
     uc_engine *uc;
@@ -137,6 +144,16 @@ struct cpu {
         void *owner;
         cpu_breakpoint_t call;
     } breakpoint;
+    struct {
+        void *owner;
+        cpu_debugger_t call; /* NULL: there is none */
+        bool due, stepping;
+        uint32_t resumed;    /* the debugger has left off before this instruction, which has not begun yet */
+        uint32_t passing;    /* it is the first of this block: no stop before it again */
+        uint32_t stopped_at; /* by a hook */
+        cpu_stop_t stop[CPU_BREAKS], ahead[CPU_STEP_STOPS];
+        unsigned stops, aheads;
+    } debug;
 };
 
 /* cpu.c */
@@ -158,6 +175,11 @@ __attribute__((format(printf, 3, 4))) void cpu_fail_at(cpu_t *cpu, uint32_t pc, 
 void cpu_on_block(uc_engine *uc, uint64_t where, uint32_t size, void *user);
 void cpu_on_interrupt(uc_engine *uc, uint32_t number, void *user);
 void cpu_serve_attention(cpu_t *cpu, cpu_block_t *block); /* with the processor at rest */
+
+/* cpu_debug.c */
+void cpu_serve_debugger(cpu_t *cpu);                      /* with the processor at rest */
+bool cpu_debug_stops_block(cpu_t *cpu, uint32_t address); /* before a block begins */
+bool cpu_debug_stopped(cpu_t *cpu);                       /* within a block; puts the PC there */
 
 /* cpu_stores.c: between begin and end of a run this processor's pages without code take stores the fast way
  */
@@ -192,7 +214,9 @@ void cpu_on_any_memory(uc_engine *uc, uc_mem_type type, uint64_t where, int size
 void cpu_take_error(cpu_t *cpu, uc_err error);
 void cpu_take_fetch_fault(cpu_t *cpu, bool protection);
 uint32_t cpu_access_pc(cpu_t *cpu, uint32_t address, bool write, uint32_t *it);
-bool cpu_is_urgent(const cpu_t *cpu); /* in HardFault, NMI or with FAULTMASK */
+void cpu_take_back_after(cpu_t *cpu, uint32_t pc); /* what was counted of the block but not executed */
+uint32_t cpu_it_at(const cpu_block_t *block, uint32_t pc); /* state of an IT block there */
+bool cpu_is_urgent(const cpu_t *cpu);                      /* in HardFault, NMI or with FAULTMASK */
 
 /* cpu_stats.c */
 void cpu_stats_enter(cpu_t *cpu, int exception);

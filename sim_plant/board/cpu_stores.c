@@ -64,12 +64,14 @@ void tlb_set_page_with_attrs_arm(void *engine, uint32_t page, uint64_t physical,
 
 void cpu_stores_meet_code(cpu_t *cpu, cpu_region_t *region, uint32_t first, uint32_t last)
 {
-    reset_dirty_t reset_dirty;
-    find("tlb_reset_dirty_arm", &reset_dirty);
     for (uint32_t page = first; page <= last; page++) {
-        region->holds_code[page] = true;
-        if (cpu->engine != NULL && reset_dirty != NULL) {
-            reset_dirty(cpu->engine, (uintptr_t)&region->host[page * CPU_PAGE], CPU_PAGE);
+        if (!region->holds_code[page]) {
+            region->holds_code[page] = true;
+            reset_dirty_t reset_dirty;
+            find("tlb_reset_dirty_arm", &reset_dirty);
+            if (cpu->engine != NULL && reset_dirty != NULL) {
+                reset_dirty(cpu->engine, (uintptr_t)&region->host[page * CPU_PAGE], CPU_PAGE);
+            }
         }
     }
 }

@@ -18,9 +18,8 @@ class Frame(c.Structure):
 
 
 class OdEntry(c.Structure):
-    _fields_ = [("index", c.c_uint16), ("sub", c.c_uint8), ("type", c.c_uint8), ("kind", c.c_uint8),
-                ("group", c.c_uint8), ("flags", c.c_uint16), ("slot", c.c_uint16), ("least", c.c_int32),
-                ("preset", c.c_int32), ("most", c.c_int32)]
+    _fields_ = [("index", c.c_uint16), ("sub", c.c_uint8), ("flags", c.c_uint8), ("type", c.c_uint, 4),
+                ("kind", c.c_uint, 2), ("group", c.c_uint, 2), ("slot", c.c_uint, 10), ("values", c.c_uint, 10)]
 
 
 ENTRY = c.POINTER(OdEntry)

@@ -6,6 +6,8 @@ import contextlib
 import csv
 import io
 import json
+import os
+import subprocess
 import sys
 import tempfile
 import threading
@@ -15,6 +17,7 @@ from pathlib import Path
 from unittest import mock
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "pmdrive"))
+import can  # noqa: E402
 import canopen  # noqa: E402
 import pmdrive  # noqa: E402
 from pmdrive import cli, dictionary, files, identify, motion, names  # noqa: E402
@@ -150,6 +153,33 @@ class Values(Bench):
         self.assertIn("i_max (2200h:01), by i_trip (2600h:01)", err)
         self.assertIn("0604 0043h", err)
 
+    def test_what_is_still_to_be_done(self):
+        self.node["parameters_ready"] = 3
+        out, _ = self.command("set", "R_s=6.2")
+        self.assertIn("`pmdrive save`, then `pmdrive reset`", out)
+
+    def test_a_record_by_its_index(self):
+        self.assertEqual(self.command("get", "2100"), self.command("get", "machine"))
+
+    def test_list(self):
+        out, _ = self.command("list", "machine")
+        self.assertIn("0.0001 ohm to 100 ohm", out)
+        self.assertNotIn("store.machine", out)
+        self.assertIn("v_injection", self.command("list", "inject")[0])
+        self.assertEqual(len(self.json("list")), len(dictionary.ENTRIES))
+        self.assertIn("no name has `nix` in it", self.command("list", "nix", code=2)[1])
+
+    def test_codes_have_words(self):
+        with self.node.gate:
+            self.node.trip(1)
+        out, _ = self.command("get", "drive_fault", "error_code")
+        self.assertIn("1 (over-current)", out)
+        self.assertIn("2310h (over-current)", out)
+
+    def test_help(self):
+        self.assertIn("NAME=VALUE", self.command("help", "set")[0])
+        self.assertIn("examples:", self.command("help")[0])
+
     def test_nobody_there(self):
         _, err = self.command("get", "R_s", code=1, node=SILENT)
         self.assertIn(f"node {SILENT} does not answer to R_s (2100h:02)", err)
@@ -211,7 +241,8 @@ class Sets(Bench):
 
     def test_refused_together_is_undone(self):
         _, err = self.command("load", self.write("R_s: 7 ohm\ni_max: 40 A\ni_trip: 30 A\n"), "--yes", code=1)
-        self.assertIn("by i_trip (2600h:01)", err)
+        self.assertIn("i_trip (2600h:01), of all together", err)
+        self.assertIn("nothing was changed", err)
         self.assertEqual((self.node["R_s"], self.node["i_max"], self.node["i_trip"]), (6000000, 5000, 9000))
         self.assertEqual(self.node["parameter_batch"], 0)
 
@@ -279,6 +310,43 @@ class Motion(Bench):
         self.command("run", "speed", "200rpm", "--for", "1e9", code=2)
         self.assertEqual(self.node.lib.cia402_on(self.node.profile), 0)
 
+    def held(self, *keys, code=0):
+        """Of `run` at a terminal where these come, one every 50 ms: what was seen, and how long it ran after the last."""
+        master, slave = os.openpty()
+        last_s = []
+
+        def press():
+            for key in keys:
+                time.sleep(0.05)
+                os.write(master, key)
+                last_s.append(time.monotonic())
+
+        thread = threading.Thread(target=press)
+        with open(slave, encoding="ascii") as terminal, mock.patch.object(sys, "stdin", terminal):
+            thread.start()
+            seen = self.json("run", "speed", "200rpm", code=code)
+            ended_s = time.monotonic()
+            thread.join()
+        os.close(master)
+        return seen, ended_s - last_s[-1]
+
+    def test_while_a_key_is_held(self):
+        seen, after_s = self.held(*[b" "] * 30)
+        self.assertAlmostEqual(max(x["velocity_actual"]["value"] for x in seen), 20.944, places=3)
+        self.assertGreater(after_s, 0.5)  # a keyboard needs so long until it repeats
+        self.wait(lambda: self.node["velocity_actual"] == 0)
+        self.assertIsNone(self.node.enabled_at)
+
+    def test_another_key_ends_it(self):
+        _, after_s = self.held(*[b" "] * 10, b"q", *[b" "] * 100)
+        self.assertIsNone(self.node.enabled_at)
+        self.assertLess(after_s, 0.0)
+
+    def test_no_other_key_begins(self):
+        seen, _ = self.held(b"x", code=1)
+        self.assertIn("was not pressed", seen[0]["error"])
+        self.assertEqual(self.node.lib.cia402_on(self.node.profile), 0)
+
     def test_stops_on_interrupt(self):
         with self.connect() as drive:
             with self.assertRaises(KeyboardInterrupt):
@@ -315,6 +383,17 @@ class Motion(Bench):
         with self.node.gate:
             self.node.trip(3)
         self.assertIn("DC-link over-voltage", self.command("run", "speed", "200rpm", "--for", "1", code=1)[1])
+
+    def test_another_has_the_same_id(self):
+        other = can.Bus(interface="virtual", channel=self.channel)
+        self.addCleanup(other.shutdown)
+        other.send(can.Message(arbitration_id=0x700 + NODE, data=[5], is_extended_id=False))
+        with self.connect() as drive:
+            self.wait(lambda: drive.read("error_register"))
+            running = motion.Motion(drive, "speed", speed=1000)
+            with self.assertRaisesRegex(pmdrive.NotDone, "two nodes use the same identifier"):
+                running.start(seconds=1.0)
+            running.stop()
 
     def test_mapping_of_another(self):
         with self.connect() as drive:
@@ -472,6 +551,73 @@ class Trace(Bench):
         self.assertIn("nothing was recorded in 0.1 s", err)
 
 
+class Flash(Bench):
+    """OpenOCD is a stand-in on PATH; the drive that it is said to have written is on the bus."""
+
+    def setUp(self):
+        super().setUp()
+        with self.connect() as drive:
+            self.image = Path(self.path("an image.elf"))
+            self.image.write_bytes(b"\x7fELF" + drive.read("stored_eds") + b"rest")
+        self.openocd("exit 0")
+        path = mock.patch.dict("os.environ", {"PATH": f"{self.folder.name}:/usr/bin:/bin"})
+        path.start()
+        self.addCleanup(path.stop)
+
+    def openocd(self, script):
+        path = Path(self.path("openocd"))
+        path.write_text(f'#!/bin/sh\necho "$@" >>{self.folder.name}/said\n{script}\n', encoding="ascii")
+        path.chmod(0o755)
+
+    def said(self):
+        path = Path(self.path("said"))
+        return path.read_text(encoding="ascii") if path.exists() else ""
+
+    def test_writes_and_verifies_on_the_bus(self):
+        out, _ = self.command("flash", str(self.image))
+        self.assertIn(f"program {{{self.image}}} verify reset exit", self.said())
+        self.assertIn("interface/stlink.cfg", self.said())
+        self.assertIn("software_version", out)
+        self.assertIn(f"node {NODE} runs it", out)
+
+    def test_another_runs(self):
+        self.image.write_bytes(b"\x7fELF")
+        _, err = self.command("flash", str(self.image), code=1)
+        self.assertIn("its data sheet is another", err)
+
+    def test_without_a_bus(self):
+        out = io.StringIO()
+        with mock.patch.dict("os.environ"), contextlib.redirect_stdout(out):
+            os.environ.pop("PMDRIVE_CAN", None)
+            self.assertEqual(cli.main(["flash", str(self.image)]), 0)
+        self.assertIn("written and verified; with --can", out.getvalue())
+
+    def test_no_probe(self):
+        self.openocd("echo 'Error: open failed' >&2; exit 1")
+        out, err = self.command("flash", str(self.image), code=1)
+        self.assertIn("Error: open failed", out)
+        self.assertIn("no debug probe was found", err)
+        self.assertIn("ST-LINK", err)
+        self.assertNotIn("runs it", out)
+
+    def test_no_openocd(self):
+        _, err = self.command("flash", "--openocd", "no-such-program", str(self.image), code=1)
+        self.assertIn("apt-get install openocd", err)
+
+    def test_not_while_the_motor_runs(self):
+        with self.connect() as drive, motion.Motion(drive, "speed", speed=20000):
+            _, err = self.command("flash", str(self.image), code=1)
+        self.assertIn("the motor runs: nothing was written", err)
+        self.assertEqual(self.said(), "")
+
+    def test_usage(self):
+        self.assertIn("cannot read", self.command("flash", "missing.elf", code=2)[1])
+        self.assertIn("not both", self.command("flash", code=2)[1])
+        out, _ = self.command("flash", str(self.image), "--dry-run")
+        self.assertIn("target/stm32g4x.cfg", out)
+        self.assertEqual(self.said(), "")
+
+
 class Shell(Bench):
     def test_commands(self):
         from pmdrive.shell import Shell as Prompt
@@ -480,17 +626,28 @@ class Shell(Bench):
             prompt = Prompt(cli.parser().parse_args(["shell"]), drive)
             out = io.StringIO()
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
-                for line in ("set R_s=6.3", "get R_s", "get R_z", "nonsense", "", "set 'R_s"):
+                for line in ("set R_s=6.3", "get R_s", "get R_z", "nonsense", "", "set 'R_s", "help set"):
                     self.assertFalse(prompt.onecmd(line))
             self.assertTrue(prompt.onecmd("quit"))
         self.assertEqual(out.getvalue().count("6.3 ohm"), 2)
         self.assertIn("did you mean R_s?", out.getvalue())
+        self.assertIn("NAME=VALUE", out.getvalue())
         self.assertEqual(prompt.completedefault("psi_"), ["psi_m"])
         self.assertEqual(prompt.completenames("fau"), ["faults"])
 
     def test_completion(self):
-        out, _ = self.command("completion")
-        self.assertIn(" psi_m ", out)
+        script, _ = self.command("completion")
+
+        def completed(*words):
+            typed = " ".join(f"'{word}'" for word in ("pmdrive", *words))
+            line = f"{script}\nCOMP_WORDS=({typed}); COMP_CWORD={len(words)}; _pmdrive 2>/dev/null; echo ${{COMPREPLY[*]}}"
+            return subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=True).stdout.split()
+
+        self.assertEqual(completed("fau"), ["faults"])
+        self.assertEqual(completed("--node", "5", "get", "psi_"), ["psi_m"])
+        self.assertEqual(completed("set", "psi_"), ["psi_m="])
+        self.assertEqual(completed("trace", "i_d", "--ed"), ["--edge"])
+        self.assertEqual(completed("save", "mach"), ["machine"])
 
     def test_interface(self):
         self.assertIn("is no CAN interface", str(self.error("socketcand:host")))

@@ -118,15 +118,16 @@ struct Entry {
     std::string name;
     std::function<std::unique_ptr<Source>()> make;
     double omega_pu; // a speed at which it works
+    int settle;      // periods until a change of the frame shows in eps
 };
 
 std::vector<Entry> sources()
 {
     std::vector<Entry> all = {
-        {"pulsating_square", [] { return std::make_unique<PulsatingSquare>(); }, 0.05},
+        {"pulsating_square", [] { return std::make_unique<PulsatingSquare>(); }, 0.05, 5},
     };
     for (const bench::ObserverCase &c : bench::observer_cases(kMachine, kBase)) {
-        all.push_back({c.name, [c] { return std::make_unique<Observer>(c.config); }, c.omega_pu});
+        all.push_back({c.name, [c] { return std::make_unique<Observer>(c.config); }, c.omega_pu, c.settle});
     }
     return all;
 }
@@ -281,7 +282,7 @@ TEST_P(ObserverContract, ErrorSignalIsTheAngle)
             }
             const double before = real(out.eps);
             drive.mistake(error);
-            for (int k = 0; k < 5; ++k) { // old carrier gone, flux not yet
+            for (int k = 0; k < GetParam().settle; ++k) { // old carrier gone, flux not yet
                 drive.advance(&out);
             }
             EXPECT_NEAR(real(out.eps) - before, error, kSlope * std::abs(error) + kSeeded_rad);

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "hal/sim/sim_loop.h"
+#include "tools/pmsim/rig_drive.h"
 #include "tools/pmsim/rig_sample.h"
 
 struct rig {
@@ -64,6 +65,11 @@ void rig_destroy(rig_t *rig)
     }
 }
 
+const drive_t *rig_drive(const rig_t *rig)
+{
+    return &rig->loop.app.drive;
+}
+
 plant_t *rig_plant(rig_t *rig)
 {
     return rig->loop.hal.plant;
@@ -94,7 +100,12 @@ void rig_set_hw_fault(rig_t *rig, bool held)
 
 void rig_set_break(rig_t *rig, double i_break_A)
 {
-    rig->loop.hal.i_break_A = i_break_A;
+    plant_break_t levels = {.delay_s = 0.0};
+    for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
+        levels.above_A[leg] = i_break_A;
+        levels.below_A[leg] = i_break_A;
+    }
+    plant_set_break(rig->loop.hal.plant, i_break_A > 0.0 ? &levels : NULL);
 }
 
 bool rig_send(rig_t *rig, const hal_can_frame_t *frame)

@@ -67,7 +67,7 @@ void rig_command(rig_t *rig, const rig_command_t *command);
 bool rig_clear_fault(rig_t *rig);
 void rig_set_temperature(rig_t *rig, double temperature_degC);
 void rig_set_hw_fault(rig_t *rig, bool held);
-void rig_set_break(rig_t *rig, double i_break_A);
+void rig_set_break(rig_t *rig, double i_break_A); /* over-current comparators; 0: none */
 
 /* Frames to and from the drive's node; false: its ring is full, none waits. Its status also becomes known by
  * them. */

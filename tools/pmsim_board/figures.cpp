@@ -46,6 +46,9 @@ void figures_merge(const figures_t *figures)
     for (int n = 0; n < FIGURE_MODES; ++n) {
         merge(total.mode[n], figures->mode[n]);
     }
+    for (int n = 0; n < FIGURE_EVENTS; ++n) {
+        merge(total.event[n], figures->event[n]);
+    }
     for (int n = 0; n < FIGURE_INTERRUPTS; ++n) {
         merge(total.interrupt[n], figures->interrupt[n]);
     }
@@ -57,6 +60,9 @@ void figures_merge(const figures_t *figures)
     total.period_cycles = figures->period_cycles;
     total.stack_most = std::max(total.stack_most, figures->stack_most);
     total.resets += figures->resets;
+    total.bus_frames += figures->bus_frames;
+    total.bus_idle += figures->bus_idle;
+    total.refused += figures->refused;
     total.simulated_s += figures->simulated_s;
 }
 

@@ -15,10 +15,20 @@ enum {
     FIGURE_CALIBRATE,
     FIGURE_PULSES,
     FIGURE_IDENTIFY,
+    FIGURE_ALIGN,
     FIGURE_OPEN_LOOP,
     FIGURE_INJECTION,
+    FIGURE_BLEND, /* injection and observer */
     FIGURE_FLUX,
+    FIGURE_WEAKENING,
     FIGURE_MODES
+};
+/* What may happen in any of them, counted there and here */
+enum {
+    FIGURE_LIMITED, /* the voltage vector was shortened */
+    FIGURE_FAULT,   /* a fault was found */
+    FIGURE_SWAP,    /* the first period with a new set of parameters */
+    FIGURE_EVENTS
 };
 /* Interrupts */
 enum { FIGURE_CONTROL, FIGURE_MONITOR, FIGURE_SLOW, FIGURE_CAN, FIGURE_CONSOLE, FIGURE_INTERRUPTS };
@@ -34,6 +44,7 @@ typedef struct {
 
 typedef struct {
     interrupt_figure_t mode[FIGURE_MODES]; /* of the control interrupt */
+    interrupt_figure_t event[FIGURE_EVENTS];
     interrupt_figure_t interrupt[FIGURE_INTERRUPTS];
     uint64_t latency_most; /* of control, cycles */
     uint64_t identical; /* control and slow interrupts whose memory was that of the host's drive after them */
@@ -42,6 +53,8 @@ typedef struct {
     uint64_t period_cycles;
     uint32_t stack_most;
     uint32_t resets;
+    uint64_t bus_frames, bus_idle; /* of --bus-load: frames, and looks that found the bus idle */
+    uint32_t refused;              /* requests that the node did not do */
     double simulated_s;
 } figures_t;
 

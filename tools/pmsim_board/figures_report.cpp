@@ -7,8 +7,9 @@ namespace pmsim
 namespace
 {
 
-const char *const mode_names[FIGURE_MODES] = {"off",       "calibrate", "pulses", "identify",
-                                              "open_loop", "injection", "flux"};
+const char *const mode_names[FIGURE_MODES] = {"off",       "calibrate", "pulses", "identify", "align",
+                                              "open_loop", "injection", "blend",  "flux",     "weakening"};
+const char *const event_names[FIGURE_EVENTS] = {"limited", "fault", "swap"};
 const char *const interrupt_names[FIGURE_INTERRUPTS] = {"control", "monitor", "slow", "can", "console"};
 
 double mean(uint64_t sum, uint64_t count)
@@ -48,6 +49,9 @@ std::vector<std::pair<std::string, double>> figure_values(const figures_t &figur
     for (int n = 0; n < FIGURE_MODES; ++n) {
         add(std::string("control.") + mode_names[n], figures.mode[n]);
     }
+    for (int n = 0; n < FIGURE_EVENTS; ++n) {
+        add(std::string("control.") + event_names[n], figures.event[n]);
+    }
     for (int n = 0; n < FIGURE_INTERRUPTS; ++n) {
         add(interrupt_names[n], figures.interrupt[n]);
     }
@@ -63,6 +67,11 @@ std::vector<std::pair<std::string, double>> figure_values(const figures_t &figur
     values.emplace_back("latency_cycles", double(figures.latency_most));
     values.emplace_back("stack_bytes", double(figures.stack_most));
     values.emplace_back("resets", double(figures.resets));
+    values.emplace_back("refused", double(figures.refused));
+    if (figures.bus_frames > 0) {
+        values.emplace_back("bus_frames", double(figures.bus_frames));
+        values.emplace_back("bus_idle", double(figures.bus_idle));
+    }
     values.emplace_back("identical", double(figures.identical));
     return values;
 }
@@ -74,6 +83,9 @@ std::string figure_table(const figures_t &figures)
         "                                  least    mean   most       low typical    high   most\n";
     for (int n = 0; n < FIGURE_MODES; ++n) {
         text += row(std::string("control, ") + mode_names[n], figures.mode[n]);
+    }
+    for (int n = 0; n < FIGURE_EVENTS; ++n) {
+        text += row(std::string("  of these, ") + event_names[n], figures.event[n]);
     }
     for (int n = 0; n < FIGURE_INTERRUPTS; ++n) {
         text += row(interrupt_names[n], figures.interrupt[n]);
@@ -91,7 +103,15 @@ std::string figure_table(const figures_t &figures)
         "interrupts\n",
         percent, static_cast<unsigned long long>(figures.latency_most), load, 1e-6 * double(figures.clock_Hz),
         figures.stack_most, figures.resets, static_cast<unsigned long long>(figures.identical));
-    return text + line;
+    text += line;
+    if (figures.bus_frames > 0) {
+        std::snprintf(line, sizeof line, "bus: %llu frames of others, %.0f a second; found idle %llu times\n",
+                      static_cast<unsigned long long>(figures.bus_frames),
+                      double(figures.bus_frames) / figures.simulated_s,
+                      static_cast<unsigned long long>(figures.bus_idle));
+        text += line;
+    }
+    return text;
 }
 
 std::string figure_json(const figures_t &figures)

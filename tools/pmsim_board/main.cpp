@@ -4,6 +4,7 @@
 #include <exception>
 #include <fstream>
 #include <iostream>
+#include <map>
 
 #include <CLI/CLI.hpp>
 
@@ -22,7 +23,10 @@ using namespace pmsim;
 struct BoardOptions {
     std::string image, figures, last;
     std::vector<std::string> limits;
+    bus_noise_kind_t load = BUS_QUIET;
     double console_s = 0.0;
+    int gdb_port = -1;
+    bool busy = false;
 };
 
 // NAME=MOST: a line like those of the expectations. Returns whether it holds.
@@ -55,7 +59,7 @@ bool check_limit(const std::string &limit, const figures_t &figures)
     throw InputError("--limit " + limit + ": no such figure in this run; there are:" + known);
 }
 
-int run(const RunOptions &options, const BoardOptions &board, NodeOptions node)
+int run(RunOptions options, const BoardOptions &board, NodeOptions node)
 {
     if (board.console_s > 0.0) {
         return board_show_console(board.image.c_str(), board.console_s,
@@ -65,13 +69,18 @@ int run(const RunOptions &options, const BoardOptions &board, NodeOptions node)
         throw InputError("a scenario is wanted, or --console SECONDS");
     }
     rig_board_image(board.image.c_str(), !node.can.empty());
-    if (!node.can.empty()) {
-        node.scenario = options.scenario;
-        node.settings = options.settings;
-        node.quiet = options.quiet;
-        return run_node(node);
+    rig_board_bus_load(board.load);
+    if (board.busy) {
+        rig_board_busy();
     }
-    int code = run_and_report(options);
+    if (board.gdb_port >= 0) {
+        rig_board_gdb(static_cast<uint16_t>(board.gdb_port));
+        options.jobs = 1;
+    }
+    node.scenario = options.scenario;
+    node.settings = options.settings;
+    node.quiet = options.quiet;
+    int code = node.can.empty() ? run_and_report(options) : run_node(node);
     const figures_t figures = all_figures();
     if (!options.quiet && !options.json) {
         std::cout << figure_table(figures);
@@ -107,6 +116,20 @@ int main(int argc, char **argv)
         "no scenario: run the image for so many seconds and print what its UART says; exit 1 when a line "
         "begins with FAIL");
     app.add_option("--until", board.last, "with --console: end at a line that begins with this");
+    app.add_option("--gdb", board.gdb_port,
+                   "wait for gdb on this port of this machine (0: a free one) before the first instruction; "
+                   "time stands while it has stopped the processor")
+        ->check(CLI::Range(0, 65535))
+        ->excludes("--console");
+    add_node_options(app, node);
+    app.add_option("--bus-load", board.load,
+                   "other nodes that fill the bus, at 1 Mbit/s: babble (shortest frames) or garbage (any)")
+        ->transform(CLI::CheckedTransformer(
+            std::map<std::string, bus_noise_kind_t>{{"babble", BUS_BABBLE}, {"garbage", BUS_GARBAGE}}));
+    app.add_flag(
+        "--busy", board.busy,
+        "beside the scenario, the bus keeps the image busy: a trace of four signals in every period, "
+        "armed again and again, and a parameter written now and then");
     app.add_option("--figures", board.figures,
                    "write instructions, cycles, stack and load to this file (JSON)");
     app.add_option("--limit", board.limits,
@@ -119,8 +142,11 @@ int main(int argc, char **argv)
         "bit for\n"
         "bit, with the same code on the host.\n"
         "Exit code: 0 all pass, 1 an expectation or a limit fails, 2 bad input or the image has failed.\n\n"
-        "Example:\n"
-        "  pmsim board out/build/stm32g431/pmdrive.elf tests/scenario/demo.yaml --out out/board");
+        "With --can it is a live node, as `pmsim node`; commands then come over the bus alone, and the "
+        "figures at its end.\n\n"
+        "Examples:\n"
+        "  pmsim board out/build/stm32g431/pmdrive.elf tests/scenario/demo.yaml --out out/board\n"
+        "  pmsim board out/build/stm32g431/pmdrive.elf tests/scenario/node.yaml --can vcan0");
     try {
         app.parse(argc, argv);
         return run(options, board, node);

@@ -1,5 +1,6 @@
 #include "tools/pmsim_board/rig_board.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,6 +9,9 @@
 #include "firmware/params/store.h"
 #include "sim_plant/board/board.h"
 #include "tools/pmsim/rig_sample.h"
+#include "tools/pmsim_board/bus_load.h"
+#include "tools/pmsim_board/gdb_server.h"
+#include "tools/pmsim_board/load.h"
 #include "tools/pmsim_board/master.h"
 #include "tools/pmsim_board/watch.h"
 
@@ -22,11 +26,17 @@ struct rig {
     rig_scale_t scale;
     drive_command_t sent;
     master_t master;
+    load_t load;
+    hal_can_state_t bus; /* as it was told last */
     uint32_t since_sent;
+    bus_load_t others;
+    gdb_server_t *gdb; /* NULL: none */
 };
 
 static const char *image_path;
-static bool live;
+static bool live, busy;
+static int gdb_port = -1;
+static bus_noise_kind_t noise;
 
 void rig_board_image(const char *elf_path, bool commands_by_bus)
 {
@@ -34,11 +44,27 @@ void rig_board_image(const char *elf_path, bool commands_by_bus)
     live = commands_by_bus;
 }
 
+void rig_board_bus_load(bus_noise_kind_t kind)
+{
+    noise = kind;
+}
+
+void rig_board_busy(void)
+{
+    busy = true;
+}
+
+void rig_board_gdb(uint16_t port)
+{
+    gdb_port = port;
+}
+
 static bool boot(rig_t *rig, const drive_params_t *params)
 {
     uint32_t words[STORE_WORDS];
+    /* refused ones too: the image has to refuse them itself */
     const uint32_t used =
-        app_page(params, 1, words); /* refused ones too: the image has to refuse them itself */
+        noise == BUS_QUIET ? app_page(params, 1, words) : bus_load_page(params, 1000, words);
     board_program(rig->board, STORE_ADDRESS, words, used * sizeof words[0]);
     return board_boot(rig->board, BOOT_S);
 }
@@ -68,6 +94,14 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         rig_destroy(rig);
         return NULL;
     }
+    if (gdb_port >= 0) {
+        rig->gdb = gdb_server_attach(board_cpu(rig->board), (uint16_t)gdb_port);
+        if (rig->gdb == NULL) {
+            snprintf(error, error_size, "no gdb on port %d: %s", gdb_port, strerror(errno));
+            rig_destroy(rig);
+            return NULL;
+        }
+    }
     if (!boot(rig, params)) {
         snprintf(error, error_size, "%s: %s", image_path, board_error(rig->board));
         rig_destroy(rig);
@@ -79,9 +113,11 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         rig_destroy(rig);
         return NULL;
     }
+    rig->others = bus_load(noise);
     if (!live) {
         rig->master = master_make(rig->board, params);
         master_start(&rig->master);
+        rig->load = load_make(rig->board, params);
     }
     return rig;
 }
@@ -89,7 +125,11 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
 void rig_destroy(rig_t *rig)
 {
     if (rig->board != NULL) {
+        rig->watch.figures.bus_frames = rig->others.frames;
+        rig->watch.figures.bus_idle = rig->others.idle;
+        rig->watch.figures.refused = rig->load.refused;
         watch_end(&rig->watch);
+        gdb_server_detach(rig->gdb);
         board_destroy(rig->board);
     }
     plant_destroy(rig->plant);
@@ -165,14 +205,18 @@ bool rig_receive(rig_t *rig, hal_can_frame_t *frame)
 
 void rig_set_can_state(rig_t *rig, hal_can_state_t state)
 {
-    board_can_error(rig->board, state == HAL_CAN_BUS_OFF);
+    if (state != rig->bus && state != HAL_CAN_ACTIVE) { /* which it becomes by itself, frame by frame */
+        board_can_error(rig->board, state == HAL_CAN_BUS_OFF);
+    }
+    rig->bus = state;
 }
 
-/* Nobody reads them in a scenario: the status is read from the memory, where it is complete. */
-static void drop_frames(rig_t *rig)
+/* Hardly any is read in a scenario: the status is read from the memory, where it is complete. */
+static void take_frames(rig_t *rig)
 {
-    hal_can_frame_t frame;
-    while (rig_receive(rig, &frame)) {
+    board_frame_t frame;
+    while (board_can_receive(rig->board, &frame)) {
+        load_take(&rig->load, &frame);
     }
 }
 
@@ -182,12 +226,19 @@ void rig_step(rig_t *rig, rig_sample_t *sample)
     if (!live && ++rig->since_sent >= REPEAT_PERIODS) {
         send(rig);
     }
+    bus_load_fill(&rig->others, rig->board);
+    if (busy && !live) {
+        load_step(&rig->load);
+    }
+    if (rig->gdb != NULL) {
+        gdb_server_poll(rig->gdb);
+    }
     if (!board_run_period(rig->board)) {
         fprintf(stderr, "pmsim board: %s at %.6f s\n", board_error(rig->board), sample->truth.t_s);
         exit(2);
     }
     if (!live) {
-        drop_frames(rig);
+        take_frames(rig);
     }
     rig->watch.figures.simulated_s += board_period_s(rig->board);
     rig_fill_sample(&rig->scale, &rig->watch.image->drive, &rig->watch.image->out, sample);

@@ -7,6 +7,9 @@
 #define PMSIM_BOARD_RIG_BOARD_H
 
 #include <stdbool.h>
+#include <stdint.h>
+
+#include "tools/pmsim_board/bus_noise.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -15,6 +18,15 @@ extern "C" {
 /* For all rigs that are created after it. commands_by_bus: rig_command() says nothing, a master is on the
  * bus. */
 void rig_board_image(const char *elf_path, bool commands_by_bus);
+
+/* Each of them waits for gdb on that port before its first instruction; 0: on a free one. */
+void rig_board_gdb(uint16_t port);
+
+/* Others keep the bus busy, at 1 Mbit/s (bus_noise.h). */
+void rig_board_bus_load(bus_noise_kind_t kind);
+
+/* Beside the scenario, requests to the image keep it busy (load.h). */
+void rig_board_busy(void);
 
 #ifdef __cplusplus
 }

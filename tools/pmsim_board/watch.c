@@ -17,11 +17,14 @@ static int mode_of(const drive_t *drive)
     case STAGE_IDENTIFY:
         return FIGURE_IDENTIFY;
     case STAGE_OPEN_LOOP:
-        return FIGURE_OPEN_LOOP;
+        return drive->state == DRIVE_FINDING ? FIGURE_ALIGN : FIGURE_OPEN_LOOP;
     case STAGE_VECTOR:
         break;
     }
-    return drive->position.inject ? FIGURE_INJECTION : FIGURE_FLUX;
+    if (drive->position.inject) {
+        return drive->position.weight > 0 ? FIGURE_BLEND : FIGURE_INJECTION;
+    }
+    return drive->field_weakening.i_d < 0 ? FIGURE_WEAKENING : FIGURE_FLUX;
 }
 
 static int interrupt_of(int exception)
@@ -55,9 +58,16 @@ static void count(watch_t *watch, int interrupt, int exception)
 {
     const cpu_exception_stats_t *now = cpu_exception_stats(board_cpu(watch->board), exception);
     cpu_exception_stats_t *before = &watch->counted[interrupt];
-    add(&watch->figures.interrupt[interrupt], before, now);
+    figures_t *figures = &watch->figures;
+    add(&figures->interrupt[interrupt], before, now);
     if (interrupt == FIGURE_CONTROL) {
-        add(&watch->figures.mode[mode_of(&watch->before)], before, now);
+        add(&figures->mode[watch->mode], before, now);
+        for (int n = 0; n < FIGURE_EVENTS; n++) {
+            if (watch->event[n]) {
+                add(&figures->event[n], before, now);
+            }
+            watch->event[n] = false;
+        }
     }
     *before = *now;
 }
@@ -79,16 +89,46 @@ static bool same(const void *first, const void *second, size_t size)
     return memcmp(first, second, size) == 0;
 }
 
+/* The limits' flags stay until the slow interrupt; this period's own are seen when they are taken away
+ * before. */
+static void step(watch_t *watch, drive_out_t *out)
+{
+    drive_t *drive = &watch->before;
+    const bool current = drive->current.limited;
+    const bool modulator = drive->modulator.limited;
+    const bool fault = drive->fault != DRIVE_FAULT_NONE;
+    watch->mode = mode_of(drive);
+    drive->current.limited = false;
+    drive->modulator.limited = false;
+    drive_step(drive, &watch->image->in, out);
+    watch->event[FIGURE_LIMITED] = drive->current.limited || drive->modulator.limited;
+    watch->event[FIGURE_FAULT] = !fault && drive->fault != DRIVE_FAULT_NONE;
+    drive->current.limited = drive->current.limited || current;
+    drive->modulator.limited = drive->modulator.limited || modulator;
+}
+
+/* The set of parameters that the image has taken, if it has, is taken from it. */
+static void step_slow(watch_t *watch)
+{
+    drive_t *drive = &watch->before;
+    const drive_config_t *now = &watch->image->drive.config;
+    if (!same(&drive->config, now, sizeof *now)) {
+        drive_reconfigure(drive, now);
+        watch->event[FIGURE_SWAP] = true;
+    }
+    const drive_slow_in_t in = {.temperature_dC = watch->image->slow.temperature_dC};
+    drive_slow(drive, &in);
+}
+
 /* The same step on the host, from the same memory. */
 static void compare(watch_t *watch, int interrupt)
 {
     drive_t *drive = &watch->before;
     drive_out_t out = watch->image->out;
     if (interrupt == FIGURE_CONTROL) {
-        drive_step(drive, &watch->image->in, &out);
+        step(watch, &out);
     } else {
-        const drive_slow_in_t in = {.temperature_dC = watch->image->slow.temperature_dC};
-        drive_slow(drive, &in);
+        step_slow(watch);
     }
     if (!same(drive, &watch->image->drive, sizeof *drive) || !same(&out, &watch->image->out, sizeof out)) {
         cpu_fail(board_cpu(watch->board),
@@ -111,10 +151,11 @@ static void trace(void *owner, int exception, bool entry)
         watch->before = watch->image->drive;
         watch->entered = interrupt;
     } else if (!entry) {
-        count(watch, interrupt, exception);
+        watch->mode = mode_of(&watch->before);
         if (compared && watch->entered == interrupt) { /* not one that had begun before the watch */
             compare(watch, interrupt);
         }
+        count(watch, interrupt, exception);
     } else {
         /* nothing to keep */
     }

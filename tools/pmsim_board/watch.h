@@ -28,6 +28,8 @@ typedef struct {
     const watched_t *image;                           /* in the processor's memory */
     drive_t before;                                   /* at the entry of the interrupt that runs, */
     int entered;                                      /* which is this one; -1: none seen yet */
+    int mode;                                         /* of the control interrupt that ends, */
+    bool event[FIGURE_EVENTS];                        /* and what happened in it */
     cpu_exception_stats_t counted[FIGURE_INTERRUPTS]; /* up to the last return */
     figures_t figures;
 } watch_t;

@@ -46,10 +46,11 @@ static void write_legs(drive_t *drive, pm_ab_t v, drive_out_t *out)
     const modulator_config_t *m = &drive->config.modulator;
     const pm_abc_t u = pm_clarke_inverse(v);
     const pm_q_t leg[DRIVE_LEGS] = {u.a, u.b, u.c};
-    const int32_t per_volt =
-        pm_shl(pm_counts_per_unit(m->per_unit, pm_max(drive->status.v_dc, V_DC_LEAST)), 7);
+    const int32_t per_volt = pm_per_volt(pm_max(drive->status.v_dc, V_DC_LEAST));
+    const int32_t parts = pm_shl(m->counts, 39 - 31); /* PART, and a share in Q31 */
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-        const int32_t wanted = m->counts * (PART / 2) + pm_mulh(leg[x], per_volt) + self->rest[x];
+        const int32_t share = pm_shl(pm_sat(pm_mulh(leg[x], per_volt), PM_SHARE_BITS), 31 - PM_SHARE_BITS);
+        const int32_t wanted = m->counts * (PART / 2) + pm_mulh(share, parts) + self->rest[x];
         const int32_t on = pm_clamp(wanted, 0, m->counts * PART) / PART;
         self->rest[x] = (uint8_t)pm_clamp(wanted - on * PART, 0, PART);
         out->compare[x][0] = (uint16_t)on;

@@ -82,7 +82,7 @@ class Flash(unittest.TestCase):
         page.write_bytes(b"\0" * 2048)
         code, text = self.run_flash("--dry-run", "--gpio", "0,11,25,24", "--parameters", page)
         self.assertEqual(code, 0, text)
-        for words in ("linuxgpiod", "swclk\\ 11", "swdio\\ 25", "srst\\ 24", "0x0801F000"):
+        for words in ("linuxgpiod", "swclk 11", "swdio 25", "srst 24", "0x0801F000"):
             self.assertIn(words, text)
 
 

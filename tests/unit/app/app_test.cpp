@@ -1,6 +1,8 @@
 // The application on the simulated board: what stands between the user and a bridge that is on.
 #include "tests/unit/app/bench.h"
 
+#include <cmath>
+
 using app_test::Bench;
 using app_test::defaults;
 
@@ -75,17 +77,17 @@ TEST(App, StoresToThePageThatIsOlder)
     }
 }
 
-// Power lost at every word of the writing: the parameters before still hold.
+// Power lost at every byte of the writing: the parameters before still hold.
 TEST(App, PowerLostInMidWriteKeepsTheOldParameters)
 {
     const drive_params_t old = defaults();
     drive_params_t wanted = old;
     wanted.i_max = 1234;
-    const uint32_t words = 4 + 2 * DRIVE_PARAM_COUNT + 2;
-    for (uint32_t cut = 0; cut < words; ++cut) {
+    const uint32_t bytes = 4 * (4 + 2 * DRIVE_PARAM_COUNT + 2);
+    for (uint32_t cut = 0; cut < bytes; ++cut) {
         Bench x;
         ASSERT_TRUE(app_save(&x.loop.hal, &old));
-        x.loop.hal.store_words_left = cut;
+        x.loop.hal.store_bytes_left = cut;
         EXPECT_FALSE(app_save(&x.loop.hal, &wanted)) << cut;
         drive_params_t back;
         uint32_t unknown;
@@ -166,13 +168,80 @@ TEST(App, BreakInputAndItsClearing)
     EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
 }
 
+plant_break_t comparators(double level_A)
+{
+    plant_break_t levels{};
+    for (int leg = 0; leg < 3; ++leg) {
+        levels.above_A[leg] = level_A;
+        levels.below_A[leg] = level_A;
+    }
+    return levels;
+}
+
+// Between two runs of the firmware: what it learns afterwards has happened already.
+TEST(App, OverCurrentComparatorsSwitchTheBridgeOffBeforeTheFirmwareKnows)
+{
+    const double level_A = 3.0; // the firmware's own limit is 9 A
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_enabled_ms(600);
+    const plant_break_t levels = comparators(level_A);
+    plant_set_break(x.plant(), &levels);
+    plant_set_load(x.plant(), 4.0); // rated: more current than that
+    double largest_A = 0.0, step_A = 0.0;
+    plant_truth_t t, before{};
+    for (int period = 0; period < 3000 && x.fault() == DRIVE_FAULT_NONE; ++period) {
+        plant_truth(x.plant(), &t);
+        sim_loop_step(&x.loop);
+        before = t;
+        plant_truth(x.plant(), &t);
+        for (int leg = 0; leg < 3; ++leg) {
+            largest_A = std::max(largest_A, std::fabs(t.i_A[leg]));
+            step_A = std::max(step_A, std::fabs(t.i_A[leg] - before.i_A[leg]));
+        }
+    }
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_HARDWARE);
+    EXPECT_FALSE(x.loop.hal.armed);
+    EXPECT_LE(largest_A, level_A * (1.0 + 1e-3)); // not a period's change further
+    EXPECT_GT(largest_A, level_A - step_A);
+    x.run_ms(20);
+    plant_truth(x.plant(), &t);
+    EXPECT_EQ(t.i_A[0], 0.0);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_HARDWARE);
+    plant_set_load(x.plant(), 0.0);
+    x.send(false, true);
+    x.run_ms(2);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+}
+
+TEST(App, ComparatorsThatNothingReachesChangeNothing)
+{
+    Bench with, without;
+    const drive_params_t params = defaults();
+    const plant_break_t levels = comparators(9.9);
+    for (Bench *x : {&with, &without}) {
+        x->boot(&params);
+        plant_set_break(x->plant(), x == &with ? &levels : nullptr);
+        x->run_enabled_ms(600);
+        EXPECT_EQ(x->fault(), DRIVE_FAULT_NONE);
+    }
+    plant_truth_t a, b;
+    plant_truth(with.plant(), &a);
+    plant_truth(without.plant(), &b);
+    EXPECT_NEAR(a.omega_mech_rad_s, b.omega_mech_rad_s, 1e-3);
+}
+
 // A rig that commands the drive itself is not overruled by a bus on which nobody speaks.
 TEST(App, WithoutAMasterTheDriveIsLeftAlone)
 {
     Bench x;
     const drive_params_t params = defaults();
     x.boot(&params);
-    const drive_command_t command = {true, DRIVE_MODE_SPEED, 30000, 0, 0, 0, false};
+    drive_command_t command = {};
+    command.enable = true;
+    command.mode = DRIVE_MODE_SPEED;
+    command.speed_mrad_s = 30000;
     drive_command(&x.loop.app.drive, &command);
     x.run_ms(700);
     EXPECT_EQ(std::memcmp(&x.loop.app.drive.command, &command, sizeof command), 0);

@@ -189,6 +189,19 @@ inline drive_params_t defaults()
     return params;
 }
 
+// A drive that runs at 30 rad/s, held by its RPDO
+class Running : public Bench
+{
+  public:
+    Running()
+    {
+        const drive_params_t params = defaults();
+        boot(&params);
+        run_enabled_ms(700);
+        EXPECT_EQ(loop.app.drive.state, DRIVE_RUNNING);
+    }
+};
+
 } // namespace app_test
 
 #endif

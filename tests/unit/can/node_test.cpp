@@ -188,6 +188,53 @@ TEST(Heartbeat, OfItsOwnIdIsACollision)
     EXPECT_TRUE(x.alarms.empty());
 }
 
+// Heartbeat or boot-up, and an answer of an SDO server
+TEST(Namesake, KeepsTheNodeOutOfOperational)
+{
+    const std::vector<std::pair<uint16_t, Bytes>> signs = {
+        {0x709, {5}}, {0x709, {0}}, {0x589, {0x4B, 0x41, 0x60, 0, 0, 0, 0, 0}}};
+    for (const auto &[id, data] : signs) {
+        Bench x(9);
+        x.give(id, data);
+        x.run_ms(1);
+        EXPECT_EQ(x.value(0x1003, 1), 0x8150U) << id;
+        EXPECT_EQ(x.value(0x1001), 0x11U);
+        x.nmt(1);
+        EXPECT_EQ(node_nmt(&x.node), NODE_PRE_OPERATIONAL);
+        x.nmt(130);
+        EXPECT_EQ(x.value(0x1001), 0U);
+        x.nmt(1);
+        EXPECT_EQ(node_nmt(&x.node), NODE_OPERATIONAL);
+        x.give(id, data); // it is still there
+        EXPECT_EQ(node_nmt(&x.node), NODE_PRE_OPERATIONAL);
+    }
+}
+
+TEST(Namesake, DoesNotStopWhatRuns)
+{
+    Bench x(9);
+    x.operational();
+    x.on = true;
+    x.give(0x709, {5});
+    EXPECT_EQ(node_nmt(&x.node), NODE_OPERATIONAL);
+    EXPECT_TRUE(x.alarms.empty());
+    x.on = false;
+    x.give(0x709, {5});
+    EXPECT_EQ(node_nmt(&x.node), NODE_PRE_OPERATIONAL);
+}
+
+TEST(Namesake, IsNobodyElse)
+{
+    Bench x(9);
+    x.give(0x708, {5});
+    x.give(0x588, Bytes(8, 0));
+    x.give(0x709, {5, 0}); // no heartbeat
+    x.give(0x589, {0x60});
+    x.give(0x609, {0x40, 0, 0x10, 0, 0, 0, 0, 0}); // a request to this node
+    EXPECT_EQ(x.take(0x589).size(), 1U);
+    EXPECT_EQ(x.value(0x1001), 0U);
+}
+
 TEST(Emcy, TellsErrorsAndTheirEnd)
 {
     Bench x;
@@ -207,6 +254,32 @@ TEST(Emcy, TellsErrorsAndTheirEnd)
     EXPECT_EQ(x.value(0x1003, 0), 2U);
     EXPECT_EQ(x.value(0x1003, 1), 0x8110U);
     EXPECT_EQ(x.value(0x1003, 2), 0x33442310U);
+}
+
+// More at once than wait: some are lost, but not what is there in the end.
+TEST(Emcy, TheLastWordIsTrue)
+{
+    for (const uint16_t last : {uint16_t(0), uint16_t(0x8120)}) {
+        Bench x;
+        for (int n = 0; n < 20; ++n) {
+            node_error(&x.node, NODE_ERROR_BUS, 0x8120, 0);
+            node_error(&x.node, NODE_ERROR_BUS, 0, 0);
+        }
+        node_error(&x.node, NODE_ERROR_APPLICATION, 0x2310, 0);
+        node_error(&x.node, NODE_ERROR_BUS, last, 0);
+        x.run_ms(200);
+        std::map<uint32_t, int> told; // by code, and the last of the bus's
+        uint32_t of_bus = 0, error_register = 0;
+        for (const node_frame_t &frame : x.take(0x81)) {
+            const uint32_t code = can::le(frame.data, 2);
+            told[code]++;
+            of_bus = code == 0x2310 ? of_bus : code;
+            error_register = frame.data[2];
+        }
+        EXPECT_EQ(told[0x2310], 1);
+        EXPECT_EQ(of_bus, last);
+        EXPECT_EQ(error_register, x.value(0x1001));
+    }
 }
 
 TEST(Emcy, RegisterSaysTheClass)
@@ -400,7 +473,8 @@ class Lss : public Bench
 
     uint32_t identity(uint8_t n)
     {
-        return can::entry(0x1018, n)->kind == OD_NODE ? 0x12345678 : uint32_t(can::entry(0x1018, n)->preset);
+        return can::entry(0x1018, n)->kind == OD_NODE ? 0x12345678
+                                                      : uint32_t(od_values_of(can::entry(0x1018, n))->preset);
     }
 };
 

@@ -32,7 +32,6 @@ modulator_config_t plain(int counts = kCounts)
 {
     modulator_config_t c = {};
     c.counts = counts;
-    c.per_unit = pm_counts_make(static_cast<uint32_t>(counts));
     return c;
 }
 
@@ -42,7 +41,7 @@ constexpr double kDead = 0.02, kDrop = 1.0 / 450, kZone = 0.003;
 modulator_config_t compensating(int counts = kCounts)
 {
     modulator_config_t c = plain(counts);
-    c.dead_counts = static_cast<int32_t>(std::lround(kDead * counts));
+    c.dead = fixed(kDead, PM_SHARE_BITS);
     c.drop = fixed(kDrop, 28);
     c.zone_alpha = fixed(1 / kZone, PM_ZONE_BITS + 6); // 2^PM_ZONE_BITS at the edge: zone/4 2^28 gain 2^-32
     c.zone_beta = fixed(std::sqrt(0.75) / kZone, PM_ZONE_BITS + 6);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <map>
 #include <string>
 #include <vector>
@@ -164,7 +165,7 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
     const double full = Ldq / Lq, half = -0.0378;
     const double per_period = 2.0 / 3 * 300 * T, exact = 4 * L_d / per_period;
     return {
-        {"dead_counts", c.modulator.dead_counts, 0, 2e-6 * 10e3 * 8500},
+        {"dead", c.modulator.dead, 20, 2e-6 * 10e3},
         {"drop", c.modulator.drop, 28, 1 / V},
         {"zone_alpha", c.modulator.zone_alpha, 20, I / 0.03},
         {"zone_beta", c.modulator.zone_beta, 20, std::sqrt(0.75) * I / 0.03},
@@ -233,6 +234,42 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
         {"omega_max", c.omega_max, 28, 150 * P / W},
         {"v_linear", c.v_linear, 31, 0.98 / std::sqrt(3.0)},
     };
+}
+
+TEST(Config, EmfObserversAreMadeFromTheSameMachine)
+{
+    for (const observer_id_t id : {OBSERVER_extended_emf, OBSERVER_extended_emf_ab}) {
+        const drive_config_t c = configure(changed({{DRIVE_PARAM_observer, id}}));
+        ASSERT_EQ(c.position.observer.id, id);
+        const emf_config_t &e = c.position.observer.extended_emf;
+        const active_flux_config_t flux = configure(changed({})).position.observer.active_flux;
+        EXPECT_EQ(std::memcmp(&e.model, &flux.model, sizeof e.model), 0);
+        const double T = 1e-4, W = 540, w = 2 * kPi * 300 * T, k = w / (1 + w);
+        EXPECT_NEAR(e.k_filter, std::ldexp(k, 32), 16);
+        EXPECT_NEAR(e.lag, std::ldexp((2 - k) / k, 26), 16);
+        EXPECT_NEAR(e.rate, std::ldexp(1 / (T * W), 20), 1);
+        EXPECT_NEAR(e.slow_rate, std::ldexp(1 / (1e-3 * W), 26), 1);
+        EXPECT_NEAR(e.slow_step, std::ldexp(1e-3 * W, 28), 1);
+        EXPECT_NEAR(e.speed_lag, std::ldexp(1.8 / (2 * kPi * 25 * 1e-3), 26), 16);
+        EXPECT_NEAR(e.omega_min, std::ldexp(10.5 * 3 / W, 28), 1);
+        EXPECT_NEAR(e.omega_tied, std::ldexp(300 / W, 28), 1);
+        EXPECT_NEAR(e.resistance.k, std::ldexp(1 / (8 * 0.4 * 0.4), 26), 16);
+    }
+}
+
+TEST(Config, AnObserverForRoundMachinesRefusesSaliency)
+{
+    drive_config_t c;
+    const drive_params_t params = changed({{DRIVE_PARAM_observer, OBSERVER_back_emf}});
+    const drive_result_t result = drive_configure(&c, &params);
+    EXPECT_FALSE(result.ok);
+    EXPECT_EQ(result.param, DRIVE_PARAM_observer);
+}
+
+TEST(Config, TheParameterNamesEveryObserverOfTheList)
+{
+    EXPECT_EQ(drive_param_table[DRIVE_PARAM_observer].min, 0);
+    EXPECT_EQ(drive_param_table[DRIVE_PARAM_observer].max, OBSERVER_COUNT - 1);
 }
 
 TEST(Config, IsTheFormulasForIpm1000)

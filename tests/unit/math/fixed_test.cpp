@@ -184,13 +184,41 @@ TEST(MathFixed, ZoneIsLinearToItsEdgesAndFlatBeyond)
 {
     const double edge = 1 << PM_ZONE_BITS;
     Random random;
-    for (const double height : {0.0, 0.3, 85.0, 8191.0}) {
-        const auto h = static_cast<int32_t>(std::lround(std::ldexp(height, 32 - PM_ZONE_BITS)));
+    for (const double height : {0.0, 0.3, 85.0, 8191.0, 262143.0}) {
+        const auto h = static_cast<int32_t>(std::lround(std::ldexp(height, PM_HEIGHT_BITS)));
         for (int n = 0; n < 20000; ++n) {
-            const int32_t x = random.word() >> (n % 24);
-            const double expected = height * std::clamp(x / edge, -1.0, 1 - 1 / edge);
+            const int32_t x = random.word() >> (6 + n % 18); // below 2^26
+            const double expected =
+                height * std::clamp(x / edge, -1.0, 1 - std::ldexp(1 / edge, -PM_ZONE_LIFT));
             ASSERT_NEAR(pm_zone_add(1000, x, h) - 1000, expected, 0.501) << x;
             ASSERT_NEAR(pm_zone_sub(1000, x, h) - 1000, -expected, 0.501) << x;
+        }
+    }
+}
+
+TEST(MathFixed, SaturationOfWhatIsShifted)
+{
+    for (const int32_t x : corners()) {
+        for (const unsigned n : {3U, 19U, 30U}) {
+            const int64_t top = int64_t{1} << n;
+            EXPECT_EQ(pm_shl_sat(x >> 5, 5, n), std::clamp<int64_t>(int64_t{x >> 5} * 32, -top, top - 1))
+                << x;
+            EXPECT_EQ(pm_sat_positive(x, n), std::clamp<int64_t>(x, 0, top - 1)) << x << " to " << n;
+        }
+    }
+}
+
+TEST(MathFixed, ShareOfAWhole)
+{
+    Random random;
+    for (const int32_t whole : {1, 200, 4250, 32767}) {
+        EXPECT_EQ(pm_share_of(INT32_MIN, whole), 0);
+        EXPECT_EQ(pm_share_of(INT32_MAX, whole), whole);
+        EXPECT_EQ(pm_share_of(1 << PM_SHARE_BITS, whole), whole);
+        for (int n = 0; n < 5000; ++n) {
+            const int32_t share = random.word() >> 10; // -2 ... 2
+            const double expected = whole * std::clamp(share * 0x1p-20, 0.0, 1 - 0x1p-20);
+            ASSERT_NEAR(pm_share_of(share, whole), expected, 0.5) << share;
         }
     }
 }

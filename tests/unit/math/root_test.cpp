@@ -21,7 +21,7 @@ constexpr double kDivRelative = 1e-8;
 constexpr double kHalfLsb = 0x1p-29;
 constexpr double kRatioLow = -0x1p-16;
 constexpr double kRatioHigh = 0x1p-15;
-constexpr double kCountsRelative = 0x1p-16; // times v + 1 / v
+constexpr double kPerVolt = 0x1p-16; // times v + 1 / v
 
 constexpr int kCount = 1000000;
 const double kLargest = real(INT32_MAX);
@@ -53,6 +53,18 @@ TEST(MathRoot, SquareRootOfSquares)
     EXPECT_NEAR(pm_sqrt(PM_ONE), PM_ONE, 4);
     EXPECT_NEAR(pm_sqrt(PM_Q(4.0)), PM_Q(2.0), 4);
     EXPECT_NEAR(pm_sqrt(PM_Q(0.25)), PM_Q(0.5), 4);
+}
+
+TEST(MathRoot, WideRootOfASquare)
+{
+    for (int64_t x = 0; x <= INT32_MAX; x += 1021) {
+        const double exact = std::sqrt(static_cast<double>(x) * 0x1p-24);
+        const double actual = pm_sqrt_wide(static_cast<int32_t>(x)) * 0x1p-22;
+        ASSERT_LE(actual, exact * (1 + 1e-8)) << x;
+        ASSERT_GE(actual, exact * (1 - 1e-8) - 0x1p-22) << x;
+    }
+    EXPECT_EQ(pm_sqrt_wide(-1), 0);
+    EXPECT_EQ(pm_sqrt_wide(1), 1 << 10);
 }
 
 double hypot_excess(int32_t x, int32_t y)
@@ -161,20 +173,28 @@ TEST(MathRoot, RatioOfParts)
     EXPECT_EQ(pm_ratio(0, 1), 0);
 }
 
-TEST(MathRoot, CountsPerUnit)
+TEST(MathRoot, PerVolt)
 {
     for (double v = 1 / 16.0; v < 7.999; v *= 1.0007) {
-        for (const int32_t counts : {0, 1, 100, 4250, 32767}) {
-            const double exact = 16 * counts / real(static_cast<pm_q_t>(v * 0x1p28));
-            const double limit = exact * kCountsRelative * (v + 1 / v);
-            const double actual = pm_counts_per_unit(pm_counts_make(static_cast<uint32_t>(counts)),
-                                                     static_cast<pm_q_t>(v * 0x1p28));
-            ASSERT_LE(actual, exact + limit) << v << " " << counts;
-            ASSERT_GE(actual, exact - limit - 1) << v << " " << counts;
-        }
+        const auto x = static_cast<pm_q_t>(v * 0x1p28);
+        const double exact = 0x1p24 / real(x);
+        ASSERT_NEAR(pm_per_volt(x), exact, exact * kPerVolt * (v + 1 / v)) << v;
+        // The voltage itself is all of the period.
+        ASSERT_NEAR(pm_mulh(x, pm_per_volt(x)), 0x1p20, 0x1p20 * kPerVolt * (v + 1 / v) + 0.5) << v;
     }
-    // Half the link voltage is half the counts, to the count.
-    EXPECT_EQ(pm_mulh(PM_Q(0.75), pm_counts_per_unit(pm_counts_make(4000), PM_Q(1.5))), 2000);
+    EXPECT_GT(pm_per_volt(PM_ONE / 16), 0);
+}
+
+TEST(MathRoot, RootTwiceHasTheShapeOfTheRoot)
+{
+    for (double x = 1; x < 0x1p31; x *= 1.003) {
+        const auto whole = static_cast<int32_t>(x);
+        const double exact = 2 * std::sqrt(static_cast<double>(whole));
+        const double actual = pm_root_twice(whole);
+        ASSERT_GE(actual, exact - 1) << whole; // what the shift cuts
+        ASSERT_LE(actual, 1.061 * exact) << whole;
+    }
+    EXPECT_EQ(pm_root_twice(0), 1);
 }
 
 } // namespace

@@ -5,6 +5,7 @@
 
 #include "tests/unit/pmsim/support.h"
 #include "tools/pmsim/loop.h"
+#include "tools/pmsim/names.h"
 #include "tools/pmsim/scenario_file.h"
 
 namespace pmsim
@@ -82,6 +83,24 @@ TEST(ProfileFaults, LostSupplyLetsTheLinkFall)
     EXPECT_NEAR(v_dc_V, 300.0, 1.0);
     bench.until(0.7, look);
     EXPECT_LT(v_dc_V, 200.0);
+}
+
+// By the level of the machine file's inverter, and not without one.
+TEST(ProfileFaults, OverCurrentComparatorsStopTheDrive)
+{
+    for (const char *level : {"0", "3"}) {
+        const Scenario s = scenario("  - {t_s: 0, mode: speed, speed_rel: 0.3, enable: true}\n"
+                                    "  - {t_s: 0.5, load_rel: 1}\n",
+                                    std::string("inverter: {i_break_A: ") + level + "}\n");
+        Loop loop(s);
+        const Sample *last = nullptr;
+        for (int k = 0; k < 7000; ++k) {
+            last = &loop.step();
+        }
+        EXPECT_EQ(fault_names()[size_t(last->rig.fault)], *level == '3' ? "HARDWARE" : "NONE");
+        EXPECT_EQ(last->rig.state == RIG_FAULT, *level == '3');
+        EXPECT_EQ(last->rig.driven, *level == '0');
+    }
 }
 
 TEST(ProfileFaults, OpenWireCarriesNoCurrent)

@@ -448,6 +448,35 @@ TEST(Plant, ParametersDriftFromTheNextPeriodOn)
     EXPECT_NEAR(std::hypot(t.v_mean_alpha_V, t.v_mean_beta_V), 150.0 * 0.2, 1e-3);
 }
 
+// At open terminals the comparators see the EMF of their phase.
+TEST(Plant, CapturesTheZeroCrossingsOfTheEmf)
+{
+    const double theta_0 = 0.3, omega_e = 150.0;
+    plant_config_t config = rig::ipm_1000();
+    config.sensor.capture_s = 1e-7;
+    rig::Plant plant(config, theta_0);
+    plant_set_speed(plant, omega_e / config.machine.pole_pairs);
+    int rising = 0, falling = 0;
+    for (int k = 0; k < 2000; k++) {
+        plant.run(rig::all_off());
+        plant_capture_t edges[8];
+        const int count = plant_captured(plant, edges, 8);
+        ASSERT_LE(count, 8);
+        for (int n = 0; n < count; n++) {
+            const double t = k * plant.period_s() + edges[n].count * config.sensor.capture_s;
+            const double axis = 2.0 * rig::pi / 3.0 * edges[n].leg + (edges[n].rising ? rig::pi : 0.0);
+            if (t > 0.0) { /* they start low */
+                const double late_rad = std::remainder(theta_0 + omega_e * t - axis, 2.0 * rig::pi);
+                ASSERT_NEAR(late_rad, 0.0, 2.0 * omega_e * config.sensor.capture_s) << t;
+                (edges[n].rising ? rising : falling)++;
+            }
+        }
+    }
+    const double turns = 2000 * plant.period_s() * omega_e / (2.0 * rig::pi);
+    EXPECT_NEAR(rising, 3 * turns, 2.0);
+    EXPECT_NEAR(falling, 3 * turns, 2.0);
+}
+
 TEST(Plant, EqualRunsAreIdentical)
 {
     plant_config_t config = rig::ipm_1000_real();

@@ -1,4 +1,5 @@
 """Someone attends: a time that was given, or the space bar that is held."""
+import os
 import select
 import sys
 import time
@@ -50,7 +51,7 @@ class Held:
         self.saved = termios.tcgetattr(sys.stdin)
         tty.setcbreak(sys.stdin)
         print("hold the space bar: the motor stops when it is released", file=sys.stderr)
-        if not self._pressed(30.0):
+        if self._keys(30.0) != b" ":
             self.__exit__()
             raise NotDone("the space bar was not pressed")
         self.last = time.monotonic()
@@ -62,17 +63,17 @@ class Held:
         termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self.saved)
 
     @staticmethod
-    def _pressed(seconds):
-        """Whether the space bar comes within that time; any other key is a release."""
+    def _keys(seconds):
+        """What has been pressed by then, without repetitions."""
         ready, _, _ = select.select([sys.stdin], [], [], seconds)
-        return bool(ready) and sys.stdin.read(1) == " "
+        return bytes(sorted(set(os.read(sys.stdin.fileno(), 1024)))) if ready else b""
 
     def lasts(self):
-        while self._pressed(0.05):
+        """Any other key ends it at once."""
+        keys = self._keys(0.05)
+        if keys == b" ":
             self.last = time.monotonic()
-            if not select.select([sys.stdin], [], [], 0)[0]:
-                break
-        return time.monotonic() - self.last < HELD_S
+        return keys in (b"", b" ") and time.monotonic() - self.last < HELD_S
 
 
 def attention(seconds):

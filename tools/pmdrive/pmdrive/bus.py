@@ -30,6 +30,7 @@ def arguments(spec, bitrate):
 
 def open_network(spec, bitrate=500000):
     network = canopen.Network()
+    network.NOTIFIER_CYCLE = 0.05  # closing waits for it
     try:
         network.connect(**arguments(spec, bitrate))
     except (can.CanError, OSError, ValueError, ImportError) as error:

@@ -1,10 +1,11 @@
 """The command line. Every command is a call of the Python interface and a way to show what it gives."""
 import argparse
 import json
+import logging
 import os
 import sys
 
-from . import bus, commands
+from . import bus, commands, flash
 from .errors import PmdriveError, UsageError
 
 EXAMPLES = """\
@@ -16,6 +17,7 @@ examples:
   pmdrive identify; pmdrive tune; pmdrive save  from a new motor to one that runs
   pmdrive run speed 300rpm --for 5              never longer than someone attends
   pmdrive trace i_d i_q theta --trigger i_q --level 2A --out start.csv
+  pmdrive --can can0 flash pmdrive.elf          writes the firmware, then looks on the bus whether it runs
 
 CAN interface and node id may also stand in PMDRIVE_CAN and PMDRIVE_NODE. A CAN interface is one of:
   """ + bus.KINDS
@@ -24,7 +26,7 @@ CAN interface and node id may also stand in PMDRIVE_CAN and PMDRIVE_NODE. A CAN 
 def parser():
     top = argparse.ArgumentParser(prog="pmdrive", description="Tunes the sensorless motor drive over CAN.",
                                   epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter)
-    top.add_argument("--can", default=os.environ.get("PMDRIVE_CAN", "can0"), help="CAN interface (%(default)s)")
+    top.add_argument("--can", default=os.environ.get("PMDRIVE_CAN"), help="CAN interface (PMDRIVE_CAN, else can0)")
     top.add_argument("--node", type=int, default=int(os.environ.get("PMDRIVE_NODE", "1")), help="node id (%(default)s)")
     top.add_argument("--bitrate", type=int, default=500000, help="bit/s, where the adapter takes it (%(default)s)")
     top.add_argument("--json", action="store_true", help="answers as JSON, for programs")
@@ -38,6 +40,8 @@ def parser():
     add("scan", "find the nodes on the bus", commands.scan, connects=False)
     sub = add("info", "what the drive is and how it does; with names: what they mean", commands.info, connects=None)
     sub.add_argument("names", nargs="*", help="objects or records")
+    sub = add("list", "the names of objects, with range and meaning", commands.list_names, connects=False)
+    sub.add_argument("names", nargs="*", help="records or parts of names (all)")
     sub = add("get", "read values", commands.get)
     sub.add_argument("names", nargs="+", help="objects or records, by name or index:sub")
     sub = add("set", "write values", commands.set_values)
@@ -92,18 +96,29 @@ def parser():
     sub.add_argument("--edge", default="rising", choices=("rising", "falling", "both"))
     sub.add_argument("--wait", type=float, default=10.0, help="seconds (%(default)s)")
     sub.add_argument("--out", default="trace.csv", help=".csv, .png or .mf4 (%(default)s)")
+    sub = add("flash", "write an image, or a page of parameters, through the debug port", commands.flash_board,
+              connects="given")
+    flash.add_options(sub)
     sub = add("eds", "the data sheet that the drive holds", commands.eds)
     sub.add_argument("--out", help="file (standard output)")
     add("shell", "commands without `pmdrive`, with completion, over one connection", commands.shell)
     sub = add("completion", "print the completion for bash: source <(pmdrive completion)", commands.completion,
               connects=False)
+    sub = add("help", "what a command takes", lambda wanted, *_: helped(top, kinds, wanted.topic), connects=False)
+    sub.add_argument("topic", nargs="?", choices=sorted(kinds.choices), metavar="COMMAND")
     return top
+
+
+def helped(top, kinds, command):
+    (kinds.choices[command] if command else top).print_help()
 
 
 def run(arguments, drive=None, out=None):
     """Carries out parsed arguments; over a drive that is connected already, if one is given."""
     out = out or commands.Output(arguments.json)
-    needs = arguments.connects or (arguments.connects is None and not arguments.names)
+    needs = {"given": bool(arguments.can), None: not getattr(arguments, "names", None)}.get(
+        arguments.connects, arguments.connects)
+    arguments.can = arguments.can or "can0"
     if not needs or drive is not None:
         arguments.function(arguments, drive, out)
         return
@@ -112,8 +127,11 @@ def run(arguments, drive=None, out=None):
 
 
 def main(words=None):
+    words = sys.argv[1:] if words is None else words
+    for library in ("can", "canopen"):  # what they complain of, our own errors say
+        logging.getLogger(library).setLevel(logging.CRITICAL)
     try:
-        arguments = parser().parse_args(words)
+        arguments = parser().parse_args(words or ["help"])
     except ValueError:
         print("pmdrive: PMDRIVE_NODE is not a node id", file=sys.stderr)
         return 2

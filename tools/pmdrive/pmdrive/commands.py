@@ -4,10 +4,10 @@ import sys
 import time
 from pathlib import Path
 
-from . import attend, bus, dictionary, files, identify, motion, names, tune
+from . import attend, bus, dictionary, files, flash, identify, motion, names, tune
 from . import trace as scope
-from .drive import error_text, state_of
-from .errors import NotDone, UsageError
+from .drive import error_text, fault_text, state_of
+from .errors import NoAnswer, NotDone, UsageError
 
 
 class Output:
@@ -43,11 +43,38 @@ def as_json(values):
             for entry, raw in values.items()}
 
 
+def shown(entry, raw):
+    """With what a code means."""
+    if entry.name in ("drive_fault", "fault_record.code"):
+        return f"{raw} ({fault_text(raw)})"
+    if entry.name == "error_code":
+        return f"{raw:04X}h ({error_text(raw) if raw else 'none'})"
+    return entry.text(raw)
+
+
 def show(out, values):
     out.data(as_json(values))
     width = max((len(entry.name) for entry in values), default=0)
     for entry, raw in values.items():
-        out.line(f"{entry.name:{width}s}  {entry.text(raw)}")
+        out.line(f"{entry.name:{width}s}  {shown(entry, raw)}")
+
+
+def list_names(arguments, _, out):
+    parts = [text.lower() for text in arguments.names if text not in names.RECORDS]
+    found = [e for e in dictionary.ENTRIES
+             if not arguments.names or e.record in arguments.names or any(text in e.name.lower() for text in parts)]
+    if not found:
+        raise UsageError(f"no name has `{'` or `'.join(arguments.names)}` in it", "`pmdrive list` shows all names")
+    if out.as_json:
+        describe(found, out)
+        return
+    record = None
+    for e in found:
+        if e.record != record:
+            record = e.record
+            out.line(f"{e.where.split(':')[0]} {record}")
+        limits = f"{e.text(e.least)} to {e.text(e.most)}" if e.least is not None else e.unit
+        out.line(f"  {e.name:28s} {e.access:6s} {limits:32s} {e.help}")
 
 
 def scan(arguments, _, out):
@@ -100,6 +127,21 @@ def set_values(arguments, drive, out):
     for entry, raw in wanted.items():
         drive.write(entry, raw)
     show(out, {entry: drive.read(entry) for entry in wanted})
+    _hint(wanted, drive, out)
+
+
+READY_HINTS = {1: "`pmdrive save`, before it may be switched on",
+               2: "the drive refuses them as they are: `pmdrive get parameter_refused`",
+               3: "the hardware runs with the old ones: `pmdrive save`, then `pmdrive reset`",
+               4: "a batch is open: `pmdrive set parameter_batch=0`"}
+
+
+def _hint(written, drive, out):
+    """What is still to be done before the drive may be switched on with these values."""
+    if any(entry.record in names.DRIVE_RECORDS for entry in written):
+        ready = drive.read("parameters_ready")
+        if ready:
+            out.line(READY_HINTS.get(ready, names.find("parameters_ready").text(ready)))
 
 
 def _write(path, text, out):
@@ -151,6 +193,7 @@ def load(arguments, drive, out):
         raise NotDone("nothing was written")
     drive.load(values, progress=out.progress)
     out.line(f"{len(changes)} values written and read back; `pmdrive save` keeps them over a reset")
+    _hint([entry for entry, _, _ in changes], drive, out)
 
 
 def _take(arguments, drive, out, values, what):
@@ -238,7 +281,7 @@ def faults(arguments, drive, out):
     if found["record"][names.find("fault_record.code")]:
         out.line("when the first fault came:")
         for entry, raw in found["record"].items():
-            out.line(f"  {entry.name.split('.')[-1]:12s} {entry.text(raw)}")
+            out.line(f"  {entry.name.split('.')[-1]:12s} {shown(entry, raw)}")
     for word in found["history"]:
         out.line(f"error {word & 0xFFFF:04X}h  {error_text(word)}")
 
@@ -253,7 +296,7 @@ def monitor(arguments, drive, out):
     while True:
         values = {entry: drive.read(entry) for entry in entries}
         out.data(as_json(values))
-        out.line("  ".join(f"{entry.text(raw):>16s}" for entry, raw in values.items()))
+        out.line("  ".join(f"{shown(entry, raw):>16s}" for entry, raw in values.items()))
         count += 1
         if count == arguments.count:
             return
@@ -272,11 +315,14 @@ def run(arguments, drive, out):
     attention = attend.attention(arguments.seconds)
     with attention, motion.Motion(drive, arguments.mode, **numbers) as running:
         entries = [names.find(name) for name in ("velocity_actual", "i_d", "i_q", "drive_limits")]
+        last = ""
         while attention.lasts():
             running.check_fault()
             values = {e: drive.read(e) for e in entries}
+            last = "  ".join(f"{e.name} {e.text(raw)}" for e, raw in values.items())
             out.data(as_json(values))
-            out.progress("  ".join(f"{e.name} {e.text(raw)}" for e, raw in values.items()))
+            out.progress(last)
+    out.line(last)
     out.line(f"stopped: {drive.state()}")
 
 
@@ -298,6 +344,43 @@ def trace(arguments, drive, out):
     out.line(f"wrote {path}: {len(recording.time_s)} samples of {', '.join(e.name for e in entries)}")
 
 
+def _must_be_off(drive):
+    """A drive that does not answer may be empty: it can be written."""
+    try:
+        if drive.state() in ("operation enabled", "quick stop active"):
+            raise NotDone("the motor runs: nothing was written", "`pmdrive stop`")
+    except NoAnswer:
+        pass
+
+
+def _verify(arguments, drive, out):
+    """Whether the node runs what was written: the data sheet that it holds is in the image as it stands."""
+    drive.await_answer()
+    wanted = ("device_name", "hardware_version", "software_version", "identity.revision", "parameters_ready")
+    values = {names.find(name): drive.read(name) for name in wanted}
+    show(out, values)
+    if arguments.image and drive.read("stored_eds") not in Path(arguments.image).read_bytes():
+        raise NotDone(f"node {drive.node_id} does not run {arguments.image}: its data sheet is another",
+                      "is it the board that was written? `pmdrive scan`")
+    out.line(f"node {drive.node_id} runs it")
+
+
+def flash_board(arguments, drive, out):
+    if drive is not None and not arguments.dry_run:
+        _must_be_off(drive)
+    try:
+        flash.write(arguments, out.line)
+    except flash.FlashError as error:
+        raise (UsageError if error.status == flash.USAGE else NotDone)(error.text, error.do) from None
+    if arguments.dry_run:
+        out.data({"command": flash.command(arguments)})
+    elif drive is not None:
+        _verify(arguments, drive, out)
+    else:
+        out.data({"written": arguments.image or arguments.parameters})
+        out.line("written and verified; with --can, the drive is asked on the bus whether it runs")
+
+
 def eds(arguments, drive, out):
     _write(arguments.out, scope.data_sheet(drive), out)
 
@@ -309,7 +392,6 @@ def shell(arguments, drive, out):
 
 
 def completion(_, __, out):
-    from .shell import WORDS
+    from .completion import script
 
-    objects = [e.name for e in dictionary.ENTRIES] + list(names.RECORDS)
-    out.stream.write(f"complete -o default -W '{' '.join([*WORDS, *objects])}' pmdrive\n")
+    out.stream.write(script())

@@ -31,6 +31,11 @@ def error_text(code):
     return fault.text if fault else dictionary.ERRORS.get(code & 0xFFFF, "unknown error")
 
 
+def fault_text(code):
+    """Of drive_fault."""
+    return dictionary.FAULTS[code - 1].text if 0 < code <= len(dictionary.FAULTS) else "unknown" if code else "none"
+
+
 class Drive:
     """Closes its network. Names may be those of the dictionary or index:sub."""
 
@@ -89,6 +94,9 @@ class Drive:
             culprit = names.BY_PLACE.get(divmod(self.read("parameter_refused"), 256))
             if culprit is None:
                 raise
+            if entry.name == "parameter_batch":
+                raise Refused(f"{culprit.label}, of all together", error.code, culprit.index, culprit.sub,
+                              f"nothing was changed: mend {culprit.name}, or those that it has to fit") from None
             raise Refused(f"{entry.label}, by {culprit.label}", error.code, entry.index, entry.sub) from None
 
     def get(self, name):
@@ -161,8 +169,11 @@ class Drive:
     def reset(self, communication=False, seconds=3.0):
         """Restart of the drive, or of its communication alone; returns when it answers again."""
         self.network.send_message(0, bytes([130 if communication else 129, self.node_id]))
-        end = time.monotonic() + seconds
         time.sleep(0.05)
+        self.await_answer(seconds)
+
+    def await_answer(self, seconds=3.0):
+        end = time.monotonic() + seconds
         while True:
             try:
                 self.read("device_type")

@@ -67,9 +67,9 @@ class ValueRefused(PmdriveError):
 class Refused(PmdriveError):
     """The device has refused, with an abort code."""
 
-    def __init__(self, label, code, index=None, sub=None):
-        meaning, do = ABORTS.get(code, ("abort code that CiA 301 does not know", "report it"))
-        super().__init__(f"{label}: {meaning} ({code >> 16:04X} {code & 0xFFFF:04X}h)", do)
+    def __init__(self, label, code, index=None, sub=None, do=None):
+        meaning, usual = ABORTS.get(code, ("abort code that CiA 301 does not know", "report it"))
+        super().__init__(f"{label}: {meaning} ({code >> 16:04X} {code & 0xFFFF:04X}h)", do or usual)
         self.label, self.code, self.index, self.sub = label, code, index, sub
 
     def as_dict(self):

@@ -7,7 +7,7 @@ import struct
 import time
 
 from . import dictionary
-from .drive import state_of
+from .drive import error_text, state_of
 from .errors import FaultError, NotDone, UsageError
 
 PERIOD_S = 0.1
@@ -74,10 +74,15 @@ class Motion:
         while self.drive.state() != wanted:
             self.check_fault()
             if time.monotonic() > end:
-                ready = self.drive.entry("parameters_ready")
-                raise NotDone(f"the drive does not go to `{wanted}`, it is `{self.drive.state()}`",
-                              f"parameters_ready says: {ready.text(self.drive.read(ready))}")
+                raise NotDone(f"the drive does not go to `{wanted}`, it is `{self.drive.state()}`", self._hindrance())
             time.sleep(0.02)
+
+    def _hindrance(self):
+        """An error of the communication that is there, or what the parameters lack."""
+        if self.drive.read("error_register") and self.drive.read("error_history.count"):
+            return f"the newest error says: {error_text(self.drive.read('error_history.1'))}"
+        ready = self.drive.entry("parameters_ready")
+        return f"parameters_ready says: {ready.text(self.drive.read(ready))}"
 
     def check_fault(self):
         if "fault" in state_of(self.drive.read("statusword")):

@@ -28,15 +28,24 @@ def find(text):
     if text.lower() in folded:
         return BY_NAME[folded[text.lower()]]
     near = difflib.get_close_matches(text.lower(), list(folded), 3, 0.6)
-    do = f"did you mean {' or '.join(folded[x] for x in near)}?" if near else "`pmdrive info` lists all names"
+    do = f"did you mean {' or '.join(folded[x] for x in near)}?" if near else "`pmdrive list` shows all names"
     raise UsageError(f"no object is called `{text}`", do)
+
+
+def _record(text):
+    """Whole record that is meant, by its name or by its index alone."""
+    place = PLACE.fullmatch(text)
+    if place and not place[2]:
+        return next((e.record for e in dictionary.ENTRIES if e.index == int(place[1], 16)), None)
+    return text if text in RECORDS else None
 
 
 def select(texts):
     """Entries by names, places or whole records; none named: all parameters of the drive."""
     out = []
     for text in texts or DRIVE_RECORDS:
-        found = [e for e in RECORDS[text] if not e.name.endswith(".count")] if text in RECORDS else [find(text)]
+        record = _record(text)
+        found = [e for e in RECORDS[record] if not e.name.endswith(".count")] if record else [find(text)]
         out += [entry for entry in found if entry not in out]
     return out
 

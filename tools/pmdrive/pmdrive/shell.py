@@ -3,10 +3,9 @@ import cmd
 import shlex
 
 from . import dictionary, names
+from .completion import commands
 from .errors import PmdriveError
 
-WORDS = ("scan", "info", "get", "set", "dump", "load", "diff", "save", "restore", "reset", "faults", "monitor", "run",
-         "identify", "tune", "stop", "trace", "eds", "shell", "completion")
 OBJECTS = sorted([*(e.name for e in dictionary.ENTRIES), *names.RECORDS])
 
 
@@ -34,16 +33,14 @@ class Shell(cmd.Cmd):
             pass
         return None
 
-    def do_help(self, _):
-        from . import cli
-
-        cli.parser().print_help()
+    def do_help(self, topic):
+        self.default(f"help {topic}")
 
     def emptyline(self):
         pass
 
     def completenames(self, text, *_):
-        return [word for word in WORDS if word.startswith(text)]
+        return [word for word in commands() if word.startswith(text)]
 
     def completedefault(self, text, *_):
         return [name for name in OBJECTS if name.startswith(text)]

@@ -1,5 +1,6 @@
 """The drive's oscilloscope: set up, wait, fetch, write."""
 import csv
+import importlib.util
 import struct
 import time
 from dataclasses import dataclass
@@ -31,10 +32,8 @@ class Recording:
             writer.writerows([f"{t:.9g}", *(f"{c[n]:.9g}" for c in self.columns)] for n, t in enumerate(self.time_s))
 
     def write_png(self, path):
-        try:
-            import matplotlib
-        except ImportError:
-            raise UsageError("a picture needs matplotlib", "pip install 'pmdrive[plot]'") from None
+        import matplotlib
+
         matplotlib.use("Agg")
         from matplotlib import pyplot
         figure, axes = pyplot.subplots(len(self.entries), 1, sharex=True, squeeze=False,
@@ -49,13 +48,10 @@ class Recording:
         figure.savefig(path, dpi=120)
         pyplot.close(figure)
 
-
     def write_mf4(self, path):
-        try:
-            import numpy
-            from asammdf import MDF, Signal
-        except ImportError:
-            raise UsageError("an MDF4 file needs asammdf", "pip install 'pmdrive[mdf]'") from None
+        import numpy
+        from asammdf import MDF, Signal
+
         with MDF(version="4.10") as file:
             time_s = numpy.array(self.time_s)
             file.append([Signal(numpy.array(column), time_s, name=entry.name, unit=entry.unit, comment=entry.help)
@@ -69,9 +65,12 @@ class Recording:
 
 
 def check_path(path):
-    """The end of a file's name, if it can be written."""
-    for end in (".csv", ".png", ".mf4"):
+    """The end of a file's name, if it can be written: known before something is recorded."""
+    for end, package in ((".csv", None), (".png", "matplotlib"), (".mf4", "asammdf")):
         if str(path).endswith(end):
+            if package and importlib.util.find_spec(package) is None:
+                raise UsageError(f"a file of the kind {end} needs {package}",
+                                 f"pip install 'pmdrive[{'plot' if end == '.png' else 'mdf'}]'")
             return end
     raise UsageError(f"`{path}` is neither .csv, .png nor .mf4")
 

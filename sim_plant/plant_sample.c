@@ -1,0 +1,67 @@
+/* What the converters see. */
+#include "sim_plant/config.h"
+#include "sim_plant/plant_state.h"
+
+#include <assert.h>
+#include <math.h>
+#include <string.h>
+
+static bool has_voltage_channels(const plant_t *plant)
+{
+    return plant->config.sensor.v_leg_full_scale_V > 0.0;
+}
+
+/* What the converters see now. Node voltages only where a board measures them: they cost. */
+void plant_look(const plant_t *plant, sensor_input_t *seen)
+{
+    const circuit_t *circuit = &plant->circuit;
+    const gates_t *gates = &plant->gates;
+    *seen = (sensor_input_t){
+        .v_dc_V = circuit->now.x[V_DC],
+        .temperature_degC = plant->winding_degC,
+        .quiet_s = plant->t_s - gates->edge_s,
+        .legs = circuit->bridge.legs,
+        .sets = circuit->machine.winding.sets,
+    };
+    for (int k = 0; k < circuit->bridge.legs; k++) {
+        bool low = circuit->bridge.leg[k] == LEG_LOW || circuit->bridge.leg[k] == LEG_DIODE_LOW;
+        seen->i_A[k] = plant_leg_A(plant, k);
+        seen->low_for_s[k] = low ? circuit->t_s - circuit->low_since_s[k] : -1.0;
+        seen->i_dc_A += circuit->bridge.upper[k] * seen->i_A[k];
+    }
+    if (!has_voltage_channels(plant)) {
+        return;
+    }
+    circuit_nodes_t nodes;
+    circuit_nodes(circuit, &circuit->now, &nodes);
+    for (int n = 0; n < PLANT_LEGS + PLANT_SETS; n++) {
+        double raw_V = n < PLANT_LEGS ? nodes.v_leg_V[n] : nodes.v_neutral_V[n - PLANT_LEGS];
+        double seen_V = probe_active(&circuit->probe) ? probe_voltage(&circuit->probe, n) : raw_V;
+        *(n < PLANT_LEGS ? &seen->v_leg_V[n] : &seen->v_neutral_V[n - PLANT_LEGS]) = seen_V;
+    }
+}
+
+void plant_sample(plant_t *plant, plant_adc_t *adc)
+{
+    assert(!config_sensor_fault(&plant->config.sensor, plant->gates.period_s));
+    if (plant->config.sensor.delay_s >= 0.0) {
+        plant_run_until(plant, fmin(plant->config.sensor.delay_s, plant->gates.period_s));
+        plant_look(plant, &plant->sampled);
+    }
+    sensor_convert(&plant->config.sensor, &plant->noise, &plant->sampled, adc);
+}
+
+void plant_sample_at(plant_t *plant, double after_s, plant_adc_t *adc)
+{
+    plant_move(plant, after_s);
+    plant_look(plant, &plant->sampled);
+    sensor_convert(&plant->config.sensor, &plant->noise, &plant->sampled, adc);
+}
+
+int plant_captured(const plant_t *plant, plant_capture_t captured[], int most)
+{
+    const probe_t *probe = &plant->complete;
+    int count = probe->edges < most ? probe->edges : most;
+    memcpy(captured, probe->edge, (size_t)(count > 0 ? count : 0) * sizeof captured[0]);
+    return probe->edges + (int)probe->lost;
+}

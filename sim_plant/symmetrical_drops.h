@@ -1,0 +1,62 @@
+/* The steps of symmetrical.c where the drop of a closed switch turns over with its current.
+ *
+ * Outside the zone (bridge.h) a drop is constant, within it a cubic of the current, which moves nearly evenly
+ * with the time. A step that ends where a turn begins or ends is smooth; one across that is not. */
+#ifndef PLANT_SYMMETRICAL_DROPS_H
+#define PLANT_SYMMETRICAL_DROPS_H
+
+#include "sim_plant/symmetrical_rates.h"
+
+#include <math.h>
+
+/* While the drop of a closed switch turns over, it is a cubic of the time: of a whole turn d says half, of
+ * parts less. Where the turn begins or ends within the step d says less than it should. */
+#define TURNING   0.5
+#define KINK      4.0
+#define ZONE_EDGE 0.01  /* a step that ends so close to where a turn begins or ends counts as there; */
+#define ZONE_PAST 0.003 /* it aims this far behind an end, so as not to leave a sliver. Units of the zone */
+
+/* What d says of a step over which drops have moved. */
+INLINE double drop_part(const bridge_t *b, const tied_t *from, const tied_t *to, shape_t shape, double part)
+{
+    for (int k = 0; k < shape.legs && b->v_switch_V != 0.0; k++) {
+        if (from->share[k] != to->share[k]) {
+            double x = fabs(from->i_leg_A[k] * b->inv_zone_1_A[k]);
+            double end = fabs(to->i_leg_A[k] * b->inv_zone_1_A[k]);
+            part = larger(part, larger(x, end) > 1.0 + ZONE_EDGE ? KINK : TURNING);
+        }
+    }
+    return part;
+}
+
+/* Steps end where the drop of a closed switch begins or ceases to turn over, and while it does are as long as
+ * the error of that allows. */
+INLINE double zone_s(const circuit_t *c, const start_t *s, shape_t shape, double h)
+{
+    const bridge_t *b = &c->bridge;
+    for (int k = 0; k < shape.legs && b->v_switch_V != 0.0; k++) {
+        double x = s->tied.i_leg_A[k] * b->inv_zone_1_A[k];
+        double speed = along(&c->machine.winding, shape, k, s->i_A_s) * b->inv_zone_1_A[k];
+        double end = x + speed * h;
+        if (b->inv_zone_1_A[k] == 0.0 || (x >= 1.0 && end >= 1.0) || (x <= -1.0 && end <= -1.0)) {
+            continue;
+        }
+        double ahead = speed > 0.0 ? x : -x; /* towards the end of a turn at 1 */
+        bool turning = ahead >= -1.0 - ZONE_EDGE;
+        double edge = turning ? 1.0 + ZONE_PAST : -1.0;
+        if (ahead > 1.0 - ZONE_PAST) {
+            continue;
+        }
+        if (ahead + fabs(speed) * h > edge) {
+            h = (edge - ahead) / fabs(speed);
+        }
+        if (turning) {
+            double d_Wb = b->v_switch_V / 3.0 * fabs(1.5 * x + 0.5 * speed * h) * speed * speed * h * h * h;
+            double error = TURNING * d_Wb * c->inv_u_scale * c->inv_tolerance;
+            h = error > 0.9 ? h * cbrt(0.9 / error) : h;
+        }
+    }
+    return h;
+}
+
+#endif
