@@ -1,6 +1,6 @@
 #include "observers/observer.h"
 
-/* One case for each of the list; with PM_OBSERVERS_SMALL, without the large ones. */
+/* One case for each of the list; with PM_OBSERVERS_FEW, without the optional ones. */
 
 void observer_reset(observer_t *self, const observer_config_t *config, const obs_in_t *in)
 {
@@ -9,8 +9,8 @@ void observer_reset(observer_t *self, const observer_config_t *config, const obs
     case OBSERVER_##name:                                                                                    \
         name##_reset(&self->name, &config->name, in);                                                        \
         break;
-#ifdef PM_OBSERVERS_SMALL
-#define PM_OBSERVER_LARGE(name, help)
+#ifdef PM_OBSERVERS_FEW
+#define PM_OBSERVER_OPTIONAL(name, help)
 #endif
 #include "observers/observers.def"
 #undef PM_OBSERVER
@@ -29,8 +29,8 @@ void observer_step_other(observer_t *self, const observer_config_t *config, cons
     case OBSERVER_##name:                                                                                    \
         name##_step(&self->name, &config->name, in, out);                                                    \
         break;
-#ifdef PM_OBSERVERS_SMALL
-#define PM_OBSERVER_LARGE(name, help)
+#ifdef PM_OBSERVERS_FEW
+#define PM_OBSERVER_OPTIONAL(name, help)
 #endif
 #include "observers/observers.def"
 #undef PM_OBSERVER
@@ -48,8 +48,8 @@ obs_out_t observer_last(const observer_t *self, const observer_config_t *config)
 #define PM_OBSERVER(name, help)                                                                              \
     case OBSERVER_##name:                                                                                    \
         return name##_last(&self->name);
-#ifdef PM_OBSERVERS_SMALL
-#define PM_OBSERVER_LARGE(name, help)
+#ifdef PM_OBSERVERS_FEW
+#define PM_OBSERVER_OPTIONAL(name, help)
 #endif
 #include "observers/observers.def"
 #undef PM_OBSERVER
@@ -67,8 +67,8 @@ void observer_slow(observer_t *self, const observer_config_t *config, const obs_
     case OBSERVER_##name:                                                                                    \
         name##_slow(&self->name, &config->name, in, out, weight);                                            \
         break;
-#ifdef PM_OBSERVERS_SMALL
-#define PM_OBSERVER_LARGE(name, help)
+#ifdef PM_OBSERVERS_FEW
+#define PM_OBSERVER_OPTIONAL(name, help)
 #endif
 #include "observers/observers.def"
 #undef PM_OBSERVER
@@ -85,8 +85,8 @@ void observer_tie(observer_t *self, const observer_config_t *config)
     case OBSERVER_##name:                                                                                    \
         name##_tie(&self->name, &config->name);                                                              \
         break;
-#ifdef PM_OBSERVERS_SMALL
-#define PM_OBSERVER_LARGE(name, help)
+#ifdef PM_OBSERVERS_FEW
+#define PM_OBSERVER_OPTIONAL(name, help)
 #endif
 #include "observers/observers.def"
 #undef PM_OBSERVER

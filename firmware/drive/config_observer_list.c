@@ -9,8 +9,8 @@ void make_observer(maker_t *m, observer_config_t *c)
     case OBSERVER_##name:                                                                                    \
         make_##name(m, &c->name);                                                                            \
         break;
-#ifdef PM_OBSERVERS_SMALL
-#define PM_OBSERVER_LARGE(name, help)
+#ifdef PM_OBSERVERS_FEW
+#define PM_OBSERVER_OPTIONAL(name, help)
 #endif
 #include "observers/observers.def"
 #undef PM_OBSERVER
