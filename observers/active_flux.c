@@ -1,7 +1,7 @@
 #include "observers/active_flux.h"
 
-#include "firmware/math/pair.h"
 #include "firmware/math/root.h"
+#include "observers/flux.h"
 
 /* psi_ref stays within this share of the amplitude that the parameters give. */
 #define BAND PM_Q(0.5)
@@ -59,30 +59,11 @@ void active_flux_reset(active_flux_t *self, const active_flux_config_t *config, 
     self->i = in->i;
 }
 
-static inline pm_q_t relative(const active_flux_t *self, int32_t flux)
-{
-    const int32_t bits = 25 + 26 - 32;
-    return pm_shl(pm_sat(pm_mulh(flux, self->inverse), 19), PM_Q_BITS - bits);
-}
-
-static inline void describe(const active_flux_t *self, pm_dq_t active, obs_out_t *out)
-{
-    out->vector = (pm_dq_t){.d = pm_shl(active.d, 3), .q = pm_shl(active.q, 3)};
-    out->eps = relative(self, active.q);
-    out->misfit = relative(self, self->reference - active.d);
-}
-
 void active_flux_step(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in,
                       obs_out_t *out)
 {
     (void)config;
-    pm_ab_t psi = pm_pair_ab(&self->psi);
-    const pm_ab_t past = pm_pair_ab(&self->i);
-    const pm_pair_t k = pm_pair(&self->step, &self->drop);
-    psi.alpha = pm_mulh_sub(pm_mulh_add(psi.alpha, in->v.alpha, k.first), past.alpha, k.second);
-    psi.beta = pm_mulh_sub(pm_mulh_add(psi.beta, in->v.beta, k.first), past.beta, k.second);
-    self->i = in->i;
-
+    const pm_ab_t psi = flux_integrate(self, in);
     pm_dq_t active = pm_park_half(psi, in->dir);
     const pm_pair_t model = pm_pair(&self->inductance, &self->reference);
     active.d = pm_mulh_sub(active.d, model.first, in->i_dq.d);
@@ -91,18 +72,15 @@ void active_flux_step(active_flux_t *self, const active_flux_config_t *config, c
     const pm_pair_t g = pm_pair(&self->k_amplitude, &self->k_seed);
     const pm_dq_t back = {.d = pm_mulh(model.second - active.d, pm_add_sat(g.first, g.second)),
                           .q = pm_mulh(active.q, g.second)};
-    psi.alpha = pm_mulh_add(pm_mulh_add(psi.alpha, back.d, in->dir.cos), back.q, in->dir.sin);
-    psi.beta = pm_mulh_sub(pm_mulh_add(psi.beta, back.d, in->dir.sin), back.q, in->dir.cos);
-    /* with the position lost, a voltage at standstill drives the flux up until the fault */
-    self->psi = (pm_ab_t){.alpha = pm_sat(psi.alpha, 29), .beta = pm_sat(psi.beta, 29)};
+    flux_keep(self, psi, back, in->dir);
     self->active = active;
-    describe(self, active, out);
+    flux_describe(self, active, out);
 }
 
 obs_out_t active_flux_last(const active_flux_t *self)
 {
     obs_out_t out;
-    describe(self, self->active, &out);
+    flux_describe(self, self->active, &out);
     return out;
 }
 

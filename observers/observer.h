@@ -25,6 +25,7 @@
 #include "observers/ekf_reduced.h"
 #include "observers/extended_emf.h"
 #include "observers/extended_emf_ab.h"
+#include "observers/flux_linkage.h"
 #include "observers/sliding_mode.h"
 
 typedef enum {

@@ -83,6 +83,13 @@ static void round_only(maker_t *m)
     }
 }
 
+static void make_flux_linkage(maker_t *m, flux_linkage_config_t *c)
+{
+    round_only(m);
+    make_active_flux(m, &c->flux);
+    c->g = fixed(m, si(m, DRIVE_PARAM_flux_gain), Q_BITS, DRIVE_PARAM_flux_gain);
+}
+
 static void make_back_emf(maker_t *m, back_emf_config_t *c)
 {
     round_only(m);

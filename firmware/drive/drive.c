@@ -39,7 +39,12 @@ bool drive_same_frame(const drive_config_t *a, const drive_config_t *b)
 
 void drive_reconfigure(drive_t *drive, const drive_config_t *config)
 {
+    const observer_id_t before = drive->config.position.observer.id;
     drive->config = *config;
+    const position_config_t *position = &drive->config.position;
+    if (position->observer.id != before && drive->stage >= STAGE_OPEN_LOOP) {
+        position_change_observer(&drive->position, position, drive->i_ab, drive->status.i);
+    }
     if (drive->fault == DRIVE_FAULT_PARAMETERS) {
         drive->fault = DRIVE_FAULT_NONE;
         drive->state = DRIVE_OFF;

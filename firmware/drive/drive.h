@@ -98,7 +98,7 @@ typedef struct drive drive_t; /* caller-owned: the struct stands in drive_state.
 drive_result_t drive_init(drive_t *drive, const drive_params_t *params);
 
 /* Takes a new configuration, whole; ends the fault PARAMETERS. Between two steps: in the slow interrupt.
- * While the drive is not off, nothing that drive_same_frame() compares may differ. */
+ * While the drive is not off, nothing that drive_same_frame() compares may differ; the observer may. */
 void drive_reconfigure(drive_t *drive, const drive_config_t *config);
 
 /* Bases, timing and start are the same, so that the present state keeps its meaning. */

@@ -53,6 +53,12 @@ void position_step(position_t *self, const position_config_t *config, pm_ab_t v,
     *out = (position_out_t){.dir = dir, .i = i_dq, .omega = pll.omega};
 }
 
+void position_change_observer(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq)
+{
+    const obs_in_t in = {.i = i, .dir = pm_dir(self->pll.theta), .omega = self->pll.omega, .i_dq = i_dq};
+    observer_reset(&self->observer, &config->observer, &in);
+}
+
 void position_lead(position_t *self, const position_config_t *config, const pm_pll_t *imposed)
 {
     observer_tie(&self->observer, &config->observer);

@@ -50,6 +50,11 @@ typedef struct {
 void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i,
                    position_out_t *out);
 
+/* The configuration names another observer than before: it is seeded at the present position and speed, where
+ * the loop had settled with the old one, so nothing jumps. What the old one had learnt of R and of the
+ * amplitude is given up. Between two steps, with the current of the last and the same in its frame. */
+void position_change_observer(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq);
+
 /* While the rotor follows a given vector (align, open-loop start): the loop is opened, the position is
  * `imposed` and goes on with its speed, and the observer is tied to it. Up to the next position_slow(). */
 void position_lead(position_t *self, const position_config_t *config, const pm_pll_t *imposed);

@@ -39,6 +39,12 @@ inline void configure(emf_config_t &c, const Machine &m, const Base &b)
     c = emf_config(m, b);
 }
 
+inline void configure(flux_linkage_config_t &c, const Machine &m, const Base &b)
+{
+    c.flux = flux_config(m, b);
+    c.g = PM_Q(0.5);
+}
+
 inline void configure(sliding_mode_config_t &c, const Machine &m, const Base &b)
 {
     c = sliding_mode_config(m, b, SLIDING_MODE_SATURATION, false);

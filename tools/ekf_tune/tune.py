@@ -17,7 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 TABLE = ROOT / "docs/results/ekf_tuning.md"
 RUNS = "tests/scenario/ekf_tuning.yaml"
-FILTERS = {5: "full order", 6: "reduced order"}
+FILTERS = {6: "full order", 7: "reduced order"}  # values of the parameter observer
 HAND = (0.0067, 0.17, 0.05)  # 2 V of 300 V; a sixth of the acceleration; 3 degrees in a second
 PRESET = (0.003, 0.3, 0.1)  # of parameters.yaml: serves both filters
 # Decades. Voltages are never known to better than a thousandth of the link: below, filters diverge now and then.
