@@ -1,5 +1,5 @@
 /* Flux-linkage observer for machines without saliency (METHODS.md 2.2.1, row 12), with the low-pass in place
- * of the integration and its lag turned back (3.2.2 and 3.2.3, rows 22 and 23).
+ * of the integration and its lag turned back (3.2.1 to 3.2.3, rows 21 to 23).
  *
  *   psi' += T_s (v - R i) - w_c T_s psi',   w_c = g |w|
  *   psi = psi' (1 - w_c T_s / 2 - j g sgn w),   psi - L_s i lies on the d-axis: eps = (psi - L_s i)_q /

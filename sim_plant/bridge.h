@@ -1,4 +1,5 @@
-/* The legs: which rail each motor terminal is tied to, and through what (METHODS.md 0.2 E6, E7, E10).
+/* The legs: which rail each motor terminal is tied to, and through what (METHODS.md 0.2 E6, E7, E10; rows 57
+ * to 59).
  *
  * A leg is tied to a rail by a closed switch (either direction of current, drop v_switch against it), or by
  * a diode (one direction, drop v_diode); all paths have r_on in series. With neither it floats: without

@@ -1,5 +1,6 @@
 /* The motor: one or two sets of three phases around a common rotor (METHODS.md 0.2 E1 to E5, E14, E16, E17,
- * E19).
+ * E19;
+ * row 36).
  *
  * The core of each set is a flux map in rotor coordinates, either the energy form
  *

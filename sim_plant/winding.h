@@ -1,5 +1,6 @@
 /* What the windings add to the core: connection, resistance, and flux linkage that is linear in the currents
- * and periodic in the rotor angle (METHODS.md 0.2 E3, E4, E5, E16, E17).
+ * and periodic in the rotor angle (METHODS.md 0.2 E3, E4, E5, E16, E17; rows 1, 8, 10, 33, 70,
+ * 79, 80 and 89).
  *
  * All quantities are in coordinates: alpha, beta and zero of each set, alpha along phase A of the first set
  * for both, amplitude invariant; then the branch of a short circuit. Currents of the legs are i_leg = axis .

@@ -1,5 +1,5 @@
 /* The position of the rotor: injection at low speed, an observer above, one phase-locked loop
- * (METHODS.md 5.9, row 69).
+ * (METHODS.md 4.5.1 and 5.9, rows 44 and 69).
  *
  *   eps = eps_injection + weight (eps_observer - eps_injection)
  * weight goes from 0 at omega_low to 1 at omega_high; the carrier is on below omega_high and off above 1.1

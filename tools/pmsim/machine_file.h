@@ -1,6 +1,6 @@
-// Machine files, sim_plant/machines/*.yaml, and what is laid over them: the sections of a scenario, then the
-// settings of the command line. Format: docs/pmsim.md. Tests: tests/unit/pmsim/machine_file_test.cpp,
-// plant_run_test.cpp.
+// Machine files, sim_plant/machines/*.yaml (row 152), and what is laid over them: the sections of a scenario,
+// then the settings of the command line. Format: docs/pmsim.md. Tests:
+// tests/unit/pmsim/machine_file_test.cpp, plant_run_test.cpp.
 #ifndef PMSIM_MACHINE_FILE_H
 #define PMSIM_MACHINE_FILE_H
 

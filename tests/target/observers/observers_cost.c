@@ -1,7 +1,7 @@
-/* Every observer of the list behind a phase-locked loop, for count.py: one call of period_<name>() is the
- * angle's prediction, its direction, the current's frame, the observer's step and the loop's correction. The
- * rotor turns at a third of the base speed with the voltage and current of a machine under load, so nothing
- * is zero; 1 kHz runs outside. Prints the bits of the last result, for the comparison with the host. */
+/* Every observer of the list with a phase-locked loop, for count.py: one call of period_<name>() is the
+ * observer's step, the loop's correction and its prediction, with their call, loads and stores. The rotor
+ * turns at a third of the base speed with the voltage and current of a machine under load, so nothing is
+ * zero; 1 kHz runs outside. Prints the bits of the last result and the sizes. */
 #include <stdio.h>
 
 #include "firmware/drive/config.h"
@@ -82,20 +82,24 @@ static void run(observer_id_t id)
 
 int main(void)
 {
-    static const char *const names[] = {
-#define PM_OBSERVER(name, help) #name,
+    static const struct {
+        const char *name;
+        uint32_t state, config;
+    } list[] = {
+#define PM_OBSERVER(name, help) {#name, sizeof(name##_t), sizeof(name##_config_t)},
 #include "observers/observers.def"
 #undef PM_OBSERVER
     };
     for (int id = 0; id < (int)OBSERVER_COUNT; id++) {
         if (!configure((observer_id_t)id)) {
-            printf("observers_cost: no configuration for %s\n", names[id]);
+            printf("observers_cost: no configuration for %s\n", list[id].name);
             return 1;
         }
         run((observer_id_t)id);
         const obs_out_t out = observer_last(&bench.observer, &config.position.observer);
-        printf("%s %08lx %08lx %08lx\n", names[id], (unsigned long)bench.pll.theta,
-               (unsigned long)bench.pll.omega, (unsigned long)out.eps);
+        printf("%s %08lx %08lx %08lx state %lu config %lu\n", list[id].name, (unsigned long)bench.pll.theta,
+               (unsigned long)bench.pll.omega, (unsigned long)out.eps, (unsigned long)list[id].state,
+               (unsigned long)list[id].config);
     }
     return 0;
 }

@@ -1,0 +1,77 @@
+"""tools/book_map.py on small trees: what it makes of a whole one, and each orphan must be refused."""
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+TOOL = Path(__file__).resolve().parents[2] / "tools/book_map.py"
+METHODS = """PM_METHOD(12, "2.2.1", "Flux linkage", IMPLEMENTED, "observer", "spm")
+PM_METHOD(13, "2.2.2", "Active flux", IMPLEMENTED, "", "observers/active")
+PM_METHOD(14, "2.3.1", "Back-EMF", NOT_YET, "", "")
+"""
+WHOLE = {
+    "tools/pmsim/methods.def": METHODS,
+    "observers/flux.h": "/* Flux (METHODS.md 2.2, rows 12 and\n * 13). */\n",
+    "tests/scenario/spm.yaml": "",
+    "tests/unit/observers/active_test.cpp": "",
+}
+
+
+def run(changes, check_again=False):
+    with tempfile.TemporaryDirectory() as folder:
+        for name, text in {**WHOLE, **changes}.items():
+            if text is not None:
+                path = Path(folder) / name
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(text)
+        (Path(folder) / "docs").mkdir()
+        command = [sys.executable, TOOL, "--root", folder]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if check_again:
+            (Path(folder) / "observers/flux.h").write_text(check_again)
+            done = subprocess.run([*command, "--check"], capture_output=True, text=True, check=False)
+        return done.returncode, done.stderr, (Path(folder) / "docs/book.md").read_text()
+
+
+class BookMap(unittest.TestCase):
+    def test_a_whole_tree_is_mapped(self):
+        code, message, page = run({})
+        self.assertEqual((code, message), (0, ""))
+        self.assertIn("| 2.2.1 | 12 | Flux linkage | [flux.h](../observers/flux.h) | `observer` | "
+                      "[spm.yaml](../tests/scenario/spm.yaml) | [results.md](results.md) |", page)
+        self.assertIn("| 2.2.2 | 13 | Active flux | [flux.h](../observers/flux.h) | always | "
+                      "[active_test.cpp](../tests/unit/observers/active_test.cpp) | in the test |", page)
+        self.assertIn("| 2.3.1 | 14 | Back-EMF | not yet |", page)
+        self.assertIn("2 of 3 rows.", page)
+
+    def test_a_range_names_its_rows(self):
+        for text in "/* rows 12 to\n * 13 */", "/* rows 12\n * to 13 */":
+            self.assertEqual(run({"observers/flux.h": text})[0], 0)
+
+    def test_a_method_without_a_source_is_refused(self):
+        code, message, _ = run({"observers/flux.h": "/* row 12 */"})
+        self.assertEqual(code, 1)
+        self.assertIn("row 13, Active flux: no source names it", message)
+
+    def test_a_method_without_its_proof_is_refused(self):
+        for missing in "tests/scenario/spm.yaml", "tests/unit/observers/active_test.cpp":
+            code, message, _ = run({missing: None})
+            self.assertEqual(code, 1)
+            self.assertIn(f"{missing} is missing", message)
+
+    def test_a_source_of_a_method_that_is_not_there_is_refused(self):
+        code, message, _ = run({"observers/emf.h": "/* back-EMF, row 14 */"})
+        self.assertEqual(code, 1)
+        self.assertIn("observers/emf.h: row 14 is not implemented", message)
+
+    def test_a_page_that_is_not_up_to_date_is_refused(self):
+        code, message, _ = run({}, check_again="/* rows 12, 13: here */")
+        self.assertEqual((code, message), (0, ""))
+        code, message, _ = run({}, check_again="/* row 12 */")
+        self.assertEqual(code, 1)
+        self.assertIn("not up to date", message)
+
+
+if __name__ == "__main__":
+    unittest.main()

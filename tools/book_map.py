@@ -1,0 +1,111 @@
+#!/usr/bin/env python3
+"""Writes docs/book.md: for every section of the book its row, the sources that name it, its test and its result.
+
+usage: book_map.py [--check] [--root DIR]
+
+Rows, sections and proofs are those of tools/pmsim/methods.def; a source belongs to the rows that its comments name
+("row 14", "rows 21 to 23"). Refused are orphans: a row that is there without a source or whose proof is missing, and
+a source that names a row which is not there. --check writes nothing and fails also when the page is not up to date.
+"""
+import argparse
+import re
+import sys
+from pathlib import Path
+
+METHOD = re.compile(r'^PM_METHOD\((\d+), "(.*?)", "(.*?)", (\w+), "(.*?)", "(.*?)"\)', re.MULTILINE)
+NUMBERS = r"\d+(?:[\s*/]*(?:,|and|to)[\s*/]*\d+)*"  # also over the end of a comment's line
+ROWS = re.compile(rf"\brows?\s+({NUMBERS})", re.IGNORECASE)
+FOLDERS = "firmware", "observers", "injection", "bldc", "sim_plant", "tools"
+HEAD = """# Map of the book
+
+Made by `tools/book_map.py`; the build fails when it is not up to date, when a method has no source or no proof, or when a
+source names a method that `pmsim methods` does not have. Sources name the rows that they implement in their first comment.
+
+| section | row | method | source | selected by | proof | result |
+|---|---:|---|---|---|---|---|
+"""
+
+
+def numbers(text):
+    """ "12, 14 and 21 to 23" -> 12, 14, 21, 22, 23"""
+    found = []
+    for first, last in re.findall(r"(\d+)(?:[\s*/]+to[\s*/]+(\d+))?", text):
+        found += range(int(first), int(last or first) + 1)
+    return found
+
+
+def sources(root):
+    """Row -> files that name it."""
+    found = {}
+    for folder in FOLDERS:
+        for path in sorted((root / folder).rglob("*.h")):
+            for match in ROWS.finditer(path.read_text(encoding="utf-8")):
+                for row in numbers(match.group(1)):
+                    found.setdefault(row, set()).add(path.relative_to(root).as_posix())
+    return found
+
+
+def proof_of(scenario):
+    return f"tests/unit/{scenario}_test.cpp" if "/" in scenario else f"tests/scenario/{scenario}.yaml"
+
+
+def result_of(scenario):
+    if scenario.startswith("sim_plant/"):
+        return "[plant.md](plant.md)"
+    return "in the test" if "/" in scenario else "[results.md](results.md)"
+
+
+def read(root):
+    return [(int(row), *rest) for row, *rest in METHOD.findall((root / "tools/pmsim/methods.def").read_text())]
+
+
+def orphans(root, methods, files):
+    here = {row for row, _, _, state, _, _ in methods if state == "IMPLEMENTED"}
+    for row, _, name, state, _, scenario in methods:
+        if state == "IMPLEMENTED":
+            if row not in files:
+                yield f"row {row}, {name}: no source names it"
+            if not (root / proof_of(scenario)).exists():
+                yield f"row {row}, {name}: {proof_of(scenario)} is missing"
+    for row in sorted(files.keys() - here):
+        for path in sorted(files[row]):
+            yield f"{path}: row {row} is not implemented, says tools/pmsim/methods.def"
+
+
+def link(path):
+    return f"[{Path(path).name}](../{path})"
+
+
+def page(methods, files):
+    lines = []
+    for row, section, name, state, parameter, scenario in methods:
+        if state == "IMPLEMENTED":
+            where = " ".join(link(path) for path in sorted(files.get(row, ())))
+            selected = f"`{parameter}`" if parameter else "always"
+            cells = where, selected, link(proof_of(scenario)), result_of(scenario)
+        else:
+            cells = "not yet", "", "", ""
+        lines.append(f"| {section} | {row} | {name} | " + " | ".join(cells) + " |\n")
+    done = sum(1 for method in methods if method[3] == "IMPLEMENTED")
+    return HEAD + "".join(lines) + f"\n{done} of {len(methods)} rows.\n"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--check", action="store_true")
+    parser.add_argument("--root", type=Path, default=Path(__file__).resolve().parent.parent)
+    options = parser.parse_args()
+    methods, files = read(options.root), sources(options.root)
+    found = list(orphans(options.root, methods, files))
+    text, path = page(methods, files), options.root / "docs/book.md"
+    if not options.check:
+        path.write_text(text)
+    elif not path.exists() or path.read_text() != text:
+        found.append("docs/book.md is not up to date: run tools/book_map.py")
+    for line in found:
+        print(line, file=sys.stderr)
+    sys.exit(1 if found else 0)
+
+
+if __name__ == "__main__":
+    main()
