@@ -95,7 +95,7 @@ void ekf_full_step(ekf_full_t *self, const ekf_full_config_t *config, const obs_
     pm_dq_t angle = {.d = config->model.psi_m - pm_shl(pm_mulh(config->model.psi_m, square), 3) +
                           pm_mul(self->flux.eta, sine),
                      .q = pm_mul(self->flux.psi_a, sine)};
-    pm_dq_t lambda = {.d = psi.d - angle.d, .q = psi.q - angle.q};
+    pm_dq_t lambda = {.d = pm_sub_sat(psi.d, angle.d), .q = pm_sub_sat(psi.q, angle.q)};
 
     predict(self, config, in->omega);
     const pm_q_t y_d = pm_sub_sat(measured.d, lambda.d);
@@ -112,7 +112,8 @@ void ekf_full_step(ekf_full_t *self, const ekf_full_config_t *config, const obs_
     lambda.d = pm_sat(lambda.d, PM_Q_BITS + 2);
     lambda.q = pm_sat(lambda.q + pm_kalman_gained(&q, y_q), PM_Q_BITS + 2);
     omega = pm_mulh_add(pm_mulh_add(omega, u_d, d.K[EKF_OMEGA]), u_q, q.K[EKF_OMEGA]);
-    const pm_q_t change = pm_mulh_add(pm_mulh(u_d, d.K[EKF_DELTA]), u_q, q.K[EKF_DELTA]);
+    const pm_q_t wanted = pm_mulh_add(pm_mulh(u_d, d.K[EKF_DELTA]), u_q, q.K[EKF_DELTA]);
+    const pm_q_t change = pm_sat(wanted, PM_Q_BITS);
     angle.d += pm_mul(self->flux.eta, change);
     angle.q += pm_mul(self->flux.psi_a, change);
     self->omega = pm_sat(omega, PM_Q_BITS + 1);

@@ -18,7 +18,7 @@ static void set_operating_point(ekf_reduced_t *self, const ekf_reduced_config_t 
     const pm_q_t size = pm_max(square, PM_Q(0.0001));
     const pm_q_t u = pm_max(pm_frac(pm_mul_sat(size, reach), config->model.t_s), 1);
     const pm_q_t fading = omega < 0 ? -share : share;
-    self->per_d = -pm_mul_sat(pm_div(self->flux.psi_a / 1024, u), fading); /* Q28 / 1024 = Q18 */
+    self->per_d = pm_mul_sat(pm_div(self->flux.psi_a / 1024, u), -fading); /* Q28 / 1024 = Q18 */
     self->per_q = pm_mul_sat(pm_div(self->flux.eta / 1024, u), fading);
     const pm_q_t ratio = pm_div(pm_mul(config->model.psi_m, config->model.psi_m), size);
     self->r_delta = pm_min(pm_mul_sat(pm_div(pm_div(config->r, reach), reach), ratio), MOST_R);

@@ -363,10 +363,46 @@ class Draw
     int n_ = 0;
 };
 
-// What must be above zero in any configuration that is accepted.
-std::vector<std::pair<const char *, int64_t>> must_be_positive(const drive_config_t &c)
+using Names = std::vector<std::pair<const char *, int64_t>>;
+
+Names observer_must_be_positive(const observer_config_t &o)
 {
-    std::vector<std::pair<const char *, int64_t>> x = {
+    switch (o.id) {
+    case OBSERVER_active_flux:
+        return {{"flux R", o.active_flux.model.R},
+                {"flux t_s", o.active_flux.model.t_s},
+                {"flux g", o.active_flux.g},
+                {"flux k_seed", o.active_flux.k_seed}};
+    case OBSERVER_sliding_mode:
+        return {{"sliding t_s", o.sliding_mode.model.t_s},
+                {"sliding k_lp", o.sliding_mode.k_lp},
+                {"sliding slope", o.sliding_mode.slope},
+                {"sliding omega_min", o.sliding_mode.omega_min}};
+    case OBSERVER_ekf_full:
+        return {{"ekf per_unit", o.ekf_full.per_unit},
+                {"ekf q_lambda beyond rounding", o.ekf_full.q_lambda + 1 - PM_KALMAN_LEAST(EKF_STATES)},
+                {"ekf q_omega beyond rounding", o.ekf_full.q_omega + 1 - PM_KALMAN_LEAST(EKF_STATES)},
+                {"ekf q_delta beyond rounding", o.ekf_full.q_delta + 1 - PM_KALMAN_LEAST(EKF_STATES)},
+                {"ekf r_d in range", o.ekf_full.r_d + 1 - PM_KALMAN_LEAST_R},
+                {"ekf r_q in range", o.ekf_full.r_q + 1 - PM_KALMAN_LEAST_R}};
+    case OBSERVER_mras_current:
+    case OBSERVER_mras_voltage:
+    case OBSERVER_mras_simple:
+        return {{"mras k", o.mras_current.k},
+                {"mras emf_min", o.mras_current.emf_min},
+                {"mras turn", o.mras_current.turn}};
+    case OBSERVER_ekf_reduced:
+        return {{"ekf omega_min", o.ekf_reduced.omega_min},
+                {"ekf r in range", o.ekf_reduced.r + 1 - PM_KALMAN_LEAST_R}};
+    default:
+        return {};
+    }
+}
+
+// What must be above zero in any configuration that is accepted.
+Names must_be_positive(const drive_config_t &c)
+{
+    Names x = {
         {"counts", c.modulator.counts},
         {"zone_alpha", c.modulator.zone_alpha},
         {"zone_beta", c.modulator.zone_beta},
@@ -382,8 +418,6 @@ std::vector<std::pair<const char *, int64_t>> must_be_positive(const drive_confi
         {"speed kb", c.speed.pi.kb},
         {"speed slope", c.speed.slope},
         {"fw k", c.field_weakening.k},
-        {"flux R", c.position.observer.active_flux.model.R},
-        {"flux t_s", c.position.observer.active_flux.model.t_s},
         {"pll_low kp", c.position.pll_low.kp_turn},
         {"pll_low ki", c.position.pll_low.ki},
         {"pll_high kp", c.position.pll_high.kp_turn},
@@ -398,15 +432,8 @@ std::vector<std::pair<const char *, int64_t>> must_be_positive(const drive_confi
         {"omega_stall", c.protection.omega_stall},
         {"i_trip", c.protection.i_trip},
     };
-    if (c.position.observer.id == OBSERVER_active_flux) {
-        x.push_back({"flux g", c.position.observer.active_flux.g});
-        x.push_back({"flux k_seed", c.position.observer.active_flux.k_seed});
-    }
-    if (c.position.observer.id == OBSERVER_mras_current || c.position.observer.id == OBSERVER_mras_voltage ||
-        c.position.observer.id == OBSERVER_mras_simple) {
-        x.push_back({"mras k", c.position.observer.mras_current.k});
-        x.push_back({"mras emf_min", c.position.observer.mras_current.emf_min});
-        x.push_back({"mras turn", c.position.observer.mras_current.turn});
+    for (const auto &item : observer_must_be_positive(c.position.observer)) {
+        x.push_back(item);
     }
     if (c.position.loop.id == LOOP_SIMPLIFIED_EKF) {
         x.push_back({"K_1", c.position.loop.k_acceleration});
