@@ -43,6 +43,7 @@ pm_q_t speed_step(speed_t *self, const speed_config_t *config, const speed_in_t 
 {
     if (config->id == SPEED_LOOP) {
         self->ready = false;
+        self->v_sum = 0;
         return in->omega;
     }
     if (!self->ready) {
