@@ -22,9 +22,12 @@
 
 #include "observers/active_flux.h"
 #include "observers/back_emf.h"
+#include "observers/ekf_full.h"
+#include "observers/ekf_reduced.h"
 #include "observers/extended_emf.h"
 #include "observers/extended_emf_ab.h"
 #include "observers/flux_linkage.h"
+#include "observers/sliding_mode.h"
 
 typedef enum {
 #define PM_OBSERVER(name, help) OBSERVER_##name,

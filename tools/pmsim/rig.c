@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "hal/sim/sim_loop.h"
+#include "tools/pmsim/rig_drive.h"
 #include "tools/pmsim/rig_sample.h"
 
 struct rig {
@@ -62,6 +63,11 @@ void rig_destroy(rig_t *rig)
         plant_destroy(rig->loop.hal.plant);
         free(rig);
     }
+}
+
+const drive_t *rig_drive(const rig_t *rig)
+{
+    return &rig->loop.app.drive;
 }
 
 plant_t *rig_plant(rig_t *rig)
