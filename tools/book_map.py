@@ -38,7 +38,7 @@ def sources(root):
     """Row -> files that name it."""
     found = {}
     for folder in FOLDERS:
-        for path in sorted((root / folder).rglob("*.h")):
+        for path in sorted(p for p in (root / folder).rglob("*") if p.suffix in (".h", ".cpp")):
             for match in ROWS.finditer(path.read_text(encoding="utf-8")):
                 for row in numbers(match.group(1)):
                     found.setdefault(row, set()).add(path.relative_to(root).as_posix())
