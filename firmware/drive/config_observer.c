@@ -1,7 +1,7 @@
-/* Configuration of the fundamental-model observers. */
+/* Configuration of the fundamental-model observers: what they share, flux, EMF and sliding mode. */
 #include "firmware/drive/config_maker.h"
 
-static void make_model(maker_t *m, observer_model_t *c)
+void make_model(maker_t *m, observer_model_t *c)
 {
     const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
     const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
@@ -37,7 +37,7 @@ static void make_resistance(maker_t *m, const observer_model_t *model, observer_
     c->max = model->R < PM_Q(4.0) ? model->R * 2 : PM_Q(7.9);
 }
 
-static void make_active_flux(maker_t *m, active_flux_config_t *c)
+void make_active_flux(maker_t *m, active_flux_config_t *c)
 {
     const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
     const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
@@ -93,30 +93,30 @@ static void round_only(maker_t *m)
     }
 }
 
-static void make_flux_linkage(maker_t *m, flux_linkage_config_t *c)
+void make_flux_linkage(maker_t *m, flux_linkage_config_t *c)
 {
     round_only(m);
     make_active_flux(m, &c->flux);
     c->g = fixed(m, si(m, DRIVE_PARAM_flux_gain), Q_BITS, DRIVE_PARAM_flux_gain);
 }
 
-static void make_back_emf(maker_t *m, back_emf_config_t *c)
+void make_back_emf(maker_t *m, back_emf_config_t *c)
 {
     round_only(m);
     make_emf(m, c);
 }
 
-static void make_extended_emf(maker_t *m, extended_emf_config_t *c)
+void make_extended_emf(maker_t *m, extended_emf_config_t *c)
 {
     make_emf(m, c);
 }
 
-static void make_extended_emf_ab(maker_t *m, extended_emf_ab_config_t *c)
+void make_extended_emf_ab(maker_t *m, extended_emf_ab_config_t *c)
 {
     make_emf(m, c);
 }
 
-static void make_sliding_mode(maker_t *m, sliding_mode_config_t *c)
+void make_sliding_mode(maker_t *m, sliding_mode_config_t *c)
 {
     const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
     const pm_num_t omega_c = pm_num_mul(angular(m, DRIVE_PARAM_sliding_bandwidth), m->base.t_s);
@@ -130,91 +130,4 @@ static void make_sliding_mode(maker_t *m, sliding_mode_config_t *c)
     c->k_lp = gain(m, pm_num_div(omega_c, pm_num_add(pm_num(1), omega_c)), FRAC_BITS,
                    DRIVE_PARAM_sliding_bandwidth);
     c->slope = fixed(m, pm_num_div(pm_num_ratio(1, 2), step), SMALL_BITS, DRIVE_PARAM_f_pwm);
-}
-
-/* What the Kalman filters take for noise, standard deviations. */
-typedef struct {
-    pm_num_t current; /* of a sample, A */
-    pm_num_t voltage; /* of a period's mean, V */
-    pm_num_t speed;   /* electrical, rad/s, that the speed wanders in a period */
-    pm_num_t angle;   /* rad, likewise */
-    pm_num_t u;       /* unit of flux: EMF of base speed in a period, Wb */
-} ekf_noise_t;
-
-static ekf_noise_t ekf_noise(const maker_t *m)
-{
-    const pm_num_t root = pm_num_sqrt(m->base.t_s);
-    const pm_num_t acceleration = pm_num_mul(si(m, DRIVE_PARAM_acceleration), pole_pairs(m));
-    return (ekf_noise_t){
-        .current = si(m, DRIVE_PARAM_i_noise),
-        .voltage = pm_num_mul(si(m, DRIVE_PARAM_v_dc_nominal), si(m, DRIVE_PARAM_ekf_voltage_noise)),
-        .speed = mul3(acceleration, si(m, DRIVE_PARAM_ekf_speed_noise), root),
-        .angle = pm_num_mul(si(m, DRIVE_PARAM_ekf_angle_noise), root),
-        .u = mul3(si(m, DRIVE_PARAM_psi_m), m->base.omega, m->base.t_s),
-    };
-}
-
-/* (sigma / unit)^2, within what keeps the covariance in its range. */
-static int32_t variance(pm_num_t sigma, pm_num_t unit, int32_t least, int32_t most)
-{
-    int32_t x;
-    (void)pm_num_to_fixed(square(pm_num_div(sigma, unit)), PM_KALMAN_BITS, &x);
-    return pm_clamp(x, least, most);
-}
-
-static int32_t process(pm_num_t sigma, pm_num_t unit, int32_t least)
-{
-    return variance(sigma, unit, least, PM_KALMAN_MOST_Q);
-}
-
-static int32_t measurement(pm_num_t sigma, pm_num_t unit)
-{
-    return variance(sigma, unit, PM_KALMAN_LEAST_R, PM_KALMAN_MOST_R);
-}
-
-static void make_ekf_full(maker_t *m, ekf_full_config_t *c)
-{
-    const ekf_noise_t noise = ekf_noise(m);
-    const pm_num_t quarter = pm_num_ratio(1, 4);
-    const int32_t least = PM_KALMAN_LEAST(EKF_STATES);
-    make_model(m, &c->model);
-    c->per_unit = fixed(m, pm_num_div(m->base.psi, noise.u), SMALL_BITS, DRIVE_PARAM_psi_m);
-    c->q_lambda = process(pm_num_mul(noise.voltage, m->base.t_s), noise.u, least);
-    c->q_omega = process(noise.speed, pm_num_mul(quarter, m->base.omega), least);
-    c->q_delta = process(noise.angle, quarter, least);
-    c->r_d = measurement(pm_num_mul(si(m, DRIVE_PARAM_L_d), noise.current), noise.u);
-    c->r_q = measurement(pm_num_mul(si(m, DRIVE_PARAM_L_q), noise.current), noise.u);
-}
-
-static void make_ekf_reduced(maker_t *m, ekf_reduced_config_t *c)
-{
-    const ekf_noise_t noise = ekf_noise(m);
-    const int32_t least = PM_KALMAN_LEAST(EKF_REDUCED_STATES);
-    /* a current enters the flux of a period twice */
-    const pm_num_t voltage = square(pm_num_mul(noise.voltage, m->base.t_s));
-    const pm_num_t current = square(pm_num_mul(si(m, DRIVE_PARAM_L_d), noise.current));
-    const pm_num_t rho = pm_num_sqrt(pm_num_add(voltage, pm_num_mul(pm_num(2), current)));
-    make_model(m, &c->model);
-    c->r = measurement(rho, noise.u);
-    c->q_omega = process(noise.speed, m->base.omega, least);
-    c->q_delta = process(noise.angle, pm_num(1), least);
-    /* from there on the variance of the angle is below 1 rad^2 */
-    const pm_q_t visible = fixed(m, pm_num_div(rho, noise.u), Q_BITS, DRIVE_PARAM_i_noise);
-    c->omega_min = pm_max(visible, PM_Q(0.02));
-}
-
-void make_observer(maker_t *m, observer_config_t *c)
-{
-    c->id = (observer_id_t)m->params->observer;
-    switch (c->id) {
-#define PM_OBSERVER(name, help)                                                                              \
-    case OBSERVER_##name:                                                                                    \
-        make_##name(m, &c->name);                                                                            \
-        break;
-#include "observers/observers.def"
-#undef PM_OBSERVER
-    case OBSERVER_COUNT:
-    default: /* the range of the parameter ends before */
-        break;
-    }
 }

@@ -43,7 +43,7 @@ pm_q_t commissioning_period(const drive_t *drive)
 static pm_q_t assumed_loss(const drive_t *drive)
 {
     const modulator_config_t *m = &drive->config.modulator;
-    return m->drop + pm_unit(drive->status.v_dc, pm_ratio(m->dead_counts, m->counts));
+    return m->drop + pm_frac(drive->status.v_dc, pm_shl(m->dead, 32 - PM_SHARE_BITS));
 }
 
 /* What the parts need that is not to be identified is taken from the last results, else from the parameters.

@@ -4,16 +4,11 @@
 #define SETTLE_CYCLES 3U
 #define CYCLES        24U
 #define BIASED_CYCLES 2U
-/* Currents below tell no sign: four steps of a 12-bit converter. */
-#define NO_SIGN PM_Q(8.0 / 4096.0)
 /* Of products, so that the sum of thousands fits. */
 #define FINE 65536
 
 static int32_t sign_of(pm_q_t i)
 {
-    if (pm_abs(i) < 4 * NO_SIGN) {
-        return 0;
-    }
     return i < 0 ? -1 : 1;
 }
 
@@ -22,10 +17,10 @@ static int32_t sign_of(pm_q_t i)
 static int32_t signs(pm_q_t from, pm_q_t to, pm_q_t u, pm_q_t edge)
 {
     if (u > edge) {
-        return sign_of(4 * from) + sign_of(4 * to);
+        return sign_of(from) + sign_of(to);
     }
     if (u < -edge) {
-        return 2 * sign_of(2 * from + 2 * to);
+        return 2 * sign_of(from + to);
     }
     return sign_of(3 * from + to) + sign_of(from + 3 * to);
 }
