@@ -1,6 +1,6 @@
 #include "observers/observer.h"
 
-/* One case for each of the list. */
+/* One case for each of the list; with PM_OBSERVERS_SMALL, without the large ones. */
 
 void observer_reset(observer_t *self, const observer_config_t *config, const obs_in_t *in)
 {
@@ -9,6 +9,9 @@ void observer_reset(observer_t *self, const observer_config_t *config, const obs
     case OBSERVER_##name:                                                                                    \
         name##_reset(&self->name, &config->name, in);                                                        \
         break;
+#ifdef PM_OBSERVERS_SMALL
+#define PM_OBSERVER_LARGE(name, help)
+#endif
 #include "observers/observers.def"
 #undef PM_OBSERVER
     case OBSERVER_COUNT:
@@ -26,6 +29,9 @@ void observer_step_other(observer_t *self, const observer_config_t *config, cons
     case OBSERVER_##name:                                                                                    \
         name##_step(&self->name, &config->name, in, out);                                                    \
         break;
+#ifdef PM_OBSERVERS_SMALL
+#define PM_OBSERVER_LARGE(name, help)
+#endif
 #include "observers/observers.def"
 #undef PM_OBSERVER
     case OBSERVER_active_flux: /* stands in observer_step() */
@@ -42,6 +48,9 @@ obs_out_t observer_last(const observer_t *self, const observer_config_t *config)
 #define PM_OBSERVER(name, help)                                                                              \
     case OBSERVER_##name:                                                                                    \
         return name##_last(&self->name);
+#ifdef PM_OBSERVERS_SMALL
+#define PM_OBSERVER_LARGE(name, help)
+#endif
 #include "observers/observers.def"
 #undef PM_OBSERVER
     case OBSERVER_COUNT:
@@ -58,6 +67,9 @@ void observer_slow(observer_t *self, const observer_config_t *config, const obs_
     case OBSERVER_##name:                                                                                    \
         name##_slow(&self->name, &config->name, in, out, weight);                                            \
         break;
+#ifdef PM_OBSERVERS_SMALL
+#define PM_OBSERVER_LARGE(name, help)
+#endif
 #include "observers/observers.def"
 #undef PM_OBSERVER
     case OBSERVER_COUNT:
@@ -73,6 +85,9 @@ void observer_tie(observer_t *self, const observer_config_t *config)
     case OBSERVER_##name:                                                                                    \
         name##_tie(&self->name, &config->name);                                                              \
         break;
+#ifdef PM_OBSERVERS_SMALL
+#define PM_OBSERVER_LARGE(name, help)
+#endif
 #include "observers/observers.def"
 #undef PM_OBSERVER
     case OBSERVER_COUNT:

@@ -1,4 +1,5 @@
-/* Any of the fundamental-model observers, chosen by the configuration.
+/* Any of the fundamental-model observers, chosen by the configuration. Side by side (METHODS.md 2.3.3, row
+ * 17): docs/results/observers.md.
  *
  * Every observer of observers.def is a source (firmware/math/estimate.h) with these functions; self is its
  * state, config is const and made from model.h's machine and a few gains:
@@ -21,9 +22,12 @@
 
 #include "observers/active_flux.h"
 #include "observers/back_emf.h"
+#include "observers/ekf_full.h"
+#include "observers/ekf_reduced.h"
 #include "observers/extended_emf.h"
 #include "observers/extended_emf_ab.h"
 #include "observers/flux_linkage.h"
+#include "observers/sliding_mode.h"
 #include "observers/mras_current.h"
 #include "observers/mras_simple.h"
 #include "observers/mras_voltage.h"

@@ -68,10 +68,13 @@ void bridge_init(bridge_t *bridge, const plant_config_t *config, int legs)
     count(bridge);
 }
 
-/* Voltages that the legs have whatever the currents, by coordinate; only where all are tied or swing. */
+/* Voltages that the legs have whatever the currents, by coordinate; only where all are tied or swing. Those
+ * of a machine whose phases are alike, who alone asks for them. */
+enum { OF_THREE = 2, OF_SIX = 4 };
+
 static void sum_three(bridge_t *b, const winding_t *w, unsigned upper, unsigned high, unsigned low)
 {
-    for (int a = 0; a < 2; a++) {
+    for (int a = 0; a < OF_THREE; a++) {
         b->rail[a] = w->side[0][upper][a];
         b->diode_V[a] = b->v_diode_V * (w->side[0][high][a] - w->side[0][low][a]);
     }
@@ -79,13 +82,16 @@ static void sum_three(bridge_t *b, const winding_t *w, unsigned upper, unsigned 
 
 static void sum_six(bridge_t *b, const winding_t *w, unsigned upper, unsigned high, unsigned low)
 {
-    const double *upper_V[] = {w->side[0][upper & 7u], w->side[1][upper >> 3]};
-    const double *high_V[] = {w->side[0][high & 7u], w->side[1][high >> 3]};
-    const double *low_V[] = {w->side[0][low & 7u], w->side[1][low >> 3]};
-    for (int a = 0; a < ACTIVE; a++) {
-        b->rail[a] = upper_V[0][a] + upper_V[1][a];
-        b->diode_V[a] = b->v_diode_V * (high_V[0][a] - low_V[0][a] + (high_V[1][a] - low_V[1][a]));
+    const double *upper_1[] = {w->side[0][upper & 7u], w->side[1][upper >> 3]};
+    const double *high_1[] = {w->side[0][high & 7u], w->side[1][high >> 3]};
+    const double *low_1[] = {w->side[0][low & 7u], w->side[1][low >> 3]};
+    double rail[OF_SIX], diode_V[OF_SIX];
+    for (int a = 0; a < OF_SIX; a++) {
+        rail[a] = upper_1[0][a] + upper_1[1][a];
+        diode_V[a] = b->v_diode_V * (high_1[0][a] - low_1[0][a] + (high_1[1][a] - low_1[1][a]));
     }
+    memcpy(b->rail, rail, sizeof rail);
+    memcpy(b->diode_V, diode_V, sizeof diode_V);
 }
 
 static void sum_sources(bridge_t *b, const winding_t *w)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 METHOD = re.compile(r'^PM_METHOD\((\d+), "(.*?)", "(.*?)", (\w+), "(.*?)", "(.*?)"\)', re.MULTILINE)
 NUMBERS = r"\d+(?:[\s*/]*(?:,|and|to)[\s*/]*\d+)*"  # also over the end of a comment's line
-ROWS = re.compile(rf"\brows?\s+({NUMBERS})", re.IGNORECASE)
+ROWS = re.compile(rf"\brows?[\s*/]+({NUMBERS})", re.IGNORECASE)
 FOLDERS = "firmware", "observers", "injection", "bldc", "sim_plant", "tools"
 HEAD = """# Map of the book
 
@@ -38,7 +38,7 @@ def sources(root):
     """Row -> files that name it."""
     found = {}
     for folder in FOLDERS:
-        for path in sorted((root / folder).rglob("*.h")):
+        for path in sorted(p for p in (root / folder).rglob("*") if p.suffix in (".h", ".cpp")):
             for match in ROWS.finditer(path.read_text(encoding="utf-8")):
                 for row in numbers(match.group(1)):
                     found.setdefault(row, set()).add(path.relative_to(root).as_posix())

@@ -52,6 +52,14 @@ def limits():
     return re.findall(r"(?m)^ok\s+(.+?): (\d+) of (\d+) bytes", text)
 
 
+MODES_RUN = SCENARIOS / "board/modes.yaml"
+MODES = [("off", "off"), ("calibrate", "calibration"), ("pulses", "initial-position pulses"),
+         ("align", "alignment"), ("open_loop", "open-loop current"),
+         ("injection", "injection"), ("blend", "injection and observer"), ("flux", "active flux"),
+         ("weakening", "active flux, field weakening"), ("limited", "of these: at the voltage limit"),
+         ("fault", "of these: a fault found"), ("swap", "of these: after a swap of parameters")]
+
+
 def table(head, rows):
     lines = ["| " + " | ".join(head) + " |", "|---|" + "---:|" * (len(head) - 1)]
     return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
@@ -63,11 +71,18 @@ def main():
         step = count_step(folder)
         demo = run_board(folder, SCENARIOS / "demo.yaml")
         fast = run_board(folder, *FAST)
+        modes = run_board(folder, MODES_RUN)
+        busy = run_board(folder, MODES_RUN, "--busy")
         slow_speed, speed = board_speed(SCENARIOS / "demo.yaml"), board_speed(*FAST)
 
     def mode(key):
         return [f"{demo[f'control.{key}.mean']:.0f}", f"{demo[f'control.{key}.worst']:.0f}",
                 f"{demo[f'control.{key}.cycles']:.0f}", f"{demo[f'control.{key}.cycles_worst']:.0f}"]
+
+    def by_mode(key, what):
+        traced = [f"{busy[f'control.{key}.{x}']:.0f}" if f"control.{key}.{x}" in busy else "" for x in ("mean", "worst")]
+        return [what, *(f"{modes[f'control.{key}.{x}']:.0f}" if f"control.{key}.{x}" in modes else ""
+                        for x in ("mean", "worst")), *traced]
 
     parts = [
         table(["`drive_step()`, executed instructions", "mean", "worst", "budget, mean"],
@@ -81,6 +96,8 @@ def main():
                 f"{demo['control.worst']:.0f}", f"{demo['control.cycles']:.0f}", f"{demo['control.cycles_worst']:.0f}"],
                ["1 kHz interrupt (speed, state machine)", f"{demo['slow.mean']:.0f}", f"{demo['slow.worst']:.0f}",
                 f"{demo['slow.cycles']:.0f}", f"{demo['slow.cycles_worst']:.0f}"]]),
+        table(["whole control interrupt by mode; budget 420 and 480", "mean", "worst", "mean, traced", "worst, traced"],
+              [by_mode(key, what) for key, what in MODES]),
         table(["at 20 kHz, 170 MHz", "measured", "budget"],
               [["worst control interrupt, share of the period", f"{fast['control.worst_percent']:.1f} %", "12 %"],
                ["processor load", f"{fast['load_percent']:.1f} %", ""],

@@ -26,8 +26,8 @@
 #include "firmware/drive/drive_state.h"
 #include "hal/hal.h"
 
-/* 8 kB: four signals, 20 kHz, 51 ms */
-#define APP_TRACE_NUMBERS 4096U
+/* 8 kB: four signals, 20 kHz, 50 ms */
+#define APP_TRACE_NUMBERS 4000U
 
 /* Whether the drive may be switched on: object parameters_ready */
 typedef enum {

@@ -60,11 +60,12 @@ static int32_t in_row(const app_t *app, const result_row_t *row)
     return app_in_units(x, base_of(&app->drive.config, (base_t)row->base), row->exponent);
 }
 
-/* L_q(i) = L_q + (L_q_rated - L_q) (i / i_rated)^2 is psi / i: its tangent at a part of the rated current has
- * three times the change. */
+/* psi / i falls with the square of the current, L_q + (L_q_rated - L_q) (i / i_rated)^2, its tangent three
+ * times as much; but saturation is steeper than that, and psi / i was measured with the i_d that lessens it:
+ * four times. */
 static pm_q_t tangent(const commissioning_result_t *r, int32_t of_16)
 {
-    return r->L_q + 3 * (r->L_q_rated - r->L_q) / 16 * of_16;
+    return r->L_q + (r->L_q_rated - r->L_q) / 4 * of_16;
 }
 
 bool app_identify_value(const app_t *app, uint16_t slot, int32_t *value)

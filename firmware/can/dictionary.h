@@ -43,19 +43,25 @@ enum {
 /* Groups of 1010h and 1011h, beside 1: all */
 typedef enum { OD_GROUP_NONE, OD_GROUP_COMMUNICATION, OD_GROUP_APPLICATION, OD_GROUP_MACHINE } od_group_t;
 
+/* Unsigned types: as their bit pattern */
+typedef struct {
+    int32_t least, preset, most;
+} od_values_t;
+
 typedef struct {
     uint16_t index;
     uint8_t sub;
-    uint8_t type;  /* od_type_t */
-    uint8_t kind;  /* od_kind_t */
-    uint8_t group; /* od_group_t */
-    uint16_t flags;
-    uint16_t slot;
-    int32_t least, preset, most; /* unsigned types: as their bit pattern */
+    uint8_t flags;
+    unsigned type : 4;  /* od_type_t */
+    unsigned kind : 2;  /* od_kind_t */
+    unsigned group : 2; /* od_group_t */
+    unsigned slot : 10;
+    unsigned values : 10; /* of od_values */
 } od_entry_t;
 
 /* Generated: dictionary_table.c, and the names of slots in dictionary_slots.h */
 extern const od_entry_t od_table[];
+extern const od_values_t od_values[]; /* each that occurs, once */
 extern const uint16_t od_count;
 extern const uint32_t od_schema; /* CRC-32 over what a stored set depends on */
 
@@ -66,6 +72,11 @@ typedef struct {
 } od_bytes_t;
 
 extern const od_bytes_t od_bytes[];
+
+static inline const od_values_t *od_values_of(const od_entry_t *entry)
+{
+    return &od_values[entry->values];
+}
 
 /* NULL: no such object, or with *has_index no such sub-index. Binary search. */
 const od_entry_t *od_find(uint16_t index, uint8_t sub, bool *has_index);

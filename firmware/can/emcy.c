@@ -54,25 +54,52 @@ static void remember(node_t *node, uint32_t code, uint32_t info)
     *count += *count < (uint32_t)NODE_HISTORY ? 1U : 0U;
 }
 
+static void queue(node_t *node, node_error_t source, uint32_t info)
+{
+    if (node->emcy_count < (uint8_t)NODE_EMCY) {
+        node->emcy[node->emcy_count] =
+            (node_emcy_t){.code = node->error[source], .error_register = update_register(node), .info = info};
+        node->emcy_count++;
+        node->told[source] = node->error[source];
+    }
+}
+
+/* What found no room: in the end a master knows what is there, if not all that has been. */
+static void catch_up(node_t *node)
+{
+    for (uint32_t source = 0; source < (uint32_t)NODE_ERRORS; source++) {
+        if (node->told[source] != node->error[source]) {
+            queue(node, (node_error_t)source, 0);
+        }
+    }
+}
+
+void emcy_forget(node_t *node)
+{
+    node->emcy_count = 0;
+    for (uint32_t source = 0; source < (uint32_t)NODE_ERRORS; source++) {
+        node->told[source] = node->error[source];
+    }
+}
+
 void node_error(node_t *node, node_error_t source, uint16_t code, uint32_t info)
 {
     if (node->error[source] == code) {
         return;
     }
     node->error[source] = code;
-    const uint8_t error_register = update_register(node);
+    (void)update_register(node);
     if (code != 0U) {
         remember(node, code, info);
     }
-    if (node->emcy_count < (uint8_t)NODE_EMCY) {
-        node->emcy[node->emcy_count] =
-            (node_emcy_t){.code = code, .error_register = error_register, .info = info};
-        node->emcy_count++;
-    }
+    queue(node, source, info);
 }
 
 void emcy_run(node_t *node)
 {
+    if (node->emcy_count == 0U) {
+        catch_up(node);
+    }
     const bool allowed = node->nmt == NODE_OPERATIONAL || node->nmt == NODE_PRE_OPERATIONAL;
     if (node->emcy_count == 0U || !allowed) {
         return;

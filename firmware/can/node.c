@@ -77,7 +77,7 @@ void node_boot_up(node_t *node)
             node_error(node, (node_error_t)source, 0, 0);
         }
     }
-    node->emcy_count = 0;
+    emcy_forget(node);
     node->sdo = (node_sdo_t){.state = SDO_IDLE};
     node->nmt = NODE_INITIALISING;
     communication_reset(node);

@@ -83,6 +83,7 @@ void heartbeat_run(node_t *node);
 
 /* emcy.c */
 void emcy_run(node_t *node);
+void emcy_forget(node_t *node); /* what waits to be told */
 
 /* pdo.c, pdo_transmit.c */
 uint32_t pdo_map(const node_t *node, uint16_t map_index, uint8_t count, node_pdo_t *pdo);

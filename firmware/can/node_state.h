@@ -84,6 +84,7 @@ struct node {
     node_consumer_t consumer[NODE_CONSUMERS];
 
     uint16_t error[NODE_ERRORS]; /* code that is there; 0: none */
+    uint16_t told[NODE_ERRORS];  /* the same, as the messages say */
     node_emcy_t emcy[NODE_EMCY]; /* to be sent */
     uint8_t emcy_count;
     uint32_t emcy_last_us;

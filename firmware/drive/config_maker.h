@@ -98,8 +98,14 @@ void make_speed(maker_t *m, speed_control_config_t *c);
 void make_flux_weakening(maker_t *m, field_weakening_config_t *c);
 void make_mtpa(maker_t *m, mtpa_config_t *c);
 
-/* config_observer.c */
+/* config_observer_list.c */
 void make_observer(maker_t *m, observer_config_t *c);
+
+/* config_observer.c, config_kalman.c */
+void make_model(maker_t *m, observer_model_t *c);
+#define PM_OBSERVER(name, help) void make_##name(maker_t *m, name##_config_t *c);
+#include "observers/observers.def"
+#undef PM_OBSERVER
 
 /* config_position.c */
 bool salient(const maker_t *m);

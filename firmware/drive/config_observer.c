@@ -1,7 +1,7 @@
-/* Configuration of the fundamental-model observers. */
+/* Configuration of the fundamental-model observers: what they share, flux, EMF and sliding mode. */
 #include "firmware/drive/config_maker.h"
 
-static void make_model(maker_t *m, observer_model_t *c)
+void make_model(maker_t *m, observer_model_t *c)
 {
     const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
     const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
@@ -37,7 +37,7 @@ static void make_resistance(maker_t *m, const observer_model_t *model, observer_
     c->max = model->R < PM_Q(4.0) ? model->R * 2 : PM_Q(7.9);
 }
 
-static void make_active_flux(maker_t *m, active_flux_config_t *c)
+void make_active_flux(maker_t *m, active_flux_config_t *c)
 {
     const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
     const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
@@ -50,25 +50,35 @@ static void make_active_flux(maker_t *m, active_flux_config_t *c)
 }
 
 /* lag: (2 - k) / k, k = w T / (1 + w T). */
-static void make_emf(maker_t *m, emf_config_t *c)
+static void make_emf_filter(maker_t *m, emf_config_t *c)
 {
-    const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
     const pm_num_t w = pm_num_mul(angular(m, DRIVE_PARAM_emf_bandwidth), m->base.t_s);
     const pm_num_t k = pm_num_div(w, pm_num_add(pm_num(1), w));
-    make_model(m, &c->model);
-    make_resistance(m, &c->model, &c->resistance, pm_num_div(FOLLOW, square(i_rated)));
     c->k_filter = gain(m, k, FRAC_BITS, DRIVE_PARAM_emf_bandwidth);
     c->lag = fixed(m, pm_num_div(pm_num_sub(pm_num(2), k), k), GAIN_BITS, DRIVE_PARAM_emf_bandwidth);
     c->k_adapt = PM_FRAC(0.01);
-    c->rate = fixed(m, pm_num_div(pm_num(1), pm_num_mul(m->base.t_s, m->base.omega)), SMALL_BITS,
-                    DRIVE_PARAM_f_pwm);
-    const pm_num_t slow = pm_num_div(pm_num(1), pm_num_mul(m->t_slow, m->base.omega));
-    c->slow_rate = fixed(m, least(slow, pm_num(31)), GAIN_BITS, DRIVE_PARAM_f_pwm);
-    c->slow_step = fixed(m, pm_num_mul(m->t_slow, m->base.omega), Q_BITS, DRIVE_PARAM_speed_trip);
-    /* 2 zeta / w_n */
-    const pm_num_t lag =
-        pm_num_div(pm_num_ratio(9, 5), pm_num_mul(angular(m, DRIVE_PARAM_injection_bandwidth), m->t_slow));
-    c->speed_lag = fixed(m, least(lag, pm_num(31)), GAIN_BITS, DRIVE_PARAM_injection_bandwidth);
+}
+
+/* Of a period, of a slow step, of the loop: 2 zeta / w_n. */
+static void make_emf_rates(maker_t *m, emf_config_t *c)
+{
+    const pm_num_t period = pm_num_mul(m->base.t_s, m->base.omega);
+    const pm_num_t slow = pm_num_mul(m->t_slow, m->base.omega);
+    const pm_num_t loop = pm_num_mul(angular(m, DRIVE_PARAM_injection_bandwidth), m->t_slow);
+    c->rate = fixed(m, pm_num_div(pm_num(1), period), SMALL_BITS, DRIVE_PARAM_f_pwm);
+    c->slow_rate = fixed(m, least(pm_num_div(pm_num(1), slow), pm_num(31)), GAIN_BITS, DRIVE_PARAM_f_pwm);
+    c->slow_step = fixed(m, slow, Q_BITS, DRIVE_PARAM_speed_trip);
+    c->speed_lag = fixed(m, least(pm_num_div(pm_num_ratio(9, 5), loop), pm_num(31)), GAIN_BITS,
+                         DRIVE_PARAM_injection_bandwidth);
+}
+
+static void make_emf(maker_t *m, emf_config_t *c)
+{
+    const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
+    make_model(m, &c->model);
+    make_resistance(m, &c->model, &c->resistance, pm_num_div(FOLLOW, square(i_rated)));
+    make_emf_filter(m, c);
+    make_emf_rates(m, c);
     c->omega_min = speed(m, DRIVE_PARAM_speed_low) / 2;
     c->omega_tied =
         fixed(m, least(pm_num_div(TIE, m->base.omega), pm_num(1)), Q_BITS, DRIVE_PARAM_speed_trip);
@@ -83,25 +93,25 @@ static void round_only(maker_t *m)
     }
 }
 
-static void make_flux_linkage(maker_t *m, flux_linkage_config_t *c)
+void make_flux_linkage(maker_t *m, flux_linkage_config_t *c)
 {
     round_only(m);
     make_active_flux(m, &c->flux);
     c->g = fixed(m, si(m, DRIVE_PARAM_flux_gain), Q_BITS, DRIVE_PARAM_flux_gain);
 }
 
-static void make_back_emf(maker_t *m, back_emf_config_t *c)
+void make_back_emf(maker_t *m, back_emf_config_t *c)
 {
     round_only(m);
     make_emf(m, c);
 }
 
-static void make_extended_emf(maker_t *m, extended_emf_config_t *c)
+void make_extended_emf(maker_t *m, extended_emf_config_t *c)
 {
     make_emf(m, c);
 }
 
-static void make_extended_emf_ab(maker_t *m, extended_emf_ab_config_t *c)
+void make_extended_emf_ab(maker_t *m, extended_emf_ab_config_t *c)
 {
     make_emf(m, c);
 }
@@ -126,33 +136,33 @@ static void make_mras(maker_t *m, mras_config_t *c)
     c->turn = fixed(m, least(turn, pm_num_ratio(49, 100)), FRAC_BITS, DRIVE_PARAM_f_pwm);
 }
 
-static void make_mras_current(maker_t *m, mras_current_config_t *c)
+void make_mras_current(maker_t *m, mras_current_config_t *c)
 {
     make_mras(m, c);
 }
 
-static void make_mras_voltage(maker_t *m, mras_voltage_config_t *c)
+void make_mras_voltage(maker_t *m, mras_voltage_config_t *c)
 {
     make_mras(m, c);
 }
 
-static void make_mras_simple(maker_t *m, mras_simple_config_t *c)
+void make_mras_simple(maker_t *m, mras_simple_config_t *c)
 {
     make_mras(m, c);
 }
 
-void make_observer(maker_t *m, observer_config_t *c)
+void make_sliding_mode(maker_t *m, sliding_mode_config_t *c)
 {
-    c->id = (observer_id_t)m->params->observer;
-    switch (c->id) {
-#define PM_OBSERVER(name, help)                                                                              \
-    case OBSERVER_##name:                                                                                    \
-        make_##name(m, &c->name);                                                                            \
-        break;
-#include "observers/observers.def"
-#undef PM_OBSERVER
-    case OBSERVER_COUNT:
-    default: /* the range of the parameter ends before */
-        break;
-    }
+    const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
+    const pm_num_t omega_c = pm_num_mul(angular(m, DRIVE_PARAM_sliding_bandwidth), m->base.t_s);
+    const pm_num_t K = pm_num_mul(si(m, DRIVE_PARAM_sliding_gain), si(m, DRIVE_PARAM_v_dc_nominal));
+    make_model(m, &c->model);
+    c->function = (sliding_mode_function_t)m->params->sliding_function;
+    c->k_base = fixed(m, pm_num_div(K, m->base.v), Q_BITS, DRIVE_PARAM_sliding_gain);
+    c->k_speed = fixed(m, si(m, DRIVE_PARAM_sliding_gain_speed), Q_BITS, DRIVE_PARAM_sliding_gain_speed);
+    c->omega_tie = pm_max(speed(m, DRIVE_PARAM_speed_low), PM_Q(0.004));
+    c->omega_min = c->omega_tie / 4;
+    c->k_lp = gain(m, pm_num_div(omega_c, pm_num_add(pm_num(1), omega_c)), FRAC_BITS,
+                   DRIVE_PARAM_sliding_bandwidth);
+    c->slope = fixed(m, pm_num_div(pm_num_ratio(1, 2), step), SMALL_BITS, DRIVE_PARAM_f_pwm);
 }

@@ -218,7 +218,9 @@ void drive_slow(drive_t *drive, const drive_slow_in_t *in)
     drive->current.limited = false;
     drive->modulator.limited = false;
     if (drive->fault == DRIVE_FAULT_NONE) {
-        reference_take(drive);
+        if (drive->stage != STAGE_IDENTIFY) { /* which goes on with what it began with */
+            reference_take(drive);
+        }
         drive->state_ms = (uint16_t)(drive->state_ms + (drive->state_ms < UINT16_MAX ? 1U : 0U));
         move(drive);
         protection_slow(drive);

@@ -3,7 +3,13 @@
 #include <string.h>
 
 const drive_param_info_t drive_param_table[DRIVE_PARAM_COUNT] = {
-#define PM_PARAM(name, unit, exp10, min, def, max, help) {#name, unit, exp10, min, def, max, help},
+#define PM_PARAM(name, unit, exp10, min, def, max, help) {#name, exp10, min, def, max},
+#include "firmware/drive/parameters.def"
+#undef PM_PARAM
+};
+
+const drive_param_text_t drive_param_text[DRIVE_PARAM_COUNT] = {
+#define PM_PARAM(name, unit, exp10, min, def, max, help) {unit, help},
 #include "firmware/drive/parameters.def"
 #undef PM_PARAM
 };

@@ -24,13 +24,19 @@ typedef enum {
 
 typedef struct {
     const char *name;
-    const char *unit;
     int32_t exp10;
     int32_t min, def, max;
-    const char *help;
 } drive_param_info_t;
 
 extern const drive_param_info_t drive_param_table[DRIVE_PARAM_COUNT];
+
+/* What people read; the firmware does without it. */
+typedef struct {
+    const char *unit;
+    const char *help;
+} drive_param_text_t;
+
+extern const drive_param_text_t drive_param_text[DRIVE_PARAM_COUNT];
 
 void drive_params_default(drive_params_t *params);
 int32_t drive_param_get(const drive_params_t *params, drive_param_id_t id);

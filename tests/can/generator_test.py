@@ -169,7 +169,7 @@ class Refusals(unittest.TestCase):
                      "what is stored must be writable")
 
     def test_constant_without_preset(self):
-        self.refused("access: const, preset: 0x0001000C", "access: const", "a constant needs a preset")
+        self.refused("access: const, preset: 0x0003000C", "access: const", "a constant needs a preset")
 
     def test_alias_of_nothing(self):
         self.refused("alias: acceleration", "alias: nothing", "no parameter `nothing`")

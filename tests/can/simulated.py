@@ -18,9 +18,8 @@ class Frame(c.Structure):
 
 
 class OdEntry(c.Structure):
-    _fields_ = [("index", c.c_uint16), ("sub", c.c_uint8), ("type", c.c_uint8), ("kind", c.c_uint8),
-                ("group", c.c_uint8), ("flags", c.c_uint16), ("slot", c.c_uint16), ("least", c.c_int32),
-                ("preset", c.c_int32), ("most", c.c_int32)]
+    _fields_ = [("index", c.c_uint16), ("sub", c.c_uint8), ("flags", c.c_uint8), ("type", c.c_uint, 4),
+                ("kind", c.c_uint, 2), ("group", c.c_uint, 2), ("slot", c.c_uint, 10), ("values", c.c_uint, 10)]
 
 
 ENTRY = c.POINTER(OdEntry)
@@ -55,6 +54,7 @@ class Cia402Out(c.Structure):
 
 
 PARAMETER, LIVE = 2, 3
+IDENTIFY = -2
 ALL, MACHINE, LSS = 0, 3, 4
 INCOMPATIBLE = 0x06040043
 
@@ -81,6 +81,7 @@ class SimulatedNode(threading.Thread):
         self.values = {(e.index, e.sub): e.preset or 0 for e in dictionary.ENTRIES if e.number}
         self.kept = {(0x2080, 1): node_id}
         self.backup, self.fault, self.alarms, self.enabled_at, self.speed = None, 0, [], None, 0
+        self.identify_reason, self.identify_s = 0, 0.2
         self.texts = {0x1009: b"simulated", 0x3103: b""}
         self.gate, self.mute = threading.Lock(), False
         self.ending = threading.Event()
@@ -250,13 +251,23 @@ class SimulatedNode(threading.Thread):
             self._clear()
         enable = out.enable and not self.fault
         self.enabled_at = (self.enabled_at or time.monotonic()) if enable else None
-        target = out.velocity if enable else 0
+        if enable and out.mode == IDENTIFY:
+            self._identify()
+        target = out.velocity if enable and out.mode != IDENTIFY else 0
         step = 2e6 * dt
         self.speed += max(-step, min(step, target - self.speed))
         if self.fault:
             self.speed = 0
         self.values[self.place("velocity_actual")] = int(self.speed)
         self.values[self.place("statusword")] = self.lib.cia402_statusword(self.profile, c.byref(inside))
+
+    def _identify(self):
+        """Takes its time, then it is done, or failed for the reason it was given."""
+        gone = (time.monotonic() - self.enabled_at) / self.identify_s
+        done = 3 if self.identify_reason else 2
+        self.values[self.place("identification.state")] = 1 if gone < 1 else done
+        self.values[self.place("identification.progress")] = int(min(100, 100 * gone))
+        self.values[self.place("identification.reason")] = self.identify_reason if gone >= 1 else 0
 
     def run(self):
         last = time.monotonic()

@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "pmdrive"
 import can  # noqa: E402
 import canopen  # noqa: E402
 import pmdrive  # noqa: E402
-from pmdrive import cli, dictionary, files, motion, names  # noqa: E402
+from pmdrive import cli, dictionary, files, identify, motion, names  # noqa: E402
 from simulated import SimulatedNode  # noqa: E402
 
 LIBRARY = None
@@ -418,6 +418,108 @@ class Motion(Bench):
             running.task.stop()
             self.command("stop")
             self.assertNotEqual(drive.state(), "operation enabled")
+
+
+class Identification(Bench):
+    FOUND = {"R_s": 5900000, "dead_voltage": 7100, "L_d": 42000000, "L_q": 74000000, "L_q_rated": 70000000,
+             "L_dh_rated": 42000000, "L_qh_rated": 62000000, "L_dqh_rated": -4000000, "cross_half": -30000,
+             "psi_m": 235000000, "J": 9000000, "friction": 1000000, "coulomb": 20000}
+
+    def setUp(self):
+        super().setUp()
+        for name, raw in self.FOUND.items():
+            self.node[f"identification.{name}"] = raw
+        self.node["dc_link_voltage"] = 300000
+
+    def test_shows_and_writes(self):
+        out, _ = self.command("identify", "--yes")
+        self.assertIn("0.235 Wb", out)
+        self.assertEqual(self.node["identification.command"], 15)
+        for name in ("R_s", "L_d", "L_q", "L_q_rated", "L_dqh_rated", "cross_half", "psi_m", "J"):
+            self.assertEqual(self.node[name], self.FOUND[name], name)
+        self.assertEqual(self.node["device_drop"], 7100 - 6000)  # 2 us of 100 us at 300 V are the dead time's
+        self.assertIn("nothing to change", self.command("identify", "--yes")[0])
+
+    def test_only_some(self):
+        before = self.node["psi_m"]
+        found = self.json("identify", "--only", "resistance,mechanics", "--yes")[:2]
+        self.assertEqual([sorted(x) for x in found], [["identification.R_s", "identification.dead_voltage"],
+                                                      ["identification.J", "identification.coulomb",
+                                                       "identification.friction"]])
+        self.assertEqual(self.node["identification.command"], 9)
+        self.assertEqual((self.node["R_s"], self.node["J"], self.node["psi_m"]), (5900000, 9000000, before))
+        _, err = self.command("identify", "--only", "colour", "--yes", code=2)
+        self.assertIn("resistance, inductance, flux, mechanics", err)
+
+    def test_asks_before_the_motor_turns(self):
+        with mock.patch.object(sys, "stdin", io.StringIO()):
+            _, err = self.command("identify", code=2)
+        self.assertIn("THE MOTOR TURNS", err)
+        self.assertIn("--yes", err)
+        self.assertIsNone(self.node.enabled_at)
+        self.assertEqual(self.node["R_s"], names.find("R_s").preset)
+
+    def test_asks_before_it_writes(self):
+        with mock.patch("pmdrive.attend.confirm", side_effect=[True, False]):
+            self.command("identify", code=1)
+        self.assertEqual(self.node["R_s"], names.find("R_s").preset)
+
+    def test_says_why_it_failed(self):
+        self.node.identify_reason = 4
+        _, err = self.command("identify", "--yes", code=1)
+        self.assertIn("the rotor does not follow", err)
+        self.assertIn("free the shaft", err)
+        self.assertEqual(self.node["R_s"], names.find("R_s").preset)
+        self.assertEqual(self.node.lib.cia402_on(self.node.profile), 0)
+
+    def test_a_fault_ends_it(self):
+        self.node.identify_s = 30
+        threading.Timer(0.5, self.node.trip, (1,)).start()
+        _, err = self.command("identify", "--yes", code=1)
+        self.assertIn("faults --clear", err)
+
+    def test_interrupt_is_a_quick_stop(self):
+        self.node.identify_s = 30
+        words = []
+        def heard(motion_, controlword, original=motion.Motion._send):
+            words.append(controlword)
+            original(motion_, controlword)
+        with mock.patch.object(motion.Motion, "_send", heard), \
+             mock.patch("pmdrive.identify._wait", side_effect=KeyboardInterrupt):
+            self.command("identify", "--yes", code=130)
+        self.assertIn(motion.QUICK_STOP, words)
+        self.assertEqual(self.node.lib.cia402_on(self.node.profile), 0)
+
+    def test_no_saliency_is_none(self):
+        self.node["identification.L_q"] = 41500000  # below L_d, which the drive would refuse
+        self.node["identification.L_q_rated"] = 41400000
+        self.command("identify", "--only", "inductance", "--yes")
+        self.assertEqual((self.node["L_d"], self.node["L_q"], self.node["L_dqh_rated"]), (41750000, 41750000, 0))
+
+    def test_name_plate(self):
+        _, err = self.command("identify", "--yes", "--rated-current", "4A", code=2)
+        self.assertIn("all four", err)
+        plate = ("--pole-pairs", "4", "--max-speed", "3000rpm", "--dc-link", "300V")
+        _, err = self.command("identify", "--yes", "--rated-current", "40A", *plate, code=2)
+        self.assertIn("cannot measure", err)
+        self.command("identify", "--yes", "--rated-current", "4A", *plate)
+        self.assertEqual((self.node["pole_pairs"], self.node["i_rated"], self.node["speed_max"]), (4, 4000, 314200))
+        self.assertEqual(self.node["psi_m"], self.FOUND["psi_m"])  # a guess first, found then
+
+    def test_tune(self):
+        out, _ = self.command("tune", "--yes", "--bandwidth", "400")
+        self.assertIn("400 Hz", out)
+        self.assertEqual(self.node["current_bandwidth"], 400000)
+        self.assertIn("nothing to change", self.command("tune", "--yes", "--bandwidth", "400")[0])
+        _, err = self.command("tune", "--yes", "--bandwidth", "4000", code=2)
+        self.assertIn("a tenth of f_pwm", err)
+
+    def test_from_python(self):
+        with self.connect() as drive:
+            found = identify.run(drive, ["flux"])
+            self.assertEqual(found, {"flux": {"psi_m": self.FOUND["psi_m"]}})
+            self.assertEqual([(e.name, raw) for e, raw in identify.parameters(drive, found).items()],
+                             [("psi_m", self.FOUND["psi_m"])])
 
 
 class Trace(Bench):

@@ -3,7 +3,8 @@ import sys
 import unittest
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "pmdrive"))
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools" / "pmdrive"))
 from pmdrive import dictionary, files, names  # noqa: E402
 from pmdrive.errors import ABORTS, Refused, UsageError, ValueRefused  # noqa: E402
 from pmdrive.entry import NUMBERS  # noqa: E402
@@ -98,7 +99,8 @@ class Names(unittest.TestCase):
             names.find("2100:FE")
 
     def test_select(self):
-        self.assertEqual(len(names.select([])), 54)
+        parameters = (ROOT / "firmware/drive/parameters.def").read_text().count("\nPM_PARAM(")
+        self.assertEqual(len(names.select([])), parameters)
         self.assertEqual({e.record for e in names.select(["machine", "R_s"])}, {"machine"})
 
     def test_identity_on_the_bus_is_not_among_the_stored(self):

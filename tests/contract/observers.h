@@ -6,6 +6,8 @@
 
 #include "tests/contract/bench.h"
 #include "tests/contract/mras_config.h"
+#include "tests/unit/observers/ekf_bench.h"
+#include "tests/unit/observers/sliding_mode_bench.h"
 
 namespace bench
 {
@@ -42,6 +44,21 @@ inline void configure(flux_linkage_config_t &c, const Machine &m, const Base &b)
 {
     c.flux = flux_config(m, b);
     c.g = PM_Q(0.5);
+}
+
+inline void configure(sliding_mode_config_t &c, const Machine &m, const Base &b)
+{
+    c = sliding_mode_config(m, b, SLIDING_MODE_SATURATION, false);
+}
+
+inline void configure(ekf_full_config_t &c, const Machine &m, const Base &b)
+{
+    c = ekf_full_config(m, b);
+}
+
+inline void configure(ekf_reduced_config_t &c, const Machine &m, const Base &b)
+{
+    c = ekf_reduced_config(m, b);
 }
 
 // The three of observers/mras.h have one configuration.

@@ -46,6 +46,16 @@ def c_flags(entry):
     return " | ".join(flags)
 
 
+def c_values(entry):
+    """Least, preset, most."""
+    return tuple(c_int32(value or 0) for value in (entry.least, entry.preset, entry.most))
+
+
+def all_values(dictionary):
+    """Each that occurs, once."""
+    return sorted({c_values(e) for e in dictionary.entries})
+
+
 FILTERS = {
     "c_text": c_text,
     "c_name": c_name,
@@ -53,9 +63,7 @@ FILTERS = {
     "c_type": lambda e: f"OD_{e.type.upper()}",
     "c_kind": lambda e: KINDS[e.lives],
     "c_group": lambda e: f"OD_GROUP_{e.group.upper()}",
-    "c_least": lambda e: c_int32(e.least or 0),
-    "c_preset": lambda e: c_int32(e.preset or 0),
-    "c_most": lambda e: c_int32(e.most or 0),
+    "c_values": c_values,
 }
 
 

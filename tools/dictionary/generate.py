@@ -32,7 +32,7 @@ def _c_files(render, dictionary, sheet):
            live=dictionary.of("live"), parameters=dictionary.of("parameter"),
            bytes=[e for e in dictionary.of("constant") if e.bits == 0])
     render("firmware/can/dictionary_table.c", "dictionary_table.c.j2", entries=dictionary.entries,
-           schema=emit_c.schema(dictionary))
+           values=emit_c.all_values(dictionary), schema=emit_c.schema(dictionary))
     render(BYTES, "dictionary_bytes.c.j2",
            constants=emit_c.constants(dictionary, sheet))
 

@@ -24,9 +24,9 @@ static void print_parameters()
     for (int i = 0; i < DRIVE_PARAM_COUNT; ++i) {
         const auto id = static_cast<drive_param_id_t>(i);
         const drive_param_info_t &info = drive_param_table[id];
-        std::printf("%-24s %-7s %12s %12s %12s  %s\n", info.name, info.unit,
+        std::printf("%-24s %-7s %12s %12s %12s  %s\n", info.name, drive_param_text[id].unit,
                     format(parameter_si(id, info.min)).c_str(), format(parameter_si(id, info.def)).c_str(),
-                    format(parameter_si(id, info.max)).c_str(), info.help);
+                    format(parameter_si(id, info.max)).c_str(), drive_param_text[id].help);
     }
 }
 

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "hal/sim/sim_loop.h"
+#include "tools/pmsim/rig_drive.h"
 #include "tools/pmsim/rig_sample.h"
 
 struct rig {
@@ -12,6 +13,22 @@ struct rig {
     drive_command_t command;   /* the last one */
     uint8_t given, given_last; /* RECORD_...: before the coming period, before the last one */
 };
+
+/* Bases may be others after a restart. */
+static rig_scale_t scale_of(const app_t *app)
+{
+    return rig_scale(&app->drive.config.base, app->params.pole_pairs, app->slow_divider);
+}
+
+/* The firmware starts again from what is stored; the world goes on. */
+static void restart(rig_t *rig)
+{
+    const double time_us = rig->loop.time_us;
+    rig->loop.hal.reset = false;
+    sim_loop_boot(&rig->loop);
+    rig->loop.time_us = time_us;
+    rig->scale = scale_of(&rig->loop.app);
+}
 
 rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_params_t *params,
                   bool refusal_expected, char *error, size_t error_size)
@@ -35,7 +52,8 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         rig_destroy(rig);
         return NULL;
     }
-    rig->scale = rig_scale(&rig->loop.app.drive.config.base, params->pole_pairs, rig->loop.app.slow_divider);
+    (void)app_save(&rig->loop.hal, params); /* for a restart */
+    rig->scale = scale_of(&rig->loop.app);
     return rig;
 }
 
@@ -45,6 +63,11 @@ void rig_destroy(rig_t *rig)
         plant_destroy(rig->loop.hal.plant);
         free(rig);
     }
+}
+
+const drive_t *rig_drive(const rig_t *rig)
+{
+    return &rig->loop.app.drive;
 }
 
 plant_t *rig_plant(rig_t *rig)
@@ -106,6 +129,9 @@ void rig_step(rig_t *rig, rig_sample_t *sample)
     rig->given_last = rig->given;
     rig->given = 0;
     sim_loop_step(&rig->loop);
+    if (rig->loop.hal.reset) {
+        restart(rig);
+    }
     rig_fill_sample(&rig->scale, &rig->loop.app.drive, &rig->loop.app.out, sample);
 }
 

@@ -28,6 +28,8 @@ static int mode_number(drive_mode_t mode)
         return CIA402_MODE_TORQUE;
     case DRIVE_MODE_CURRENT:
         return CIA402_MODE_CURRENT;
+    case DRIVE_MODE_IDENTIFY:
+        return CIA402_MODE_IDENTIFY;
     case DRIVE_MODE_SPEED:
     default:
         return CIA402_MODE_VELOCITY;

@@ -29,13 +29,13 @@ void commissioning_start_current(drive_t *drive)
     drive->identify.work.kind = KIND_CURRENT;
 }
 
-/* A bandwidth of f_pwm / 50: kp = 0.1257 L / T_s, ki = 0.1257 R. */
+/* A bandwidth of f_pwm / 21: kp = 0.3 L / T_s, ki = 0.3 R. */
 void commissioning_set_gains(drive_t *drive)
 {
     const commissioning_t *self = &drive->identify.work;
     const pm_q_t per_period = pm_div(self->L_d, 4 * commissioning_period(drive)); /* of L / T_s, a quarter */
-    const pm_gain_t kp = pm_mul_sat(per_period, PM_Q(0.1257));
-    const pm_gain_t ki = pm_mul(self->R, PM_Q(0.1257)) / 4;
+    const pm_gain_t kp = pm_mul_sat(per_period, PM_Q(0.3));
+    const pm_gain_t ki = pm_mul(self->R, PM_Q(0.3)) / 4;
     const pm_q_t ratio = pm_sat(pm_div(ki, kp), PM_Q_BITS - 1);
     drive->identify.work.pi = (pm_pi_config_t){.kp = kp, .ki = ki, .kb = pm_shl(ratio, 31 - PM_Q_BITS)};
 }
@@ -104,6 +104,7 @@ static void turn(drive_t *drive)
     const pm_ab_t more = regained(drive, ahead);
     self->v = (pm_ab_t){.alpha = v.alpha + more.alpha, .beta = v.beta + more.beta};
     drive->status.i = i;
+    drive->u = u;
     self->sum[0] += u.d;
     self->sum[1] += u.q;
     self->sum[2] += i.d;
@@ -127,7 +128,7 @@ static void bias(drive_t *drive)
     commissioning_t *self = &drive->identify.work;
     const square_t *square = &self->of.square;
     if (square->on_q && square->bias != 0) {
-        const pm_q_t wanted = square->found ? -square->bias : square->bias;
+        const pm_q_t wanted = square->state >= (uint8_t)SQUARE_MEASURES ? -square->bias : square->bias;
         self->v.alpha = axis_voltage(drive, &drive->current.d, wanted - drive->i_ab.alpha);
     }
 }

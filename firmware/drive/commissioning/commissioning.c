@@ -4,6 +4,7 @@
 #include <stddef.h>
 
 #include "firmware/drive/commissioning/commissioning_parts.h"
+#include "firmware/math/root.h"
 
 #define HOLD_MS 500U
 
@@ -39,6 +40,12 @@ pm_q_t commissioning_period(const drive_t *drive)
     return pm_frac(drive->config.k_theta, PM_FRAC(0.0981747704));
 }
 
+static pm_q_t assumed_loss(const drive_t *drive)
+{
+    const modulator_config_t *m = &drive->config.modulator;
+    return m->drop + pm_frac(drive->status.v_dc, pm_shl(m->dead, 32 - PM_SHARE_BITS));
+}
+
 /* What the parts need that is not to be identified is taken from the last results, else from the parameters.
  */
 static void know(drive_t *drive)
@@ -48,7 +55,7 @@ static void know(drive_t *drive)
     const current_control_config_t *c = &drive->config.current;
     self->L_d = r->L_d != 0 ? r->L_d : c->L_d;
     self->L_q = r->L_q != 0 ? r->L_q : c->L_q;
-    self->lost = r->lost;
+    self->lost = r->R != 0 ? r->lost : assumed_loss(drive);
     /* of the current control: kb = R T_s / L */
     self->R = r->R != 0 ? r->R : pm_div(pm_unit(c->L_d, c->d.kb), commissioning_period(drive));
     commissioning_set_gains(drive);

@@ -62,11 +62,12 @@ typedef struct {
     uint16_t half;   /* periods of half a wave */
     uint16_t count;  /* periods of the present one that have gone */
     uint16_t cycles; /* whole waves since the amplitude was found */
-    bool on_q, up, leading, begun, found, done, failed;
+    uint8_t state;   /* SQUARE_... */
+    bool on_q, up, leading;
     pm_q_t voltage;
-    pm_q_t wanted; /* amplitude of the current */
-    pm_q_t peak;   /* of the present wave */
-    pm_q_t bias;   /* i_d meanwhile: positive while the amplitude is sought, negative while it is measured */
+    pm_q_t wanted;   /* amplitude of the current */
+    pm_q_t top, low; /* of the present wave, either direction */
+    pm_q_t bias; /* i_d meanwhile: positive while the amplitude is sought, negative while it is measured */
 } square_t;
 
 /* At work; shares its place with the estimators of the position. */
@@ -88,8 +89,10 @@ typedef struct {
             pm_q_t slope_v, slope_i, v, i; /* over the levels: weighted with 3, 1, -1, -3, and plain */
         } resistance;
         struct {
-            pm_q_t omega;
+            pm_q_t omega, omega_ref; /* at the top, and now, without what damps the swing */
+            pm_q_t u_d;              /* mean of a quarter of a second */
             int32_t count;           /* of the torques in the sum */
+            pm_q_t psi_full;         /* magnet flux, measured at full current */
             pm_q_t tau_up, tau_even; /* u_d / omega while speeding up, at speed */
         } rotation;
     } of;

@@ -15,6 +15,7 @@ pm_q_t commissioning_mean(const commissioning_t *self, uint32_t n); /* of sum n 
 
 /* square.c: one period of the square wave; what is summed up, beside currents and fluxes in w = v - R i -
  * lost per T_s. */
+enum { SQUARE_WAITS, SQUARE_SEEKS, SQUARE_MEASURES, SQUARE_DONE, SQUARE_FAILED };
 #define SQUARE_LONGEST 256U /* periods of half a wave */
 enum { SUM_FLUX, SUM_CURRENT, SUM_D_FLUX, SUM_D_CURRENT, SUM_SQUARE };
 void square_step(drive_t *drive, pm_ab_t v_past);

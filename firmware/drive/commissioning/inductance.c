@@ -97,10 +97,10 @@ static void conclude(drive_t *drive, bool on_q, bool rated, pm_q_t L)
 phase_result_t inductance_slow(drive_t *drive, bool on_q, bool rated)
 {
     const commissioning_t *self = &drive->identify.work;
-    if (self->of.square.failed) {
+    if (self->of.square.state == (uint8_t)SQUARE_FAILED) {
         return (phase_result_t){.failed = COMMISSIONING_NO_CURRENT};
     }
-    if (!self->of.square.done) {
+    if (self->of.square.state != (uint8_t)SQUARE_DONE) {
         return (phase_result_t){.done = false};
     }
     if (self->sum[SUM_FLUX] <= 0 || self->sum[SUM_CURRENT] <= 0) {

@@ -16,7 +16,7 @@
 enum { U_D, U_Q, I_D, I_Q, TORQUE }; /* of the sums */
 
 typedef struct {
-    pm_q_t length, i_d;
+    pm_q_t psi; /* of the magnet */
     bool follows;
 } active_t;
 
@@ -26,6 +26,8 @@ void rotation_enter(drive_t *drive)
     self->of.rotation.omega =
         pm_clamp(drive->omega_target, -drive->config.omega_max, drive->config.omega_max);
     self->of.rotation.count = 0;
+    self->of.rotation.omega_ref = 0;
+    self->of.rotation.u_d = drive->u.d;
 }
 
 static pm_q_t ramp_step(const commissioning_t *self)
@@ -46,7 +48,7 @@ static void take_torque(drive_t *drive)
 {
     commissioning_t *self = &drive->identify.work;
     const pm_q_t top = pm_abs(self->of.rotation.omega);
-    const pm_q_t omega = pm_abs(drive->omega_open);
+    const pm_q_t omega = pm_abs(self->of.rotation.omega_ref);
     if (omega > top / 2 && omega < top - top / 10) {
         self->sum[TORQUE] += torque_voltage(self, omega);
         self->of.rotation.count++;
@@ -62,13 +64,32 @@ static pm_q_t mean_torque(const commissioning_t *self)
     return count == 0 ? 0 : (pm_q_t)(self->sum[TORQUE] / count);
 }
 
+/* A rotor on a vector that turns by itself swings like a pendulum. u_d rises by u_q per radian that it falls
+ * behind; the vector then waits for it: 30 rad/s per radian. */
+static void turn_on(drive_t *drive, pm_q_t target)
+{
+    commissioning_t *self = &drive->identify.work;
+    const pm_q_t ref = commissioning_approach(self->of.rotation.omega_ref, target, ramp_step(self));
+    const pm_q_t off = drive->u.d - self->of.rotation.u_d;
+    self->of.rotation.u_d += off / 256;
+    self->of.rotation.omega_ref = ref;
+    drive->omega_open = ref;
+    if (pm_abs(ref) > pm_abs(self->of.rotation.omega) / 4) {
+        const pm_q_t behind = pm_clamp(pm_div(off, pm_abs(drive->u.q)), -PM_Q(0.3), PM_Q(0.3));
+        /* per-unit: 0.03 over the radians of a millisecond at base speed */
+        const pm_q_t per_ms = commissioning_period(drive) * (int32_t)drive->config.slow_divider;
+        const pm_q_t back = pm_mul(behind, pm_div(PM_Q(0.03), per_ms));
+        drive->omega_open -= ref < 0 ? -back : back;
+    }
+}
+
 phase_result_t rotation_up(drive_t *drive)
 {
     commissioning_t *self = &drive->identify.work;
     take_torque(drive);
-    drive->omega_open = commissioning_approach(drive->omega_open, self->of.rotation.omega, ramp_step(self));
+    turn_on(drive, self->of.rotation.omega);
     self->of.rotation.tau_up = mean_torque(self);
-    return (phase_result_t){.done = drive->omega_open == self->of.rotation.omega};
+    return (phase_result_t){.done = self->of.rotation.omega_ref == self->of.rotation.omega};
 }
 
 static active_t active_flux(const drive_t *drive)
@@ -82,8 +103,10 @@ static active_t active_flux(const drive_t *drive)
     const pm_q_t d = pm_div(e_q, speed) - pm_mul(self->L_q, i);
     const pm_q_t q = pm_div(e_d, speed);
     const pm_q_t length = pm_hypot(d, q);
-    const bool follows = d > pm_mul(self->L_q, i) / 8 && pm_abs(q) < 2 * d;
-    return (active_t){.length = length, .i_d = pm_mul(i, pm_div(d, pm_max(length, 1))), .follows = follows};
+    const pm_q_t i_d = pm_mul(i, pm_div(d, pm_max(length, 1)));
+    const pm_q_t psi = length + pm_mul(self->L_q - self->L_d, i_d);
+    const bool follows = d > pm_mul(self->L_q, i) / 8 && pm_abs(q) < 2 * d && psi > 0;
+    return (active_t){.psi = psi, .follows = follows};
 }
 
 static bool is_measured(commissioning_t *self)
@@ -100,6 +123,7 @@ static const phase_result_t stuck = {.failed = COMMISSIONING_NOT_TURNING};
 phase_result_t rotation_full(drive_t *drive)
 {
     commissioning_t *self = &drive->identify.work;
+    turn_on(drive, self->of.rotation.omega);
     if (!is_measured(self)) {
         return running;
     }
@@ -107,7 +131,8 @@ phase_result_t rotation_full(drive_t *drive)
     if (!active.follows) {
         return stuck;
     }
-    self->of.rotation.tau_even = torque_voltage(self, pm_abs(drive->omega_open));
+    self->of.rotation.psi_full = active.psi;
+    self->of.rotation.tau_even = torque_voltage(self, pm_abs(self->of.rotation.omega));
     return (phase_result_t){.done = true};
 }
 
@@ -118,15 +143,16 @@ phase_result_t rotation_less(drive_t *drive)
     commissioning_result_t *r = &drive->commissioning_report.result;
     const pm_q_t half = commissioning_current(drive) / 4;
     drive->i_ref.d = commissioning_approach(drive->i_ref.d, half, half / 64 + 1);
+    turn_on(drive, self->of.rotation.omega);
     if (!is_measured(self)) {
         return running;
     }
     const active_t active = active_flux(drive);
-    if (!active.follows) {
+    /* what the current alone makes of a rotor that stands would be half now */
+    if (!active.follows || active.psi < pm_mul(self->of.rotation.psi_full, PM_Q(0.75))) {
         return stuck;
     }
-    const pm_q_t psi = active.length + pm_mul(self->L_q - self->L_d, active.i_d);
-    r->psi_m = psi;
+    r->psi_m = active.psi;
     return (phase_result_t){.done = true};
 }
 
@@ -152,13 +178,14 @@ phase_result_t rotation_down(drive_t *drive)
     const pm_q_t full = commissioning_current(drive) / 2;
     if (self->ms < SETTLE_MS) {
         drive->i_ref.d = commissioning_approach(drive->i_ref.d, full, full / 64 + 1);
+        turn_on(drive, self->of.rotation.omega);
         commissioning_clear_sums(self);
         self->of.rotation.count = 0;
         return running;
     }
     take_torque(drive);
-    drive->omega_open = commissioning_approach(drive->omega_open, 0, ramp_step(self));
-    if (drive->omega_open != 0) {
+    turn_on(drive, 0);
+    if (self->of.rotation.omega_ref != 0) {
         return running;
     }
     const pm_q_t tau_down = mean_torque(self);

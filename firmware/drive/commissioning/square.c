@@ -4,16 +4,11 @@
 #define SETTLE_CYCLES 3U
 #define CYCLES        24U
 #define BIASED_CYCLES 2U
-/* Currents below tell no sign: four steps of a 12-bit converter. */
-#define NO_SIGN PM_Q(8.0 / 4096.0)
 /* Of products, so that the sum of thousands fits. */
 #define FINE 65536
 
 static int32_t sign_of(pm_q_t i)
 {
-    if (pm_abs(i) < 4 * NO_SIGN) {
-        return 0;
-    }
     return i < 0 ? -1 : 1;
 }
 
@@ -22,10 +17,10 @@ static int32_t sign_of(pm_q_t i)
 static int32_t signs(pm_q_t from, pm_q_t to, pm_q_t u, pm_q_t edge)
 {
     if (u > edge) {
-        return sign_of(4 * from) + sign_of(4 * to);
+        return sign_of(from) + sign_of(to);
     }
     if (u < -edge) {
-        return 2 * sign_of(2 * from + 2 * to);
+        return 2 * sign_of(from + to);
     }
     return sign_of(3 * from + to) + sign_of(from + 3 * to);
 }
@@ -56,7 +51,8 @@ static void take(drive_t *drive, pm_ab_t v)
     if (self->of.square.on_q) {
         self->sum[SUM_FLUX] += v.beta < 0 ? -w.beta : w.beta;
         self->sum[SUM_CURRENT] += v.beta < 0 ? -di.beta : di.beta;
-        const pm_q_t x = pm_mul(mean.beta, di.beta);
+        const pm_q_t far = pm_mul(self->of.square.wanted, PM_Q(0.8)); /* near the current that it is for */
+        const pm_q_t x = pm_abs(mean.beta) > far ? pm_mul(mean.beta, di.beta) : 0;
         self->sum[SUM_D_FLUX] += (int64_t)w.alpha * x / FINE;
         self->sum[SUM_D_CURRENT] += (int64_t)di.alpha * x / FINE;
         self->sum[SUM_SQUARE] += (int64_t)x * x / FINE;
@@ -72,54 +68,66 @@ static uint32_t settling(const square_t *square)
     return square->bias != 0 ? 1U : SETTLE_CYCLES;
 }
 
-/* A whole wave has ended. */
+/* A whole wave has ended, in the middle of its rise: the current is zero, and a change of the voltage here
+ * leaves no mean behind, which would turn the rotor. */
 static void judge(drive_t *drive, square_t *square)
 {
     const uint32_t cycles = square->bias != 0 ? BIASED_CYCLES : CYCLES;
-    if (square->found) {
+    if (square->leading) {
+        square->leading = false; /* not a whole one */
+    } else if (square->state == (uint8_t)SQUARE_MEASURES) {
         square->cycles++;
-        square->done = square->cycles >= settling(square) + cycles;
-    } else if (square->peak >= square->wanted) {
-        square->found = true;
+        if (square->cycles >= settling(square) + cycles) {
+            square->state = (uint8_t)SQUARE_DONE;
+        }
+    } else if (pm_min(square->top, square->low) >= square->wanted) {
+        square->state = (uint8_t)SQUARE_MEASURES;
         commissioning_clear_sums(&drive->identify.work);
     } else {
-        square->voltage += square->voltage / 8;
+        square->voltage += square->voltage / 12;
         if (square->voltage > pm_mul(drive->status.v_dc, PM_Q(0.4))) {
             square->voltage /= 2;
             square->half = (uint16_t)(2U * square->half);
-            square->failed = square->half > SQUARE_LONGEST;
+            square->count = square->half / 2U;
+            if (square->half > SQUARE_LONGEST) {
+                square->state = (uint8_t)SQUARE_FAILED;
+            }
         }
     }
-    square->peak = 0;
+    square->top = 0;
+    square->low = 0;
+}
+
+/* The first waves are such that the rotor has no speed when the current is at its peaks: then its mean speed
+ * is zero, too. */
+static void flip(square_t *square)
+{
+    square->count = square->leading ? (uint16_t)((uint32_t)square->half * 146U / 1000U) : 0U;
+    square->up = !square->up;
 }
 
 void square_step(drive_t *drive, pm_ab_t v_past)
 {
     commissioning_t *self = &drive->identify.work;
     square_t *square = &self->of.square;
-    const pm_q_t i = pm_abs(square->on_q ? drive->i_ab.beta : drive->i_ab.alpha);
-    if (!square->begun) { /* what flowed before goes first */
-        square->begun = i < square->wanted / 8;
+    const pm_q_t i = square->on_q ? drive->i_ab.beta : drive->i_ab.alpha;
+    if (square->state == (uint8_t)SQUARE_WAITS) { /* what flowed before goes first */
+        square->state = (uint8_t)(pm_abs(i) < square->wanted / 8 ? SQUARE_SEEKS : SQUARE_WAITS);
         return;
     }
-    square->peak = pm_max(square->peak, i);
-    if (square->found && square->cycles >= settling(square) && !square->done) {
+    square->top = pm_max(square->top, i);
+    square->low = pm_max(square->low, -i);
+    if (square->state == (uint8_t)SQUARE_MEASURES && square->cycles >= settling(square)) {
         take(drive, v_past);
     }
     if (square->count >= square->half) {
-        /* The first waves are such that the rotor has no speed when the current is at its peaks: then its
-         * mean speed is zero, too. */
-        square->count = square->leading ? (uint16_t)((uint32_t)square->half * 146U / 1000U) : 0U;
-        square->up = !square->up;
-        const bool judged = square->up && !square->leading;
-        square->leading = false;
-        if (judged && !square->done) {
-            judge(drive, square);
-        }
+        flip(square);
+    }
+    if (square->up && square->count == square->half / 2U && square->state < (uint8_t)SQUARE_DONE) {
+        judge(drive, square);
     }
     square->count++;
-    const bool quiet = square->done || square->failed;
-    const pm_q_t v = quiet ? 0 : square->voltage;
+    const pm_q_t v = square->state < (uint8_t)SQUARE_DONE ? square->voltage : 0;
     pm_q_t *axis = square->on_q ? &self->v.beta : &self->v.alpha;
     *axis = square->up ? v : -v;
 }

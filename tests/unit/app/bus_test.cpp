@@ -394,7 +394,8 @@ TEST(BusTrace, RecordsTheStart)
     EXPECT_GT(x.loop.app.periods, first);
     ASSERT_GE(truth.size(), 1000U); // the first were taken while the answer was waited for
     ASSERT_EQ(x.get(0x3100, 2) & 0xFF, uint32_t(TRACE_COMPLETE));
-    ASSERT_EQ(x.get(0x3100, 8), 1024U);
+    const size_t samples = APP_TRACE_NUMBERS / 4;
+    ASSERT_EQ(x.get(0x3100, 8), samples);
     // scale: two times the base
     EXPECT_EQ(int32_t(x.get(0x3102, 1)), 2 * defaults().i_full_scale);
     EXPECT_NEAR(double(x.get(0x3102, 4)), 2.0 * defaults().speed_trip, 2);
@@ -417,11 +418,11 @@ TEST(BusTrace, RecordsTheStart)
             }
         }
     }
-    ASSERT_GE(bytes.size(), 8192U);
+    ASSERT_GE(bytes.size(), 2 * APP_TRACE_NUMBERS);
     size_t wrong = 0;
-    for (size_t n = 4 * (1024 - std::min<size_t>(1024, truth.size())); n < 4096; ++n) {
+    for (size_t n = 4 * (samples - std::min(samples, truth.size())); n < APP_TRACE_NUMBERS; ++n) {
         const auto value = int16_t(bytes[2 * n] | bytes[2 * n + 1] << 8);
-        const size_t sample = truth.size() - 1024 + n / 4;
+        const size_t sample = truth.size() - samples + n / 4;
         wrong += value != truth[sample][n % 4] ? 1 : 0;
     }
     EXPECT_EQ(wrong, 0U);

@@ -256,6 +256,32 @@ TEST(Emcy, TellsErrorsAndTheirEnd)
     EXPECT_EQ(x.value(0x1003, 2), 0x33442310U);
 }
 
+// More at once than wait: some are lost, but not what is there in the end.
+TEST(Emcy, TheLastWordIsTrue)
+{
+    for (const uint16_t last : {uint16_t(0), uint16_t(0x8120)}) {
+        Bench x;
+        for (int n = 0; n < 20; ++n) {
+            node_error(&x.node, NODE_ERROR_BUS, 0x8120, 0);
+            node_error(&x.node, NODE_ERROR_BUS, 0, 0);
+        }
+        node_error(&x.node, NODE_ERROR_APPLICATION, 0x2310, 0);
+        node_error(&x.node, NODE_ERROR_BUS, last, 0);
+        x.run_ms(200);
+        std::map<uint32_t, int> told; // by code, and the last of the bus's
+        uint32_t of_bus = 0, error_register = 0;
+        for (const node_frame_t &frame : x.take(0x81)) {
+            const uint32_t code = can::le(frame.data, 2);
+            told[code]++;
+            of_bus = code == 0x2310 ? of_bus : code;
+            error_register = frame.data[2];
+        }
+        EXPECT_EQ(told[0x2310], 1);
+        EXPECT_EQ(of_bus, last);
+        EXPECT_EQ(error_register, x.value(0x1001));
+    }
+}
+
 TEST(Emcy, RegisterSaysTheClass)
 {
     const std::vector<std::pair<int, uint32_t>> all = {
@@ -447,7 +473,8 @@ class Lss : public Bench
 
     uint32_t identity(uint8_t n)
     {
-        return can::entry(0x1018, n)->kind == OD_NODE ? 0x12345678 : uint32_t(can::entry(0x1018, n)->preset);
+        return can::entry(0x1018, n)->kind == OD_NODE ? 0x12345678
+                                                      : uint32_t(od_values_of(can::entry(0x1018, n))->preset);
     }
 };
 

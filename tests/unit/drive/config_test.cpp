@@ -382,8 +382,6 @@ std::vector<std::pair<const char *, int64_t>> must_be_positive(const drive_confi
         {"speed kb", c.speed.pi.kb},
         {"speed slope", c.speed.slope},
         {"fw k", c.field_weakening.k},
-        {"flux R", c.position.observer.active_flux.model.R},
-        {"flux t_s", c.position.observer.active_flux.model.t_s},
         {"pll_low kp", c.position.pll_low.kp_turn},
         {"pll_low ki", c.position.pll_low.ki},
         {"pll_high kp", c.position.pll_high.kp_turn},
@@ -398,9 +396,25 @@ std::vector<std::pair<const char *, int64_t>> must_be_positive(const drive_confi
         {"omega_stall", c.protection.omega_stall},
         {"i_trip", c.protection.i_trip},
     };
-    if (c.position.observer.id == OBSERVER_active_flux) {
-        x.push_back({"flux g", c.position.observer.active_flux.g});
-        x.push_back({"flux k_seed", c.position.observer.active_flux.k_seed});
+    const observer_config_t &o = c.position.observer;
+    if (o.id == OBSERVER_active_flux || o.id == OBSERVER_flux_linkage) {
+        const active_flux_config_t &f = o.id == OBSERVER_active_flux ? o.active_flux : o.flux_linkage.flux;
+        x.push_back({"flux R", f.model.R});
+        x.push_back({"flux t_s", f.model.t_s});
+        x.push_back({"flux g", f.g});
+        x.push_back({"flux k_seed", f.k_seed});
+    }
+    if (o.id == OBSERVER_back_emf || o.id == OBSERVER_extended_emf || o.id == OBSERVER_extended_emf_ab) {
+        const emf_config_t &e = o.extended_emf;
+        x.push_back({"EMF R", e.model.R});
+        x.push_back({"EMF k_filter", e.k_filter});
+        x.push_back({"EMF lag", e.lag});
+        x.push_back({"EMF rate", e.rate});
+        x.push_back({"EMF slow_rate", e.slow_rate});
+        x.push_back({"EMF slow_step", e.slow_step});
+        x.push_back({"EMF speed_lag", e.speed_lag});
+        x.push_back({"EMF omega_min", e.omega_min});
+        x.push_back({"EMF omega_tied", e.omega_tied});
     }
     if (c.position.observer.id == OBSERVER_mras_current || c.position.observer.id == OBSERVER_mras_voltage ||
         c.position.observer.id == OBSERVER_mras_simple) {

@@ -15,8 +15,8 @@ TEST(Parameters, TableIsComplete)
     for (int id = 0; id < DRIVE_PARAM_COUNT; ++id) {
         const drive_param_info_t &p = drive_param_table[id];
         EXPECT_TRUE(names.insert(p.name).second) << p.name;
-        EXPECT_NE(std::string(p.unit), "") << p.name;
-        EXPECT_NE(std::string(p.help), "") << p.name;
+        EXPECT_NE(std::string(drive_param_text[id].unit), "") << p.name;
+        EXPECT_NE(std::string(drive_param_text[id].help), "") << p.name;
         EXPECT_LT(p.min, p.max) << p.name;
         EXPECT_GE(p.def, p.min) << p.name;
         EXPECT_LE(p.def, p.max) << p.name;

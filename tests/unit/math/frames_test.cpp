@@ -27,6 +27,9 @@ constexpr double kRoundTripError = 4;
 // pm_dir() has 7e-7 per component; turning by it and back loses its length error once more.
 constexpr double kTurnRoundTripError = 1.4e-6;
 
+// 3/40 x^5, the term that is left out, at 0.2.
+constexpr double kTurnError = 2.5e-5;
+
 constexpr double kPhaseRange = 2.6;
 constexpr double kInverseRange = 4.0;
 constexpr double kVectorRange = 7.999;
@@ -192,6 +195,26 @@ TEST(MathFrames, ParkRoundTrip)
         worst = std::max(worst, (vector(back) - vector(x)).norm() / length);
     });
     EXPECT_LE(worst, kTurnRoundTripError);
+}
+
+TEST(MathFrames, TurnBetweenTwoDirections)
+{
+    const auto turn = [](double from, double by) {
+        const auto dir = [](double rad) {
+            return pm_dir_t{static_cast<pm_unit_t>(std::lround(std::cos(rad) * PM_UNIT_MAX)),
+                            static_cast<pm_unit_t>(std::lround(std::sin(rad) * PM_UNIT_MAX))};
+        };
+        return real(pm_dir_turn(dir(from), dir(from + by)));
+    };
+    for (double from = -3; from < 3; from += 0.37) {
+        for (double by = 0; by <= 0.2; by += 0.01) {
+            ASSERT_NEAR(turn(from, by), by, kTurnError) << from;
+            ASSERT_NEAR(turn(from, -by), -by, kTurnError) << from;
+        }
+        for (double by = 0.3; by < 1.5; by += 0.1) {
+            ASSERT_GT(turn(from, by), turn(from, by - 0.1));
+        }
+    }
 }
 
 } // namespace

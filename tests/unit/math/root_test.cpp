@@ -185,4 +185,16 @@ TEST(MathRoot, PerVolt)
     EXPECT_GT(pm_per_volt(PM_ONE / 16), 0);
 }
 
+TEST(MathRoot, RootTwiceHasTheShapeOfTheRoot)
+{
+    for (double x = 1; x < 0x1p31; x *= 1.003) {
+        const auto whole = static_cast<int32_t>(x);
+        const double exact = 2 * std::sqrt(static_cast<double>(whole));
+        const double actual = pm_root_twice(whole);
+        ASSERT_GE(actual, exact - 1) << whole; // what the shift cuts
+        ASSERT_LE(actual, 1.061 * exact) << whole;
+    }
+    EXPECT_EQ(pm_root_twice(0), 1);
+}
+
 } // namespace

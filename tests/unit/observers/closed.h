@@ -1,16 +1,26 @@
-// Any observer of the list with a phase-locked loop in double around a rotor at constant speed.
+// Any observer of the list with a phase-locked loop in double around a rotor at constant speed, with or
+// without the noise of a converter.
 #pragma once
 
+#include <algorithm>
+
 #include "tests/contract/bench.h"
+#include "tests/unit/math/samples.h"
 
 namespace bench
 {
 
+constexpr double kConverterNoise_A = 2.8e-3; // half a step of 12 bits for +-10 A, and its quantisation
+
+struct Errors {
+    double mean = 0, max = 0, ripple = 0; // degrees
+};
+
 class Closed
 {
   public:
-    Closed(const Base &base, const observer_config_t &of, const Rotation &truth)
-        : config(of), rotation(truth), base_(base)
+    Closed(const Base &base, const observer_config_t &of, const Rotation &truth, double noise_A = 0)
+        : config(of), rotation(truth), base_(base), noise_A_(noise_A)
     {
         loop.theta_rad = rotation.theta_rad;
         loop.omega_rad_s = rotation.omega_rad_s;
@@ -22,7 +32,8 @@ class Closed
     {
         rotation.advance();
         loop.predict(base_.period_s);
-        in = rotation.seen(loop.theta_rad, loop.omega_rad_s);
+        const Complex noise = noise_A_ == 0 ? 0 : noise_A_ * Complex{gauss(), gauss()};
+        in = rotation.seen(loop.theta_rad, loop.omega_rad_s, 0, noise);
         observer_step(&state, &config, &in, &out);
         loop.correct(real(out.eps), base_.period_s);
         if (++periods_ % 10 == 0) {
@@ -43,6 +54,23 @@ class Closed
         return error_deg();
     }
 
+    Errors settled(double settle_s = 0.5, double seconds = 0.5)
+    {
+        const auto n = static_cast<int>(seconds / base_.period_s);
+        settled_deg(settle_s);
+        double sum = 0, squares = 0;
+        Errors e;
+        for (int k = 0; k < n; ++k) {
+            step();
+            sum += error_deg();
+            squares += error_deg() * error_deg();
+            e.max = std::max(e.max, std::abs(error_deg()));
+        }
+        e.mean = sum / n;
+        e.ripple = std::sqrt(std::max(0.0, squares / n - e.mean * e.mean));
+        return e;
+    }
+
     observer_config_t config;
     observer_t state = {};
     Loop loop;
@@ -51,7 +79,18 @@ class Closed
     obs_out_t out = {};
 
   private:
+    double gauss() // of twelve uniform ones
+    {
+        double sum = -6;
+        for (int k = 0; k < 12; ++k) {
+            sum += random_.within(0, 1);
+        }
+        return sum;
+    }
+
     Base base_;
+    double noise_A_;
+    samples::Random random_;
     int periods_ = 0;
 };
 

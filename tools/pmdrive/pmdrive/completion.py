@@ -34,12 +34,18 @@ def _words(parser):
     return found
 
 
+def commands():
+    """{name: parser}"""
+    from . import cli
+
+    return next(action.choices for action in cli.parser()._actions if hasattr(action.choices, "items"))
+
+
 def script():
     from . import cli
 
-    top = cli.parser()
-    commands = next(action.choices for action in top._actions if hasattr(action.choices, "items"))
+    found = commands()
     objects = " ".join(sorted({*(e.name for e in dictionary.ENTRIES), *names.RECORDS}))
     cases = [f"        {name}) words='{' '.join(_words(sub))}{' ' + objects if name in TAKE_NAMES else ''}' ;;"
-             for name, sub in commands.items()]
-    return SCRIPT.format(commands="|".join(commands), top=" ".join(_words(top)), cases="\n".join(cases))
+             for name, sub in found.items()]
+    return SCRIPT.format(commands="|".join(found), top=" ".join(_words(cli.parser())), cases="\n".join(cases))

@@ -84,7 +84,7 @@ def _inductances(x):
         x["L_q_rated"] *= (x["L_d"] + x["L_q"]) / 2 / x["L_q"]
         x["L_d"] = x["L_q"] = x["L_dh_rated"] = (x["L_d"] + x["L_q"]) / 2
         x["L_q_rated"] = min(x["L_q_rated"], x["L_q"])
-        x["L_qh_rated"] = 3 * x["L_q_rated"] - 2 * x["L_q"]
+        x["L_qh_rated"] = 4 * x["L_q_rated"] - 3 * x["L_q"]
         x["L_dqh_rated"] = x["cross_half"] = 0.0
     x["L_qh_rated"] = max(x["L_qh_rated"], 0.3 * x["L_q_rated"])
 

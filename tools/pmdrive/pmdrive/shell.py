@@ -3,10 +3,9 @@ import cmd
 import shlex
 
 from . import dictionary, names
+from .completion import commands
 from .errors import PmdriveError
 
-WORDS = ("scan", "info", "list", "get", "set", "dump", "load", "diff", "save", "restore", "reset", "faults", "monitor", "run",
-         "identify", "tune", "stop", "trace", "flash", "eds", "shell", "completion", "help")
 OBJECTS = sorted([*(e.name for e in dictionary.ENTRIES), *names.RECORDS])
 
 
@@ -41,7 +40,7 @@ class Shell(cmd.Cmd):
         pass
 
     def completenames(self, text, *_):
-        return [word for word in WORDS if word.startswith(text)]
+        return [word for word in commands() if word.startswith(text)]
 
     def completedefault(self, text, *_):
         return [name for name in OBJECTS if name.startswith(text)]

@@ -1,0 +1,22 @@
+/* The observer that the parameters name. */
+#include "firmware/drive/config_maker.h"
+
+void make_observer(maker_t *m, observer_config_t *c)
+{
+    c->id = (observer_id_t)m->params->observer;
+    switch (c->id) {
+#define PM_OBSERVER(name, help)                                                                              \
+    case OBSERVER_##name:                                                                                    \
+        make_##name(m, &c->name);                                                                            \
+        break;
+#ifdef PM_OBSERVERS_SMALL
+#define PM_OBSERVER_LARGE(name, help)
+#endif
+#include "observers/observers.def"
+#undef PM_OBSERVER
+    case OBSERVER_COUNT:
+    default: /* the range of the parameter ends before */
+        refuse(m, DRIVE_PARAM_observer, "is not in this image");
+        break;
+    }
+}

@@ -1,0 +1,55 @@
+/* Extended Kalman filter of full order (METHODS.md 12.4.1 to 12.4.3, row 142).
+ *
+ * States: the two currents as fluxes lambda = (L + R T_s / 2) i, the speed omega, and delta = theta_rotor -
+ * theta, the error of the present position; that frame moves with the loop, and delta by as much the other
+ * way. So the Jacobian has no sine or cosine and the covariance is nearly constant. Model, in the present
+ * frame: psi = (lambda_d + psi_m cos delta + eta sin delta, lambda_q + psi_a sin delta),  eta = (L_d - L_q)
+ * i_q psi(k) = psi(k-1) turned back by the frame's turn, + T_s v - T_s R i (mean of both ends) omega(k) =
+ * omega(k-1),  delta(k) = delta(k-1) + T_s omega - turn The stator flux is advanced exactly, in the
+ * stationary frame, so nothing of omega T_s is neglected. Assumed: L_d constant, L_q(i_q) renewed at 1 kHz, R
+ * known. Salient machines need no more than round ones. Measured are both currents, one after the other,
+ * which needs no inverse of a matrix.
+ *
+ * Covariance: firmware/math/kalman.h (Joseph, why there), with F at delta = 0:
+ *   F = [1 s 0 w; -s 1 -b 0; 0 0 1 0; 0 0 T_s 1], s = omega T_s, w = omega b,  b = psi_a / (4 psi_m)
+ * in units of 0.25 rad, 0.25 of the base speed and u = psi_m T_s w_base: the EMF of base speed in one period.
+ * Noise: q_lambda is that of the voltage (dead time, link), q_omega the acceleration, q_delta what the model
+ * does not know of the angle, r_d and r_q the converter's noise. All in the units above, squared, per period.
+ * How to choose them: tools/ekf_tune, docs/results/ekf_tuning.md.
+ *
+ * Called each period; the result belongs to k. Range: |psi| < 4, L < 4, |delta| <= 1, |omega| < 2; an
+ * innovation counts up to 32 u. At weight 0 delta is halved each slow step and all else starts anew.
+ * misfit: innovation of the q-axis over u. vector: active flux. Tests: tests/unit/observers/ekf_test.cpp
+ * (against Eigen in double precision), tests/scenario. Cost: tests/target/observers. */
+#ifndef OBSERVERS_EKF_FULL_H
+#define OBSERVERS_EKF_FULL_H
+
+#include "firmware/math/kalman.h"
+#include "observers/dq_flux.h"
+
+enum { EKF_LAMBDA_D, EKF_LAMBDA_Q, EKF_OMEGA, EKF_DELTA, EKF_STATES };
+
+typedef struct {
+    observer_model_t model;
+    int32_t per_unit; /* 1 / u, Q20 */
+    /* variances, Q30 */
+    int32_t q_lambda, q_omega, q_delta; /* >= PM_KALMAN_LEAST(4) */
+    int32_t r_d, r_q;                   /* >= 2^-20 */
+} ekf_full_config_t;
+
+typedef struct {
+    int32_t P[PM_KALMAN_SIZE(EKF_STATES)];
+    dq_flux_t flux;
+    pm_q_t omega, delta; /* delta in rad */
+    pm_frac_t b;         /* Q32 */
+    pm_q_t misfit;       /* of the last step */
+} ekf_full_t;
+
+void ekf_full_reset(ekf_full_t *self, const ekf_full_config_t *config, const obs_in_t *in);
+void ekf_full_step(ekf_full_t *self, const ekf_full_config_t *config, const obs_in_t *in, obs_out_t *out);
+obs_out_t ekf_full_last(const ekf_full_t *self);
+void ekf_full_tie(ekf_full_t *self, const ekf_full_config_t *config);
+void ekf_full_slow(ekf_full_t *self, const ekf_full_config_t *config, const obs_in_t *in,
+                   const obs_out_t *out, pm_q_t weight);
+
+#endif

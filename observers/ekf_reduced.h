@@ -1,0 +1,58 @@
+/* Extended Kalman filter of reduced order: speed and angle, from the EMF (METHODS.md 12.4.4, row 143).
+ *
+ * States: omega and delta = theta_rotor - theta, the error of the present position, as in ekf_full.h.
+ * Measured is what the machine at the present position does not explain of the stator flux psi = (L_d i_d +
+ * psi_m, L_q i_q), rho = psi(k-1) turned back by the frame's turn + T_s v - T_s R i - psi(k) = T_s omega
+ * delta (-psi_a, eta) + (T_s omega - turn) (eta, psi_a),  eta = (L_d - L_q) i_q, the EMF of the period
+ * against that of the present position, without an approximation in omega T_s. Angle and speed act on it at
+ * right angles, and the angle's part alone is taken, z = (-psi_a rho_d + eta rho_q) / (T_s omega (psi_a^2 +
+ * eta^2)) = sin delta with the variance r psi_m^2 / (psi_a^2 + eta^2) / omega^2 (omega per-unit, r that of
+ * rho / u). The other tells the speed, but so does the turning of delta, and a wrong psi_m in a measured
+ * speed would move the angle by much. (With the d-component alone the loop is unstable when a salient machine
+ * generates: it moves against the angle first.) Assumed: L_d constant, L_q(i_q) renewed at 1 kHz, R known;
+ * salient machines need no more than round ones. The noise of rho at successive samples is not independent (a
+ * current enters twice, with opposite signs), which the filter does not know: r errs on the safe side.
+ *
+ * Covariance: firmware/math/kalman.h (Joseph, why there), F = [1 0; T_s 1], in units of 1 rad, the base speed
+ * and u = psi_m T_s w_base. Below omega_min, where the angle's variance no longer fits, z fades with
+ * (omega / omega_min)^2.
+ *
+ * Called each period; the result belongs to k. Range: |psi| < 4, L < 4, |delta| <= 1, |omega| < 2. At weight
+ * 0 delta is halved each slow step and all else starts anew. misfit: difference of the speeds, filter and
+ * loop, relative to base speed, at 1 kHz. vector: active flux. Tests: tests/unit/observers/ekf_test.cpp
+ * (against Eigen in double precision), tests/scenario. Cost: tests/target/observers. */
+#ifndef OBSERVERS_EKF_REDUCED_H
+#define OBSERVERS_EKF_REDUCED_H
+
+#include "firmware/math/kalman.h"
+#include "observers/dq_flux.h"
+
+enum { EKF_REDUCED_OMEGA, EKF_REDUCED_DELTA, EKF_REDUCED_STATES };
+
+typedef struct {
+    observer_model_t model;
+    pm_q_t omega_min; /* > 0 */
+    /* variances, Q30 */
+    int32_t q_omega, q_delta; /* >= PM_KALMAN_LEAST(2) */
+    int32_t r;                /* of rho, in u^2; >= 2^-20 */
+} ekf_reduced_config_t;
+
+typedef struct {
+    int32_t P[PM_KALMAN_SIZE(EKF_REDUCED_STATES)];
+    dq_flux_t flux;      /* that the present position explains */
+    pm_q_t omega, delta; /* delta in rad */
+    int32_t per_d;       /* what z takes of rho, fading below omega_min, Q18 */
+    int32_t per_q;
+    int32_t r_delta; /* Q30 */
+    pm_q_t misfit;
+} ekf_reduced_t;
+
+void ekf_reduced_reset(ekf_reduced_t *self, const ekf_reduced_config_t *config, const obs_in_t *in);
+void ekf_reduced_step(ekf_reduced_t *self, const ekf_reduced_config_t *config, const obs_in_t *in,
+                      obs_out_t *out);
+obs_out_t ekf_reduced_last(const ekf_reduced_t *self);
+void ekf_reduced_tie(ekf_reduced_t *self, const ekf_reduced_config_t *config);
+void ekf_reduced_slow(ekf_reduced_t *self, const ekf_reduced_config_t *config, const obs_in_t *in,
+                      const obs_out_t *out, pm_q_t weight);
+
+#endif
