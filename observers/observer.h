@@ -1,4 +1,5 @@
-/* Any of the fundamental-model observers, chosen by the configuration.
+/* Any of the fundamental-model observers, chosen by the configuration. Side by side (METHODS.md 2.3.3, row
+ * 17): docs/results/observers.md.
  *
  * Every observer of observers.def is a source (firmware/math/estimate.h) with these functions; self is its
  * state, config is const and made from model.h's machine and a few gains:

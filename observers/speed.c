@@ -10,11 +10,11 @@ static uint32_t turn_of(const speed_config_t *config, pm_q_t omega, uint32_t ste
     return (uint32_t)pm_omega_to_angle(omega, config->k_theta) * periods;
 }
 
-void speed_reset(speed_t *self, const speed_config_t *config, const speed_in_t *in)
+static void reset(speed_t *self, const speed_config_t *config, const speed_in_t *in)
 {
-    *self = (speed_t){.i_q = in->i.q, .v_q = in->v_q, .omega_e = in->omega, .ready = true};
+    *self = (speed_t){.i_q = in->i.q, .omega_e = in->omega, .ready = true};
     for (uint32_t n = 0; n < config->window; n++) {
-        self->past[n] = in->theta - turn_of(config, in->omega, config->window - n);
+        self->past[n] = in->theta - turn_of(config, in->omega, config->window - 1U - n);
     }
 }
 
@@ -32,10 +32,10 @@ static pm_q_t ratio(speed_t *self, const speed_config_t *config, const speed_in_
 {
     const pm_q_t psi = config->psi_m + pm_mul(config->L_d, in->i.d);
     const pm_q_t rise = pm_narrow_sat(pm_gain(in->i.q - self->i_q, config->rise));
-    const pm_q_t v_q = pm_mean(in->v_q, self->v_q);
+    const pm_q_t v_q = pm_narrow_sat(pm_gain(self->v_sum, config->per_step));
     const pm_q_t e_q = v_q - pm_mul(config->R, pm_mean(in->i.q, self->i_q)) - rise;
     self->i_q = in->i.q;
-    self->v_q = in->v_q;
+    self->v_sum = 0;
     return pm_sat(pm_div(e_q, pm_max(psi, config->psi_m / 4)), PM_Q_BITS + 1);
 }
 
@@ -43,10 +43,12 @@ pm_q_t speed_step(speed_t *self, const speed_config_t *config, const speed_in_t 
 {
     if (config->id == SPEED_LOOP) {
         self->ready = false;
+        self->v_sum = 0;
         return in->omega;
     }
     if (!self->ready) {
-        speed_reset(self, config, in);
+        reset(self, config, in);
+        return in->omega;
     }
     const pm_q_t omega_d = difference(self, config, in);
     (void)pm_lp1(&self->omega_e, ratio(self, config, in), config->k_ratio);

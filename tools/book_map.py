@@ -14,7 +14,7 @@ from pathlib import Path
 
 METHOD = re.compile(r'^PM_METHOD\((\d+), "(.*?)", "(.*?)", (\w+), "(.*?)", "(.*?)"\)', re.MULTILINE)
 NUMBERS = r"\d+(?:[\s*/]*(?:,|and|to)[\s*/]*\d+)*"  # also over the end of a comment's line
-ROWS = re.compile(rf"\brows?\s+({NUMBERS})", re.IGNORECASE)
+ROWS = re.compile(rf"\brows?[\s*/]+({NUMBERS})", re.IGNORECASE)
 MANUALS = ".h", ".cpp"  # where a first comment is the manual: headers, and the programs of tools
 FOLDERS = "firmware", "observers", "injection", "bldc", "sim_plant", "tools"
 HEAD = """# Map of the book

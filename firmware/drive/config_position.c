@@ -80,6 +80,7 @@ void make_speed_estimate(maker_t *m, speed_config_t *c)
         .R = per_unit(m, DRIVE_PARAM_R_s, m->impedance),
         .L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance),
         .psi_m = per_unit(m, DRIVE_PARAM_psi_m, m->base.psi),
+        .per_step = fixed(m, pm_num_ratio(16, (int32_t)m->slow_divider), GAIN_BITS, DRIVE_PARAM_f_pwm),
         .rise = fixed(m, pm_num_div(L_q, pm_num_mul(m->t_slow, m->base.omega)), GAIN_BITS, DRIVE_PARAM_L_q),
         .per_turn = fixed(m, pm_num_div(PM_NUM_TWO_PI, span), GAIN_BITS, DRIVE_PARAM_speed_trip),
         .k_ratio = PM_FRAC(0.28),

@@ -214,6 +214,9 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
         position_out_t frame;
         position_step(&drive->position, &drive->config.position, v, drive->i_ab, &frame);
         drive->status.theta = drive->position.pll.theta;
+        if (__builtin_expect(drive->config.speed_estimate.id != SPEED_LOOP, 0) != 0) {
+            speed_collect(&drive->speed_estimate, pm_park(v, frame.dir).q);
+        }
         if (drive->stage != STAGE_VECTOR) {
             drive->theta_open += (pm_angle_t)drive->turn_open;
             if (!drive->led) {

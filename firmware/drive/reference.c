@@ -1,7 +1,6 @@
 #include "firmware/drive/drive_parts.h"
 
 #include "firmware/math/root.h"
-#include "firmware/math/trig.h"
 
 /* A value in 10^exponent SI as a signal; what does not fit saturates, and the limits below clamp it with a
  * flag. */
@@ -53,11 +52,7 @@ static pm_q_t flux_current(drive_t *drive, pm_q_t i_q)
 static pm_q_t measured_speed(drive_t *drive)
 {
     const pm_pll_t *p = &drive->position.pll;
-    /* the voltage acts over the period to come, on whose middle the frame stands then */
-    const int32_t turn = pm_omega_to_angle(p->omega, drive->config.k_theta);
-    const pm_dir_t dir = pm_dir(p->theta + (pm_angle_t)pm_half(turn));
-    const speed_in_t in = {
-        .theta = p->theta, .omega = p->omega, .v_q = pm_park(drive->v_acting, dir).q, .i = drive->status.i};
+    const speed_in_t in = {.theta = p->theta, .omega = p->omega, .i = drive->status.i};
     return speed_step(&drive->speed_estimate, &drive->config.speed_estimate, &in);
 }
 

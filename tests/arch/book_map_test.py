@@ -46,7 +46,7 @@ class BookMap(unittest.TestCase):
         self.assertIn("2 of 3 rows.", page)
 
     def test_a_range_names_its_rows(self):
-        for text in "/* rows 12 to\n * 13 */", "/* rows 12\n * to 13 */":
+        for text in "/* rows\n * 12 to\n * 13 */", "/* rows 12\n * to 13 */":
             self.assertEqual(run({"observers/flux.h": text})[0], 0)
 
     def test_a_method_without_a_source_is_refused(self):

@@ -59,14 +59,14 @@ int main(void)
                               .R = PM_Q(0.13),
                               .L_d = PM_Q(0.5),
                               .psi_m = PM_Q(0.28),
+                              .per_step = PM_GAIN(1.6),
                               .rise = PM_GAIN(1.7),
                               .k_theta = PM_Q(0.55),
                               .per_turn = PM_GAIN(1.9),
                               .k_ratio = PM_FRAC(0.28),
                               .k_mean = PM_FRAC(0.03)};
     for (uint32_t k = 0; k < 50; k++) {
-        const speed_in_t in = {
-            .theta = k * 80000000U, .omega = PM_Q(0.3), .v_q = PM_Q(0.12), .i = {0, PM_Q(0.2)}};
+        const speed_in_t in = {.theta = k * 80000000U, .omega = PM_Q(0.3), .i = {0, PM_Q(0.2)}};
         sink = cost_speed(&speed, &c, &in);
     }
     return 0;

@@ -365,14 +365,30 @@ class Draw
 
 using Names = std::vector<std::pair<const char *, int64_t>>;
 
+Names flux_must_be_positive(const active_flux_config_t &f)
+{
+    return {{"flux R", f.model.R}, {"flux t_s", f.model.t_s}, {"flux g", f.g}, {"flux k_seed", f.k_seed}};
+}
+
 Names observer_must_be_positive(const observer_config_t &o)
 {
     switch (o.id) {
     case OBSERVER_active_flux:
-        return {{"flux R", o.active_flux.model.R},
-                {"flux t_s", o.active_flux.model.t_s},
-                {"flux g", o.active_flux.g},
-                {"flux k_seed", o.active_flux.k_seed}};
+        return flux_must_be_positive(o.active_flux);
+    case OBSERVER_flux_linkage:
+        return flux_must_be_positive(o.flux_linkage.flux);
+    case OBSERVER_back_emf:
+    case OBSERVER_extended_emf:
+    case OBSERVER_extended_emf_ab:
+        return {{"EMF R", o.extended_emf.model.R},
+                {"EMF k_filter", o.extended_emf.k_filter},
+                {"EMF lag", o.extended_emf.lag},
+                {"EMF rate", o.extended_emf.rate},
+                {"EMF slow_rate", o.extended_emf.slow_rate},
+                {"EMF slow_step", o.extended_emf.slow_step},
+                {"EMF speed_lag", o.extended_emf.speed_lag},
+                {"EMF omega_min", o.extended_emf.omega_min},
+                {"EMF omega_tied", o.extended_emf.omega_tied}};
     case OBSERVER_sliding_mode:
         return {{"sliding t_s", o.sliding_mode.model.t_s},
                 {"sliding k_lp", o.sliding_mode.k_lp},

@@ -40,6 +40,7 @@ speed_config_t config_of(speed_id_t id, unsigned window, double ratio_s = 3e-3)
     c.R = model.R;
     c.L_d = model.L_d;
     c.psi_m = model.psi_m;
+    c.per_step = fixed(16.0 / kPeriods, 26);
     c.rise = fixed(real(model.L_q) / (kStep_s * kBase.omega_rad_s), 26);
     c.window = static_cast<uint8_t>(window);
     c.turn_step = kPeriods;
@@ -58,14 +59,7 @@ class Bench
         : config_(config), omega_(omega_pu), loop_(omega_pu)
     {
         config_.psi_m = static_cast<pm_q_t>(psi_factor * config_.psi_m);
-        speed_in_t in = {};
-        in.omega = fixed(omega_pu, 28);
-        in.i.q = fixed(i_q_, 28);
-        in.v_q = fixed(kMachine.R_ohm / kBase.impedance_ohm() * i_q_ +
-                           omega_pu * kMachine.psi_m_Wb / kBase.psi_Wb(),
-                       28);
-        in.theta = bench::turns(bench::wrapped(omega_ * kBase.omega_rad_s * kStep_s)); // of the first step
-        speed_reset(&state, &config_, &in);
+        step(omega_pu); // the first gives the loop's speed
         // what the EMF says of the speed it starts with
         state.omega_e = fixed(omega_pu * kMachine.psi_m_Wb / kBase.psi_Wb() / real(config_.psi_m), 28);
         state.difference = fixed(omega_pu, 28) - state.omega_e;
@@ -83,10 +77,12 @@ class Bench
             bench::turns(bench::wrapped(theta_ + theta_noise_rad * random_.within(-1, 1) * std::sqrt(3.0)));
         in.omega = fixed(loop_, 28);
         in.i = {0, fixed(i_q_, 28)};
-        in.v_q = fixed(kMachine.R_ohm / kBase.impedance_ohm() * i_q_ + L_q_di +
+        const double v_q = kMachine.R_ohm / kBase.impedance_ohm() * (i_q_ - rise_ * kStep_s / 2) + L_q_di +
                            omega_ * kMachine.psi_m_Wb / kBase.psi_Wb() +
-                           v_noise_V / kBase.v_V * random_.within(-1, 1) * std::sqrt(3.0),
-                       28);
+                           v_noise_V / kBase.v_V * random_.within(-1, 1) * std::sqrt(3.0);
+        for (int n = 0; n < kPeriods; ++n) {
+            speed_collect(&state, fixed(v_q, 28));
+        }
         return real(speed_step(&state, &config_, &in));
     }
 
@@ -240,11 +236,7 @@ TEST(Speed, TheDifferenceCountsWholeTurns)
     c.turn_step = 40;
     c.k_theta = fixed(16 * base * 25e-6 / (2 * kPi), 30);
     c.per_turn = fixed(2 * kPi / (4 * kStep_s * base), 26);
-    speed_t state;
-    speed_in_t start = {};
-    start.omega = fixed(0.88, 28);
-    start.theta = bench::turns(bench::wrapped(0.9 * base * kStep_s));
-    speed_reset(&state, &c, &start);
+    speed_t state = {};
     double theta = 0;
     pm_q_t omega = 0;
     for (int k = 0; k < 50; ++k) {
