@@ -27,6 +27,9 @@
 #include "observers/extended_emf.h"
 #include "observers/extended_emf_ab.h"
 #include "observers/flux_linkage.h"
+#include "observers/mras_current.h"
+#include "observers/mras_simple.h"
+#include "observers/mras_voltage.h"
 #include "observers/sliding_mode.h"
 
 typedef enum {

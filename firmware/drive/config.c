@@ -124,6 +124,8 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     make_mtpa(&m, &config->mtpa);
     make_flux_weakening(&m, &config->field_weakening);
     make_position(&m, &config->position, config->injection);
+    make_speed_estimate(&m, &config->speed_estimate);
+    config->speed_estimate.k_theta = config->position.pll_low.k_theta;
     if (!config->align_first) {
         make_pulses(&m, &config->pulses);
     }

@@ -14,6 +14,7 @@
 #include "firmware/drive/position.h"
 #include "firmware/math/num.h"
 #include "injection/initial_pulses.h"
+#include "observers/speed.h"
 
 /* Bases. A signal in SI is its per-unit value times the base. */
 typedef struct {
@@ -52,6 +53,7 @@ typedef struct {
     modulator_config_t modulator;
     current_control_config_t current;
     speed_control_config_t speed;
+    speed_config_t speed_estimate;
     mtpa_config_t mtpa;
     field_weakening_config_t field_weakening;
     position_config_t position;

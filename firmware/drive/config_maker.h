@@ -110,6 +110,7 @@ void make_model(maker_t *m, observer_model_t *c);
 /* config_position.c */
 bool salient(const maker_t *m);
 void make_position(maker_t *m, position_config_t *c, bool injection);
+void make_speed_estimate(maker_t *m, speed_config_t *c);
 void make_pulses(maker_t *m, initial_pulses_config_t *c);
 
 #endif

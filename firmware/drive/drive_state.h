@@ -27,9 +27,7 @@ typedef struct {
 
 struct drive {
     drive_config_t config;
-    drive_command_t command;
     drive_status_t status;
-    drive_fault_record_t record;
 
     drive_fault_t fault; /* latched; while it is set, the stage is STAGE_OFF */
     drive_state_t state;
@@ -56,9 +54,7 @@ struct drive {
             commissioning_t work;
         } identify;
     };
-    initial_pulses_t pulses;
     pm_procedure_t pulses_state;
-    commissioning_report_t commissioning_report;
     current_control_t current;
     speed_control_t speed;
     field_weakening_t field_weakening;
@@ -79,6 +75,13 @@ struct drive {
     uint16_t still_ms; /* standstill while stopping */
     uint16_t agree_ms; /* observer and imposed angle turn alike */
     int32_t temperature_dC;
+
+    /* not of a control period */
+    drive_command_t command;
+    drive_fault_record_t record;
+    commissioning_report_t commissioning_report;
+    initial_pulses_t pulses;
+    speed_t speed_estimate;
 };
 
 #endif

@@ -48,7 +48,10 @@ void position_step(position_t *self, const position_config_t *config, pm_ab_t v,
         pulsating_square_demodulate(&self->square, &config->square, &in, &square);
         eps = square.eps + pm_mul(self->weight, eps - square.eps);
     }
-    pm_pll_correct(&pll, &self->gains, eps);
+    if (__builtin_expect(config->second_harmonic.id != SECOND_HARMONIC_STAYS, 0) != 0) {
+        eps = second_harmonic_step(&self->second_harmonic, &config->second_harmonic, dir, eps);
+    }
+    loop_correct(&self->loop, &config->loop, &pll, &self->gains, eps);
     self->pll = pll;
     *out = (position_out_t){.dir = dir, .i = i_dq, .omega = pll.omega};
 }
@@ -62,6 +65,8 @@ void position_change_observer(position_t *self, const position_config_t *config,
 void position_lead(position_t *self, const position_config_t *config, const pm_pll_t *imposed)
 {
     observer_tie(&self->observer, &config->observer);
+    loop_reset(&self->loop);
+    second_harmonic_reset(&self->second_harmonic);
     self->pll = *imposed;
     self->gains.kp_turn = 0;
     self->gains.ki = 0;
@@ -123,6 +128,8 @@ void position_slow(position_t *self, const position_config_t *config, pm_ab_t i,
     pulsating_square_slow(&self->square, &config->square, &in);
     self->gains.kp_turn = between(config->pll_low.kp_turn, config->pll_high.kp_turn, self->weight);
     self->gains.ki = between(config->pll_low.ki, config->pll_high.ki, self->weight);
+    loop_slow(&self->loop, &config->loop, self->weight);
+    second_harmonic_slow(&self->second_harmonic, &config->second_harmonic, self->pll.omega, self->weight);
     observer_slow(&self->observer, &config->observer, &in, &seen, self->weight);
     set_quality(self, config, &seen);
 }

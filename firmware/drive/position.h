@@ -1,5 +1,5 @@
-/* The position of the rotor: injection at low speed, an observer above, one phase-locked loop
- * (METHODS.md 4.5.1 and 5.9, rows 44 and 69).
+/* The position of the rotor: injection at low speed, an observer above, one loop (METHODS.md 4.5.1 and 5.9,
+ * rows 44 and 69; the loop: observers/loop.h).
  *
  *   eps = eps_injection + weight (eps_observer - eps_injection)
  * weight goes from 0 at omega_low to 1 at omega_high; the carrier is on below omega_high and off above 1.1
@@ -12,12 +12,16 @@
 #include "firmware/math/estimate.h"
 #include "firmware/math/pll.h"
 #include "injection/pulsating_square.h"
+#include "observers/loop.h"
 #include "observers/observer.h"
+#include "observers/second_harmonic.h"
 
 typedef struct {
     observer_config_t observer;
     pulsating_square_config_t square;
     pm_pll_config_t pll_low, pll_high;
+    loop_config_t loop;
+    second_harmonic_config_t second_harmonic;
     pm_q_t omega_low, omega_high;
     int32_t per_span; /* 1 / (omega_high - omega_low), Q20 */
     bool injection;
@@ -26,6 +30,8 @@ typedef struct {
 typedef struct {
     pm_pll_t pll;
     pm_pll_config_t gains; /* between pll_low and pll_high */
+    loop_t loop;
+    second_harmonic_t second_harmonic;
     observer_t observer;
     pulsating_square_t square;
     bool inject;                     /* carrier on */

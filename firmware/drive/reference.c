@@ -1,6 +1,7 @@
 #include "firmware/drive/drive_parts.h"
 
 #include "firmware/math/root.h"
+#include "firmware/math/trig.h"
 
 /* A value in 10^exponent SI as a signal; what does not fit saturates, and the limits below clamp it with a
  * flag. */
@@ -24,6 +25,7 @@ void reference_take(drive_t *drive)
 void reference_reset(drive_t *drive, pm_q_t i_q)
 {
     speed_control_reset(&drive->speed, drive->position.pll.omega, i_q);
+    drive->speed_estimate.ready = false;
     drive->field_weakening.i_d = 0;
     drive->i_ref = (pm_dq_t){.d = 0, .q = i_q};
 }
@@ -48,6 +50,17 @@ static pm_q_t flux_current(drive_t *drive, pm_q_t i_q)
     return pm_max(pm_min(mtpa_i_d(&c->mtpa, i_q), -light) + weak, -c->i_max);
 }
 
+static pm_q_t measured_speed(drive_t *drive)
+{
+    const pm_pll_t *p = &drive->position.pll;
+    /* the voltage acts over the period to come, on whose middle the frame stands then */
+    const int32_t turn = pm_omega_to_angle(p->omega, drive->config.k_theta);
+    const pm_dir_t dir = pm_dir(p->theta + (pm_angle_t)pm_half(turn));
+    const speed_in_t in = {
+        .theta = p->theta, .omega = p->omega, .v_q = pm_park(drive->v_acting, dir).q, .i = drive->status.i};
+    return speed_step(&drive->speed_estimate, &drive->config.speed_estimate, &in);
+}
+
 void reference_vector(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
@@ -62,17 +75,17 @@ void reference_vector(drive_t *drive)
 
     bool limited = false;
     pm_q_t i_q;
+    const pm_q_t omega = measured_speed(drive);
     if (drive->command.mode == DRIVE_MODE_TORQUE && !stopping) {
         const pm_q_t wanted = current_for(drive, drive->torque_target);
         i_q = pm_clamp(wanted, i_min, i_max);
         limited = i_q != wanted;
-        speed_control_reset(&drive->speed, drive->position.pll.omega, i_q);
+        speed_control_reset(&drive->speed, omega, i_q);
     } else {
         const pm_q_t wanted = stopping ? 0 : drive->omega_target;
         const pm_q_t target = pm_clamp(wanted, -c->omega_max, c->omega_max);
         drive->status.limits |= target != wanted ? DRIVE_LIMIT_SPEED : 0U;
-        i_q = speed_control_step(&drive->speed, &c->speed, target, drive->position.pll.omega, i_min, i_max,
-                                 &limited);
+        i_q = speed_control_step(&drive->speed, &c->speed, target, omega, i_min, i_max, &limited);
     }
     drive->status.limits |= limited ? DRIVE_LIMIT_CURRENT : 0U;
     drive->i_ref = (pm_dq_t){.d = flux_current(drive, i_q), .q = i_q};

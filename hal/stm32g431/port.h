@@ -8,7 +8,7 @@
 
 #include "hal/hal.h"
 
-#define PORT_CONSOLE_SIZE 256U /* powers of two */
+#define PORT_CONSOLE_SIZE 128U /* powers of two */
 #define PORT_CAN_FRAMES   16U
 
 /* Written by one context and read by another; the counts run freely. */

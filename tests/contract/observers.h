@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tests/contract/bench.h"
+#include "tests/contract/mras_config.h"
 #include "tests/unit/observers/ekf_bench.h"
 #include "tests/unit/observers/sliding_mode_bench.h"
 
@@ -58,6 +59,12 @@ inline void configure(ekf_full_config_t &c, const Machine &m, const Base &b)
 inline void configure(ekf_reduced_config_t &c, const Machine &m, const Base &b)
 {
     c = ekf_reduced_config(m, b);
+}
+
+// The three of observers/mras.h have one configuration.
+inline void configure(mras_config_t &c, const Machine &m, const Base &b)
+{
+    c = mras_config(m, b);
 }
 
 } // namespace observers

@@ -77,9 +77,9 @@ static pm_ab_t regained(const drive_t *drive, pm_dir_t dir)
     const pm_abc_t i = pm_clarke_inverse((pm_ab_t){.alpha = dir.cos / 8, .beta = dir.sin / 8}); /* Q28 */
     const pm_q_t lost = drive->identify.work.lost;
     const pm_abc_t v = {
-        .a = pm_mul(lost, pm_clamp(8 * i.a, -PM_ONE, PM_ONE)),
-        .b = pm_mul(lost, pm_clamp(8 * i.b, -PM_ONE, PM_ONE)),
-        .c = pm_mul(lost, pm_clamp(8 * i.c, -PM_ONE, PM_ONE)),
+        .a = pm_mul(lost, 8 * pm_clamp(i.a, -PM_ONE / 8, PM_ONE / 8)),
+        .b = pm_mul(lost, 8 * pm_clamp(i.b, -PM_ONE / 8, PM_ONE / 8)),
+        .c = pm_mul(lost, 8 * pm_clamp(i.c, -PM_ONE / 8, PM_ONE / 8)),
     };
     return pm_clarke(v);
 }

@@ -416,6 +416,19 @@ std::vector<std::pair<const char *, int64_t>> must_be_positive(const drive_confi
         x.push_back({"EMF omega_min", e.omega_min});
         x.push_back({"EMF omega_tied", e.omega_tied});
     }
+    if (c.position.observer.id == OBSERVER_mras_current || c.position.observer.id == OBSERVER_mras_voltage ||
+        c.position.observer.id == OBSERVER_mras_simple) {
+        x.push_back({"mras k", c.position.observer.mras_current.k});
+        x.push_back({"mras emf_min", c.position.observer.mras_current.emf_min});
+        x.push_back({"mras turn", c.position.observer.mras_current.turn});
+    }
+    if (c.position.loop.id == LOOP_SIMPLIFIED_EKF) {
+        x.push_back({"K_1", c.position.loop.k_acceleration});
+    }
+    if (c.position.second_harmonic.id != SECOND_HARMONIC_STAYS) {
+        x.push_back({"second harmonic mu", c.position.second_harmonic.mu});
+        x.push_back({"second harmonic k_p", c.position.second_harmonic.k_p});
+    }
     if (c.injection) {
         const pulsating_square_config_t &s = c.position.square;
         x.push_back({"v_h", s.v_h});
@@ -466,6 +479,45 @@ Survey survey(int draws)
         }
     }
     return s;
+}
+
+// The formulas of observers/mras.h, loop.h, speed.h and second_harmonic.h for IPM-1000.
+TEST(Config, ModelReferenceLoopAndSpeed)
+{
+    const double W = 3 * 180.0, T = 1e-4, w_n = 2 * M_PI * 25, r = 0.7067 * w_n;
+    for (const observer_id_t id : {OBSERVER_mras_current, OBSERVER_mras_voltage, OBSERVER_mras_simple}) {
+        const drive_config_t c = configure(changed({{DRIVE_PARAM_observer, id},
+                                                    {DRIVE_PARAM_position_observer, LOOP_SIMPLIFIED_EKF},
+                                                    {DRIVE_PARAM_second_harmonic, SECOND_HARMONIC_NOTCH},
+                                                    {DRIVE_PARAM_speed_estimator, SPEED_COMBINED}}));
+        ASSERT_EQ(c.position.observer.id, id);
+        const mras_config_t &m = c.position.observer.mras_current;
+        const active_flux_config_t flux = configure(changed({})).position.observer.active_flux;
+        EXPECT_EQ(std::memcmp(&m.model, &flux.model, sizeof m.model), 0);
+        EXPECT_NEAR(real(m.k, 32), 2 * M_PI * 50 * T, 1e-8);
+        EXPECT_NEAR(real(m.emf_min), 21.0 * 3 / W / 4 * real(m.model.psi_m), 1e-7);
+        EXPECT_NEAR(real(m.turn, 32), std::min(0.49, 1e-3 * W / (2 * (75e-3 - 43e-3) * 4 / 0.236 + 0.2)),
+                    1e-6);
+        EXPECT_NEAR(real(c.position.loop.k_acceleration, 36), r * r * r * T * T / W, 1e-9);
+        EXPECT_NEAR(real(c.position.pll_high.ki, 32), 2 * r * r * T / W, 1e-8);
+        EXPECT_NEAR(real(c.position.pll_high.kp_turn, 32), 2 * r * T * 2 / M_PI, 1e-8);
+        EXPECT_NEAR(real(c.position.second_harmonic.k_p), 2 * r / W, 1e-7);
+        EXPECT_NEAR(real(c.position.second_harmonic.k_i), 2 * r * r / W / W, 1e-7);
+        EXPECT_NEAR(real(c.position.second_harmonic.k_1), std::pow(r / W, 3), 1e-7);
+        EXPECT_NEAR(real(c.position.second_harmonic.mu, 32), 40 * T, 1e-8);
+        EXPECT_NEAR(real(c.speed_estimate.per_turn, 26), 2 * M_PI / (6e-3 * W), 1e-6);
+        EXPECT_NEAR(real(c.speed_estimate.k_mean, 32), 2 * M_PI * 5e-3, 1e-8);
+    }
+}
+
+TEST(Config, TheArctangentLeavesNothingToLearnASecondHarmonicFrom)
+{
+    const drive_params_t params = changed({{DRIVE_PARAM_position_observer, LOOP_ARCTANGENT},
+                                           {DRIVE_PARAM_second_harmonic, SECOND_HARMONIC_NOTCH}});
+    drive_config_t c;
+    const drive_result_t result = drive_configure(&c, &params);
+    EXPECT_FALSE(result.ok);
+    EXPECT_EQ(result.param, DRIVE_PARAM_second_harmonic);
 }
 
 TEST(Config, RandomSetsAreRefusedOrMakeSense)

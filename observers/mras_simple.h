@@ -1,0 +1,41 @@
+/* Model reference adaptive system, simplified voltage model (METHODS.md 12.2.4, row 139).
+ *
+ * The d-axis of the voltage model alone, with the sign and the size of the EMF from the filtered speed w_f:
+ *   D_d = v_d - R i_d - L_q (p i)_d = -E sin(error),  eps = -D_d / (w_f psi_a)
+ * where (p i)_d is the change of the stationary current seen along the d-axis, which holds -omega i_q: so no
+ * speed enters the model. (With w_f L_q i_q instead, the loop's own correction k_p eps turns the frame that
+ * the current control holds i_q in, which is a positive feedback of k_p L_q i_q / E: unstable at rated load
+ * below a third of rated speed.) All is the mean of two periods. The turn of half a period is left to v_q of
+ * the steady state at 1 kHz: eps gets (w_f T_s/2) (R i_q + E) / E instead of two products per period.
+ *
+ * What it gives up: eps is (L_d - L_q) p i_d / E wrong while i_d moves, and without the q-axis there is no
+ * EMF ratio and no misfit (always 0): a lost position shows in eps alone.
+ *
+ * Called each period; result belongs to k. Range: |v| and |i| < 2, L_q / (T_s emf_min) < 2048 or it is held
+ * there. vector: (D_d, w_f psi_a). Tests: tests/unit/observers/mras_test.cpp, tests/scenario. */
+#ifndef OBSERVERS_MRAS_SIMPLE_H
+#define OBSERVERS_MRAS_SIMPLE_H
+
+#include "observers/mras.h"
+
+typedef mras_config_t mras_simple_config_t;
+
+typedef struct {
+    pm_ab_t i;                   /* at k-1 */
+    int32_t inverse, offset;     /* 1 / E, Q24; what v_q adds, Q20 */
+    int32_t resistive, reactive; /* R / E, Q24; L_q / (T_s E), Q20 */
+    int32_t v_d, rise;           /* of the last period, Q27: v_d and the change of current along d */
+    pm_q_t eps;                  /* of the last step */
+    pm_q_t emf;                  /* w_f psi_a */
+    pm_q_t omega;                /* w_f */
+} mras_simple_t;
+
+void mras_simple_reset(mras_simple_t *self, const mras_simple_config_t *config, const obs_in_t *in);
+void mras_simple_step(mras_simple_t *self, const mras_simple_config_t *config, const obs_in_t *in,
+                      obs_out_t *out);
+obs_out_t mras_simple_last(const mras_simple_t *self);
+void mras_simple_tie(mras_simple_t *self, const mras_simple_config_t *config);
+void mras_simple_slow(mras_simple_t *self, const mras_simple_config_t *config, const obs_in_t *in,
+                      const obs_out_t *out, pm_q_t weight);
+
+#endif

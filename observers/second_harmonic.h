@@ -1,0 +1,62 @@
+/* Takes the second harmonic out of the error signal, between a source and the loop
+ * (METHODS.md 3.6.2 and 3.6.3, rows 34 and 35).
+ *
+ * Unlike phases put a negative sequence into EMF and flux: an error signal d at twice the rotor's angle, of
+ * R_d I / (omega psi_a) for a traceless part R_d of the resistance, which the loop would follow. Its
+ * estimate is subtracted and learns from what is left:
+ *
+ *   adaptive notch   d^ = a cos 2 theta + b sin 2 theta;  (a, b) += mu eps' (cos, sin)(2 theta + phi)
+ *   resonator        d^ = y;  (y, q) turned by 2 omega T, += mu eps' (cos, -sin) phi  (SOGI at 2 omega)
+ *   eps' = eps - d^
+ *
+ * The first is tied to the angle and keeps what it learned through changes of speed; the second knows the
+ * frequency only. phi is the angle of the loop's sensitivity at 2 omega: the loop answers d - d^ with
+ *
+ *   S = s^3 / (s^3 + k_p s^2 + k_i s + k_1), s = 2 j omega,
+ *
+ * whose angle exceeds 90 degrees below 2 omega = w_n: there phi = 0, which the literature has, drives the
+ * estimate away (docs/methods_notes.md). d^ is reached with the time constant 2 T / (mu |S|).
+ *
+ * S is renewed at 1 kHz. While another source leads, or 2 |omega| < w_n / 3, where |S| < 0.15, it learns
+ * nothing and what it knew fades within 20 ms. A period costs 30 (resonator) or 35 (notch)
+ * instructions and a call, two when it is off. Range: mu < 0.1. Tests:
+ * tests/unit/observers/second_harmonic_test.cpp, tests/scenario/asymmetry.yaml. */
+#ifndef OBSERVERS_SECOND_HARMONIC_H
+#define OBSERVERS_SECOND_HARMONIC_H
+
+#include "firmware/math/frames.h"
+
+typedef enum {
+    SECOND_HARMONIC_STAYS,
+    SECOND_HARMONIC_NOTCH,
+    SECOND_HARMONIC_RESONATOR,
+    SECOND_HARMONIC_COUNT
+} second_harmonic_id_t;
+
+typedef struct {
+    second_harmonic_id_t id;
+    pm_frac_t mu;       /* per period, Q32 */
+    pm_q_t k_p;         /* of the loop, rad/s over w_base: 2 zeta w_n */
+    pm_q_t k_i;         /* its square: w_n^2 */
+    pm_q_t k_1;         /* its cube: 0 for the PLL */
+    pm_q_t omega_least; /* no learning below, w_n / 6 */
+    pm_frac_t t_s;      /* T_s w_base, Q32 */
+} second_harmonic_config_t;
+
+typedef struct {
+    pm_q_t a, b;                /* or y, q */
+    pm_dir_t turn;              /* of 2 omega T */
+    int32_t gain_cos, gain_sin; /* mu cos phi, +-mu sin phi, Q32; 0: nothing is learnt */
+} second_harmonic_t;
+
+void second_harmonic_reset(second_harmonic_t *self);
+
+/* What is left of eps; dir: direction of the present position. */
+pm_q_t second_harmonic_step(second_harmonic_t *self, const second_harmonic_config_t *config, pm_dir_t dir,
+                            pm_q_t eps);
+
+/* At 1 kHz. */
+void second_harmonic_slow(second_harmonic_t *self, const second_harmonic_config_t *config, pm_q_t omega,
+                          pm_q_t weight);
+
+#endif
