@@ -8,8 +8,8 @@
  *   eps = -E_d / (w psi_ref),   misfit = 1 - E_q / (w psi_ref).
  * psi_ref follows the amplitude within a band around psi_m + (L_d - L_q) i_d, so an error of psi_m moves no
  * angle. Below omega_min the error signal fades with the EMF instead of rising with the noise; while another
- * source leads, errors of the voltage weigh as they do in a flux that is tied to the position. Then
- * source leads below resistance.omega, R follows what E_q is more than w psi_a + (L_q - L_d) p i_q.
+ * source leads, errors of the voltage weigh as they do in a flux that is tied to the position, and below
+ * resistance.omega R follows what E_q is more than w psi_a + (L_q - L_d) p i_q.
  *
  * L, w T, w T (L_q - L_d), 1 / (w psi_ref) and R T are renewed at 1 kHz. Nothing is integrated, so nothing
  * drifts and nothing has to be tied.
@@ -17,7 +17,7 @@
  * The speed in w (L_q - L_d) J i closes a second loop: eps = error - c (w^ - w), c = (L_q - L_d) i_q / (w
  * psi). While braking c < 0, and with the loop's own speed that is unstable below w_n |c w| / (2 zeta), 14 %
  * of rated speed on IPM-1000 at full load. A speed that lags by one radian of rotation is stable everywhere
- * (c w < 1) and costs c w of a degree per degree that the speed changes within it. */
+ * (c w < 1); in a ramp a of the speed it costs an angle of c a / w. */
 #ifndef OBSERVERS_EMF_H
 #define OBSERVERS_EMF_H
 

@@ -8,11 +8,13 @@ import argparse
 import csv
 import json
 import math
+import os
 import random
 import re
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import matplotlib
@@ -31,9 +33,9 @@ USABLE_DEG = 10  # an observer is usable where its largest error at three loads 
 
 # What must be known of the machine beside its speed range: of every observer of the list.
 NEEDS = {
-    "sliding_mode": "R, L_d, L_q(i_q); a gain above the largest EMF",
-    "ekf_full": "R, L_d, L_q(i_q), psi_m; covariances of noise and model",
-    "ekf_reduced": "R, L_d, L_q(i_q), psi_m; covariances of noise and model",
+    "sliding_mode": "R, L_q(i_q); psi_m for error scale and gain, which must exceed the EMF",
+    "ekf_full": "R, L_d, L_q(i_q), psi_m; noise of voltage, current and acceleration",
+    "ekf_reduced": "R, L_d, L_q(i_q), psi_m; noise of the EMF and acceleration",
     "mras_current": "R, L_d, L_q(i_q), psi_m",
     "mras_voltage": "R, L_d, L_q(i_q), psi_m",
     "mras_simple": "R, L_d, L_q(i_q), psi_m",
@@ -48,7 +50,7 @@ SEEN = "fault", "angle_error_mean_deg", "angle_error_rms_deg", "angle_error_max_
 
 def observers():
     text = (ROOT / "observers/observers.def").read_text()
-    found = re.findall(r'^PM_OBSERVER(?:_DEFAULT)?\((\w+), "(.*?)"\)', text, re.MULTILINE)
+    found = re.findall(r'^PM_OBSERVER(?:_[A-Z]+)?\((\w+), "(.*?)"\)', text, re.MULTILINE)
     for name, _ in found:
         if name not in NEEDS:
             sys.exit(f"observer_report: NEEDS says nothing of {name}")
@@ -255,15 +257,12 @@ def measure(machine, chosen, ids, count):
                "harmonics": harmonics(machine), "machines": monte_carlo(machine, count, 3),
                "quick": monte_carlo(machine, count, 5)}
     results = {}
-    for name in chosen:
-        got = {}
-        for key, study in studies.items():
-            got[key] = study.run(ids[name])
-            if got[key] is None:
-                break
-        else:
-            results[name] = got
-            print(f"{machine}: {name}", flush=True)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for name in chosen:
+            got = dict(zip(studies, pool.map(lambda study, n=ids[name]: study.run(n), studies.values())))
+            if None not in got.values():  # the drive takes it for this machine
+                results[name] = got
+                print(f"{machine}: {name}", flush=True)
     return results, studies["errors"].names
 
 
@@ -275,7 +274,9 @@ speed control, below 30 % speed 10 and 3 Hz (SPM-400: 15 and 4); the observer al
 
 **The drive's default is `active_flux`.** It runs salient and round machines alike, down to the lowest speed: it integrates, so noise
 and what is not known of the dead time weigh least there. Its model contains no speed, which the position loop would feed back, and
-it costs the least. An EMF observer answers a load step with less error; take it where the speed stays above 20 %.
+it costs the least. An EMF observer answers a load step with less error; take it where the speed stays above 20 %. The Kalman filter
+of full order is as good at low speed and better in a load step, at six times the instructions, but a wrong psi_m moves its angle.
+SPM-400 with twice the noise is lost in the open-loop start, where the observer takes over an oscillating rotor.
 """
 
 
