@@ -89,8 +89,8 @@ static inline pm_half_dir_t pm_dir_sum(pm_dir_t a, pm_dir_t b)
     return r;
 }
 
-/* Angle from one direction to another in rad, Q28; error below 2.5e-5 up to 0.2 rad, monotonous up to a quarter
- * turn. */
+/* Angle from one direction to another in rad, Q28; error below 2.5e-5 up to 0.2 rad, monotonous up to a
+ * quarter turn. */
 static inline pm_q_t pm_dir_turn(pm_dir_t from, pm_dir_t to)
 {
     const int32_t s = pm_mulh_sub(pm_mulh(to.sin, from.cos), to.cos, from.sin); /* sine, Q30 */
