@@ -29,9 +29,12 @@ static void arctangent(loop_t *self, pm_pll_t *pll, const pm_pll_config_t *gains
     self->inner = (int32_t)inner.theta;
 }
 
-pm_q_t loop_correct_other(loop_t *self, const loop_config_t *config, pm_pll_t *pll,
-                          const pm_pll_config_t *gains, pm_q_t eps)
+pm_q_t loop_eps(loop_t *self, const loop_config_t *config, pm_pll_t *pll, const pm_pll_config_t *gains,
+                pm_q_t eps)
 {
+    if (config->id == LOOP_PLL) {
+        return eps;
+    }
     if (config->id == LOOP_ARCTANGENT) {
         if (!self->direct) {
             return eps;

@@ -17,11 +17,10 @@
  * No error under a constant acceleration. Noise bandwidth 5/3 r against (4 zeta^2 + 1) / (4 zeta) w_n of the
  * PLL: equal for r = 0.707 w_n at zeta = 0.9.
  *
- * loop_correct() takes the place of pm_pll_correct(); the PLL costs two instructions more than alone,
- * the others a call and 18 (simplified EKF) or 28. While
- * another source has a share, the arctangent is the PLL of the given gains; K_1 grows with the share.
- * Range: |W| < 1/32 per period. Tests: tests/unit/observers/loop_test.cpp,
- * tests/scenario/position_observers.yaml. */
+ * loop_eps() stands before pm_pll_correct(); a drive with the PLL does without it. The others cost a call and
+ * 18 (simplified EKF) or 28 instructions. While another source has a share, the arctangent is the PLL of the
+ * given gains; K_1 grows with the share. Range: |W| < 1/32 per period. Tests:
+ * tests/unit/observers/loop_test.cpp, tests/scenario/position_observers.yaml. */
 #ifndef OBSERVERS_LOOP_H
 #define OBSERVERS_LOOP_H
 
@@ -47,16 +46,7 @@ void loop_reset(loop_t *self);
 void loop_slow(loop_t *self, const loop_config_t *config, pm_q_t weight);
 
 /* Its own part of the correction; returns what is left of eps for the PLL. */
-pm_q_t loop_correct_other(loop_t *self, const loop_config_t *config, pm_pll_t *pll,
-                          const pm_pll_config_t *gains, pm_q_t eps);
-
-static inline void loop_correct(loop_t *self, const loop_config_t *config, pm_pll_t *pll,
-                                const pm_pll_config_t *gains, pm_q_t eps)
-{
-    if (__builtin_expect(config->id != LOOP_PLL, 0) != 0) {
-        eps = loop_correct_other(self, config, pll, gains, eps);
-    }
-    pm_pll_correct(pll, gains, eps);
-}
+pm_q_t loop_eps(loop_t *self, const loop_config_t *config, pm_pll_t *pll, const pm_pll_config_t *gains,
+                pm_q_t eps);
 
 #endif

@@ -70,9 +70,9 @@ static inline void observer_step(observer_t *self, const observer_config_t *conf
     if (__builtin_expect(config->id == OBSERVER_active_flux, 1) != 0) {
         active_flux_step(&self->active_flux, &config->active_flux, in, out);
     } else {
-        const obs_in_t copy = *in; /* only this path needs it in memory */
+        const obs_in_t given = *in; /* only this path needs it in memory */
         obs_out_t result;
-        observer_step_other(self, config, &copy, &result);
+        observer_step_other(self, config, &given, &result);
         *out = result;
     }
 }

@@ -19,7 +19,7 @@ static void reset(speed_t *self, const speed_config_t *config, const speed_in_t 
 }
 
 /* theta(k-N) stands where theta(k) goes. */
-static pm_q_t difference(speed_t *self, const speed_config_t *config, const speed_in_t *in)
+static pm_q_t of_difference(speed_t *self, const speed_config_t *config, const speed_in_t *in)
 {
     const pm_angle_t past = self->past[self->next];
     self->past[self->next] = in->theta;
@@ -50,7 +50,7 @@ pm_q_t speed_step(speed_t *self, const speed_config_t *config, const speed_in_t 
         reset(self, config, in);
         return in->omega;
     }
-    const pm_q_t omega_d = difference(self, config, in);
+    const pm_q_t omega_d = of_difference(self, config, in);
     (void)pm_lp1(&self->omega_e, ratio(self, config, in), config->k_ratio);
     (void)pm_lp1(&self->difference, omega_d - self->omega_e, config->k_mean);
     if (config->id == SPEED_DIFFERENCE) {

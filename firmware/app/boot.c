@@ -18,11 +18,23 @@ static const char *reset_text(hal_reset_t cause)
     }
 }
 
+/* At the start there is time to wait until the ring has room; no longer than this, should nobody send. */
+#define WAIT_US 50000U
+
+static void put(hal_t *hal, const char *text)
+{
+    const char *rest = text;
+    const uint32_t since = hal_time_us(hal);
+    do {
+        rest = &rest[hal_console(hal, rest)];
+    } while (*rest != '\0' && hal_time_us(hal) - since < WAIT_US);
+}
+
 static void say(hal_t *hal, const char *what, const char *value)
 {
-    (void)hal_console(hal, what);
-    (void)hal_console(hal, value);
-    (void)hal_console(hal, "\r\n");
+    put(hal, what);
+    put(hal, value);
+    put(hal, "\r\n");
 }
 
 static void say_hex(hal_t *hal, const char *what, uint32_t value)

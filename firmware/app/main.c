@@ -3,7 +3,8 @@
 
 app_t app_instance;
 
-int main(void)
+/* Under its own name in the image, for debuggers. */
+int __attribute__((noipa)) main(void)
 {
     hal_t *hal = hal_instance();
     app_boot(&app_instance, hal);

@@ -45,12 +45,12 @@ void make_ekf_full(maker_t *m, ekf_full_config_t *c)
 {
     const ekf_noise_t noise = ekf_noise(m);
     const pm_num_t quarter = pm_num_ratio(1, 4);
-    const int32_t least = PM_KALMAN_LEAST(EKF_STATES);
+    const int32_t lowest = PM_KALMAN_LEAST(EKF_STATES);
     make_model(m, &c->model);
     c->per_unit = fixed(m, pm_num_div(m->base.psi, noise.u), SMALL_BITS, DRIVE_PARAM_psi_m);
-    c->q_lambda = process(pm_num_mul(noise.voltage, m->base.t_s), noise.u, least);
-    c->q_omega = process(noise.speed, pm_num_mul(quarter, m->base.omega), least);
-    c->q_delta = process(noise.angle, quarter, least);
+    c->q_lambda = process(pm_num_mul(noise.voltage, m->base.t_s), noise.u, lowest);
+    c->q_omega = process(noise.speed, pm_num_mul(quarter, m->base.omega), lowest);
+    c->q_delta = process(noise.angle, quarter, lowest);
     c->r_d = measurement(pm_num_mul(si(m, DRIVE_PARAM_L_d), noise.current), noise.u);
     c->r_q = measurement(pm_num_mul(si(m, DRIVE_PARAM_L_q), noise.current), noise.u);
 }
@@ -58,15 +58,15 @@ void make_ekf_full(maker_t *m, ekf_full_config_t *c)
 void make_ekf_reduced(maker_t *m, ekf_reduced_config_t *c)
 {
     const ekf_noise_t noise = ekf_noise(m);
-    const int32_t least = PM_KALMAN_LEAST(EKF_REDUCED_STATES);
+    const int32_t lowest = PM_KALMAN_LEAST(EKF_REDUCED_STATES);
     /* a current enters the flux of a period twice */
     const pm_num_t voltage = square(pm_num_mul(noise.voltage, m->base.t_s));
     const pm_num_t current = square(pm_num_mul(si(m, DRIVE_PARAM_L_d), noise.current));
     const pm_num_t rho = pm_num_sqrt(pm_num_add(voltage, pm_num_mul(pm_num(2), current)));
     make_model(m, &c->model);
     c->r = measurement(rho, noise.u);
-    c->q_omega = process(noise.speed, m->base.omega, least);
-    c->q_delta = process(noise.angle, pm_num(1), least);
+    c->q_omega = process(noise.speed, m->base.omega, lowest);
+    c->q_delta = process(noise.angle, pm_num(1), lowest);
     /* from there on the variance of the angle is below 1 rad^2 */
     const pm_q_t visible = fixed(m, pm_num_div(rho, noise.u), Q_BITS, DRIVE_PARAM_i_noise);
     c->omega_min = pm_max(visible, PM_Q(0.02));

@@ -214,7 +214,7 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
         position_out_t frame;
         position_step(&drive->position, &drive->config.position, v, drive->i_ab, &frame);
         drive->status.theta = drive->position.pll.theta;
-        if (__builtin_expect(drive->config.speed_estimate.id != SPEED_LOOP, 0) != 0) {
+        if (pm_rarely(drive->config.position.special)) {
             speed_collect(&drive->speed_estimate, pm_park(v, frame.dir).q);
         }
         if (drive->stage != STAGE_VECTOR) {
@@ -237,8 +237,8 @@ void drive_prepare(drive_t *drive)
     /* at low speed the observer would drift on an imposed angle */
     drive->led = open && pm_abs(omega) < c->position.omega_low;
     if (drive->led) {
-        const pm_pll_t imposed = {.theta = drive->theta_open, .omega = omega};
-        position_lead(&drive->position, &c->position, &imposed);
+        const pm_pll_t along = {.theta = drive->theta_open, .omega = omega};
+        position_lead(&drive->position, &c->position, &along);
     }
     drive->turn_open = turn;
     drive->ahead = pm_dir((pm_angle_t)turn + (pm_angle_t)pm_half(turn));

@@ -1,5 +1,6 @@
 #include "firmware/drive/position.h"
 
+#include "firmware/math/compiler.h"
 #include "firmware/math/filter.h"
 #include "firmware/math/trig.h"
 
@@ -26,6 +27,16 @@ void position_reset(position_t *self, const position_config_t *config, pm_angle_
     pulsating_square_reset(&self->square, &config->square, i);
 }
 
+/* Of what few drives use: one question in the period instead of one for each. */
+PM_RARE static pm_q_t special_eps(position_t *self, const position_config_t *config, pm_pll_t *pll,
+                                  pm_dir_t dir, pm_q_t eps)
+{
+    if (config->second_harmonic.id != SECOND_HARMONIC_STAYS) {
+        eps = second_harmonic_step(&self->second_harmonic, &config->second_harmonic, dir, eps);
+    }
+    return loop_eps(&self->loop, &config->loop, pll, &self->gains, eps);
+}
+
 void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i,
                    position_out_t *out)
 {
@@ -48,10 +59,10 @@ void position_step(position_t *self, const position_config_t *config, pm_ab_t v,
         pulsating_square_demodulate(&self->square, &config->square, &in, &square);
         eps = square.eps + pm_mul(self->weight, eps - square.eps);
     }
-    if (__builtin_expect(config->second_harmonic.id != SECOND_HARMONIC_STAYS, 0) != 0) {
-        eps = second_harmonic_step(&self->second_harmonic, &config->second_harmonic, dir, eps);
+    if (pm_rarely(config->special)) {
+        eps = special_eps(self, config, &pll, dir, eps);
     }
-    loop_correct(&self->loop, &config->loop, &pll, &self->gains, eps);
+    pm_pll_correct(&pll, &self->gains, eps);
     self->pll = pll;
     *out = (position_out_t){.dir = dir, .i = i_dq, .omega = pll.omega};
 }

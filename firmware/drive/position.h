@@ -25,6 +25,7 @@ typedef struct {
     pm_q_t omega_low, omega_high;
     int32_t per_span; /* 1 / (omega_high - omega_low), Q20 */
     bool injection;
+    bool special; /* a second harmonic, another loop or an estimate of the speed is to be looked after */
 } position_config_t;
 
 typedef struct {

@@ -10,7 +10,7 @@
 /* A condition of the control period that is next to never true. */
 static inline bool pm_rarely(bool x)
 {
-    return __builtin_expect((long)x, 0L) != 0L;
+    return __builtin_expect(x ? 1L : 0L, 0L) != 0L;
 }
 
 #endif

@@ -56,7 +56,7 @@ static inline __attribute__((always_inline)) pm_kalman_gain_t pm_kalman_measure(
                                                                                 unsigned m, int32_t r)
 {
     pm_kalman_gain_t g;
-    int32_t column[PM_KALMAN_STATES_MAX];
+    int32_t column[PM_KALMAN_STATES_MAX] = {0};
 #pragma GCC unroll 4
     for (unsigned i = 0; i < n; i++) {
         column[i] = pm_kalman_at(P, i, m);

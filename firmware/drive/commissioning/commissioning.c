@@ -202,7 +202,7 @@ void commissioning_slow(drive_t *drive)
         do {
             next++;
         } while (!is_wanted(drive->commissioning_report.routines, next));
-        drive->commissioning_report.progress = (uint8_t)(100U * next / (uint32_t)END);
+        drive->commissioning_report.progress = (uint8_t)(100U * (uint32_t)next / (uint32_t)END);
         if (next == (uint8_t)END) {
             finish(drive, COMMISSIONING_DONE, COMMISSIONING_NO_REASON);
         } else {

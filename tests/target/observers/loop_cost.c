@@ -12,7 +12,7 @@
 COST(void, loop, loop_t *self, const loop_config_t *c, pm_pll_t *pll, const pm_pll_config_t *gains,
      pm_q_t eps)
 {
-    loop_correct(self, c, pll, gains, eps);
+    pm_pll_correct(pll, gains, loop_eps(self, c, pll, gains, eps));
 }
 
 COST(pm_q_t, second_harmonic, second_harmonic_t *self, const second_harmonic_config_t *c, const pm_dir_t *dir,

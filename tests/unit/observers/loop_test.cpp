@@ -69,7 +69,8 @@ struct Loop {
     }
     void correct(double eps_rad)
     {
-        loop_correct(&loop, &config, &pll, &gains, fixed(std::clamp(eps_rad, -1.0, 1.0), 28));
+        const pm_q_t eps = fixed(std::clamp(eps_rad, -1.0, 1.0), 28);
+        pm_pll_correct(&pll, &gains, loop_eps(&loop, &config, &pll, &gains, eps));
     }
 };
 
