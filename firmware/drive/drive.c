@@ -160,7 +160,7 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
 }
 
 /* Open loop at a speed where the observer has an angle of its own. */
-PM_RARE static position_out_t imposed(const drive_t *drive)
+static inline position_out_t imposed(const drive_t *drive)
 {
     const pm_dir_t dir = pm_dir(drive->theta_open);
     return (position_out_t){.dir = dir, .i = pm_park(drive->i_ab, dir), .omega = drive->omega_open};
@@ -200,6 +200,14 @@ static inline void control(drive_t *drive, const position_out_t *frame, drive_ou
     write_out(&m, out);
 }
 
+/* In the frame of the step that follows. */
+PM_RARE static void collect_speed(drive_t *drive, pm_ab_t v)
+{
+    pm_pll_t pll = drive->position.pll;
+    pm_pll_predict(&pll, &drive->position.gains);
+    speed_collect(&drive->speed_estimate, pm_park(v, pm_dir(pll.theta)).q);
+}
+
 void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
 {
     drive->period++;
@@ -211,12 +219,12 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
         const pm_ab_t next = pm_pair_ab(&drive->v_next);
         drive->v_acting.alpha = next.alpha;
         drive->v_acting.beta = next.beta;
+        if (pm_rarely(drive->config.position.special)) {
+            collect_speed(drive, v);
+        }
         position_out_t frame;
         position_step(&drive->position, &drive->config.position, v, drive->i_ab, &frame);
         drive->status.theta = drive->position.pll.theta;
-        if (pm_rarely(drive->config.position.special)) {
-            speed_collect(&drive->speed_estimate, pm_park(v, frame.dir).q);
-        }
         if (drive->stage != STAGE_VECTOR) {
             drive->theta_open += (pm_angle_t)drive->turn_open;
             if (!drive->led) {

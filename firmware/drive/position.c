@@ -27,14 +27,14 @@ void position_reset(position_t *self, const position_config_t *config, pm_angle_
     pulsating_square_reset(&self->square, &config->square, i);
 }
 
-/* Of what few drives use: one question in the period instead of one for each. */
-PM_RARE static pm_q_t special_eps(position_t *self, const position_config_t *config, pm_pll_t *pll,
-                                  pm_dir_t dir, pm_q_t eps)
+/* What few drives use: one question in the period instead of one for each. */
+PM_RARE static pm_q_t special_eps(position_t *self, const position_config_t *config, pm_q_t eps)
 {
     if (config->second_harmonic.id != SECOND_HARMONIC_STAYS) {
-        eps = second_harmonic_step(&self->second_harmonic, &config->second_harmonic, dir, eps);
+        eps = second_harmonic_step(&self->second_harmonic, &config->second_harmonic, pm_dir(self->pll.theta),
+                                   eps);
     }
-    return loop_eps(&self->loop, &config->loop, pll, &self->gains, eps);
+    return loop_eps(&self->loop, &config->loop, &self->pll, &self->gains, eps);
 }
 
 void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i,
@@ -60,7 +60,9 @@ void position_step(position_t *self, const position_config_t *config, pm_ab_t v,
         eps = square.eps + pm_mul(self->weight, eps - square.eps);
     }
     if (pm_rarely(config->special)) {
-        eps = special_eps(self, config, &pll, dir, eps);
+        self->pll = pll; /* by way of the memory, so that otherwise it stays in registers */
+        eps = special_eps(self, config, eps);
+        pll = self->pll;
     }
     pm_pll_correct(&pll, &self->gains, eps);
     self->pll = pll;
