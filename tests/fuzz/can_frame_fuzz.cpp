@@ -162,7 +162,7 @@ void read(void *context, const od_entry_t *entry, uint32_t offset, uint8_t *byte
     if (entry->slot != OD_LIVE_TRACE_DATA) {
         demand(offset + count <= 9);
         std::memset(bytes, 'x', count);
-    } else if (d.trace.end > 0) { // settings may have changed since the transfer began
+    } else if (d.trace.end != nullptr) { // settings may have changed since the transfer began
         trace_read(&d.trace, offset, bytes, count);
     }
 }

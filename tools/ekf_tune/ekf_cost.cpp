@@ -179,7 +179,7 @@ double cost(const std::vector<Record> &records, int observer, const Noise &noise
         for (const Record &r : records) {
             drive_config_t config;
             if (!configure(r, observer, noise, &config)) {
-                return INFINITY;
+                return static_cast<double>(INFINITY);
             }
             if (n > 0) {
                 factors.apply(&config.position.observer);
