@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/temporary_file.h"
+
 namespace
 {
 
@@ -62,7 +64,8 @@ struct File {
 
     elf_image_t *open(std::string *error = nullptr)
     {
-        const std::string path = testing::TempDir() + "image.elf";
+        const tests::TemporaryFile place("image.elf");
+        const std::string path = place.path();
         FILE *file = std::fopen(path.c_str(), "wb");
         EXPECT_EQ(std::fwrite(bytes.data(), 1, bytes.size(), file), bytes.size());
         std::fclose(file);

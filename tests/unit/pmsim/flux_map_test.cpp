@@ -10,6 +10,7 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/support/temporary_file.h"
 #include "tests/unit/pmsim/support.h"
 
 namespace pmsim
@@ -68,14 +69,7 @@ class FluxMapTable : public testing::Test
   protected:
     FluxMapTable()
     {
-        const testing::TestInfo *info = testing::UnitTest::GetInstance()->current_test_info();
-        folder_ = fs::temp_directory_path() / (std::string("flux_map_test.") + info->name());
         fs::create_directories(folder_);
-    }
-
-    ~FluxMapTable() override
-    {
-        fs::remove_all(folder_);
     }
 
     // Reads the section with the CSV file beside its machine file.
@@ -93,7 +87,8 @@ class FluxMapTable : public testing::Test
         return message.compare(0, prefix.size(), prefix) == 0 ? message.substr(prefix.size()) : message;
     }
 
-    fs::path folder_;
+    const tests::TemporaryFile place_{"flux_map"};
+    const fs::path folder_ = place_.path();
 };
 
 using Flux = std::function<dq_t(double i_d, double i_q, double theta_rad)>;

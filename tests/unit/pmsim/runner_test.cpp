@@ -1,12 +1,12 @@
 #include "tools/pmsim/runner.h"
 
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <sstream>
 
 #include <gmock/gmock.h>
 
+#include "tests/support/temporary_file.h"
 #include "tests/unit/pmsim/support.h"
 #include "tools/pmsim/loop.h"
 #include "tools/pmsim/record_file.h"
@@ -42,14 +42,12 @@ std::string content(const std::string &path)
 
 std::string trace_of(const std::string &text, const std::string &name)
 {
-    const std::string path = testing::TempDir() + name;
+    const tests::TemporaryFile file(name);
     const Scenario scenario = load(text);
-    TraceWriter trace(path, scenario, 7);
+    TraceWriter trace(file.path(), scenario, 7);
     run_scenario(scenario, [&trace](const Sample &sample) { trace.add(sample); });
     trace.close();
-    std::string read = content(path);
-    std::filesystem::remove(path);
-    return read;
+    return content(file.path());
 }
 
 TEST(Runner, SameSeedSameTraceOtherSeedOtherTrace)
@@ -163,10 +161,9 @@ TEST(Record, ReplayGivesTheSameBits)
 
 TEST(Record, FileHasTheSizeAndHeaderThatTheFormatSays)
 {
-    const std::string path = testing::TempDir() + "pmsim.rec";
-    write_recording(record_scenario(load(small_scenario()), 100), path);
-    const std::string bytes = content(path);
-    std::filesystem::remove(path);
+    const tests::TemporaryFile file("recording");
+    write_recording(record_scenario(load(small_scenario()), 100), file.path());
+    const std::string bytes = content(file.path());
     EXPECT_EQ(bytes.size(),
               sizeof(record_header_t) + 4U * DRIVE_PARAM_COUNT + 100U * sizeof(record_period_t));
     EXPECT_EQ(bytes.substr(0, 8), RECORD_MAGIC);
