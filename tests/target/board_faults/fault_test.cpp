@@ -33,6 +33,19 @@ TEST(BoardFault, TheSameWithoutComparatorsStaysOn)
     EXPECT_TRUE(b.bridge_on());
 }
 
+// The port asks for it (DBGMCU): no voltage stays applied at a breakpoint, and a breakpoint is no dead
+// program.
+TEST(BoardFault, DebuggerThatStopsTheProcessorOpensTheBridge)
+{
+    Bench b;
+    b.running();
+    board_halt(b.board, true);
+    EXPECT_FALSE(b.bridge_on()); // at once
+    b.run_ms(100);               // five times the watchdog's
+    EXPECT_FALSE(b.bridge_on());
+    EXPECT_EQ(board_resets(b.board), 0u);
+}
+
 TEST(BoardFault, BreakInputOpensAndBarsArming)
 {
     Bench b;
