@@ -14,7 +14,7 @@
  * Order in period k: pulsating_square_demodulate() with the current at k, then pulsating_square_output() for
  * the voltage over [k+1, k+2). eps is exact for small e and 1/2 sin 2e beyond: stable at 0 and 180 degrees,
  * so the polarity must be known. misfit: distance of h_d from its expected value, relative. The fundamental
- * current is the mean of two samples: pulsating_square_fundamental(). Tests:
+ * current is the mean of two samples: pulsating_square_fundamental_twice(). Tests:
  * tests/unit/injection/pulsating_square_test.cpp, tests/scenario. */
 #ifndef INJECTION_PULSATING_SQUARE_H
 #define INJECTION_PULSATING_SQUARE_H
@@ -53,16 +53,10 @@ void pulsating_square_slow(pulsating_square_t *self, const pulsating_square_conf
 /* misfit of the last step. */
 pm_q_t pulsating_square_misfit(const pulsating_square_t *self, const pulsating_square_config_t *config);
 
-/* Current at k without the carrier, doubled or as it is; call before pulsating_square_demodulate(). */
+/* Current at k without the carrier, doubled; call before pulsating_square_demodulate(). */
 static inline pm_ab_t pulsating_square_fundamental_twice(const pulsating_square_t *self, pm_ab_t i)
 {
     return (pm_ab_t){.alpha = i.alpha + self->i.alpha, .beta = i.beta + self->i.beta};
-}
-
-static inline pm_ab_t pulsating_square_fundamental(const pulsating_square_t *self, pm_ab_t i)
-{
-    const pm_ab_t twice = pulsating_square_fundamental_twice(self, i);
-    return (pm_ab_t){.alpha = pm_half(twice.alpha), .beta = pm_half(twice.beta)};
 }
 
 #endif

@@ -9,9 +9,6 @@ void observer_reset(observer_t *self, const observer_config_t *config, const obs
     case OBSERVER_##name:                                                                                    \
         name##_reset(&self->name, &config->name, in);                                                        \
         break;
-#ifdef PM_OBSERVERS_FEW
-#define PM_OBSERVER_OPTIONAL(name, help)
-#endif
 #include "observers/observers.def"
 #undef PM_OBSERVER
     case OBSERVER_COUNT:
@@ -29,9 +26,6 @@ void observer_step_other(observer_t *self, const observer_config_t *config, cons
     case OBSERVER_##name:                                                                                    \
         name##_step(&self->name, &config->name, in, out);                                                    \
         break;
-#ifdef PM_OBSERVERS_FEW
-#define PM_OBSERVER_OPTIONAL(name, help)
-#endif
 #include "observers/observers.def"
 #undef PM_OBSERVER
     case OBSERVER_active_flux: /* stands in observer_step() */
@@ -48,9 +42,6 @@ obs_out_t observer_last(const observer_t *self, const observer_config_t *config)
 #define PM_OBSERVER(name, help)                                                                              \
     case OBSERVER_##name:                                                                                    \
         return name##_last(&self->name);
-#ifdef PM_OBSERVERS_FEW
-#define PM_OBSERVER_OPTIONAL(name, help)
-#endif
 #include "observers/observers.def"
 #undef PM_OBSERVER
     case OBSERVER_COUNT:
@@ -67,9 +58,6 @@ void observer_slow(observer_t *self, const observer_config_t *config, const obs_
     case OBSERVER_##name:                                                                                    \
         name##_slow(&self->name, &config->name, in, out, weight);                                            \
         break;
-#ifdef PM_OBSERVERS_FEW
-#define PM_OBSERVER_OPTIONAL(name, help)
-#endif
 #include "observers/observers.def"
 #undef PM_OBSERVER
     case OBSERVER_COUNT:
@@ -85,9 +73,6 @@ void observer_tie(observer_t *self, const observer_config_t *config)
     case OBSERVER_##name:                                                                                    \
         name##_tie(&self->name, &config->name);                                                              \
         break;
-#ifdef PM_OBSERVERS_FEW
-#define PM_OBSERVER_OPTIONAL(name, help)
-#endif
 #include "observers/observers.def"
 #undef PM_OBSERVER
     case OBSERVER_COUNT:

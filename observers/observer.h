@@ -34,6 +34,7 @@
 
 typedef enum {
 #define PM_OBSERVER(name, help) OBSERVER_##name,
+#define PM_OBSERVER_OPTIONAL    PM_OBSERVER
 #include "observers/observers.def"
 #undef PM_OBSERVER
     OBSERVER_COUNT
@@ -43,6 +44,7 @@ typedef struct {
     observer_id_t id;
     union {
 #define PM_OBSERVER(name, help) name##_config_t name;
+#define PM_OBSERVER_OPTIONAL    PM_OBSERVER
 #include "observers/observers.def"
 #undef PM_OBSERVER
     };
@@ -50,6 +52,7 @@ typedef struct {
 
 typedef union {
 #define PM_OBSERVER(name, help) name##_t name;
+#define PM_OBSERVER_OPTIONAL    PM_OBSERVER
 #include "observers/observers.def"
 #undef PM_OBSERVER
 } observer_t;

@@ -9,9 +9,6 @@ void make_observer(maker_t *m, observer_config_t *c)
     case OBSERVER_##name:                                                                                    \
         make_##name(m, &c->name);                                                                            \
         break;
-#ifdef PM_OBSERVERS_FEW
-#define PM_OBSERVER_OPTIONAL(name, help)
-#endif
 #include "observers/observers.def"
 #undef PM_OBSERVER
     case OBSERVER_COUNT:

@@ -271,12 +271,6 @@ static inline pm_q_t pm_small_gain(int32_t small, int32_t g)
     return pm_shl(pm_sat(pm_mulh(small, g), 20), PM_Q_BITS - 20);
 }
 
-/* x g limited to +-1, as a signal. */
-static inline pm_q_t pm_gain_unit(pm_q_t x, pm_gain_t g)
-{
-    return pm_narrow(pm_sat(pm_mulh(x, g), PM_WIDE_BITS));
-}
-
 /* a - b as the shorter way round, in turns of 2^32. */
 static inline int32_t pm_angle_diff(pm_angle_t a, pm_angle_t b)
 {

@@ -93,7 +93,7 @@ class Carrier
         in.omega = fixed(omega_ / kBase.omega_rad_s, 28);
         in.i_dq = bench::dq(i_fundamental() / kBase.i_A * std::polar(1.0, -theta_hat));
         pulsating_square_slow(&self, &c_, &in);
-        fundamental = bench::complex(pulsating_square_fundamental(&self, in.i)) * kBase.i_A;
+        fundamental = bench::complex(pulsating_square_fundamental_twice(&self, in.i)) * kBase.i_A / 2.0;
         obs_out_t out;
         pulsating_square_demodulate(&self, &c_, &in, &out);
         const pm_dq_t v = pulsating_square_output(&self, &c_);
