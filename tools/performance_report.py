@@ -54,7 +54,7 @@ def limits():
 
 MODES_RUN = SCENARIOS / "board/modes.yaml"
 MODES = [("off", "off"), ("calibrate", "calibration"), ("pulses", "initial-position pulses"),
-         ("align", "alignment"), ("open_loop", "open-loop current"),
+         ("identify", "identification"), ("align", "alignment"), ("open_loop", "open-loop current"),
          ("injection", "injection"), ("blend", "injection and observer"), ("flux", "active flux"),
          ("weakening", "active flux, field weakening"), ("limited", "of these: at the voltage limit"),
          ("fault", "of these: a fault found"), ("swap", "of these: after a swap of parameters")]

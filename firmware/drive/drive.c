@@ -137,20 +137,17 @@ static void off(drive_out_t *out)
     }
 }
 
-/* A period without current control: a fault, the bridge off, calibration, pulses. */
+/* A period without control: a fault, the bridge off, calibration, pulses. */
 PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_out_t *out)
 {
     drive->hw_fault = in->hw_fault;
     protection_step(drive);
-    const pm_ab_t v_past = drive->v_acting;
     drive->v_acting = drive->v_next;
     drive->v_next = (pm_ab_t){0, 0};
     drive->status.theta = drive->position.pll.theta;
     out->trip = drive->fault != DRIVE_FAULT_NONE;
     if (drive->stage == STAGE_PULSES) {
         pulses(drive, out);
-    } else if (drive->stage == STAGE_IDENTIFY) {
-        commissioning_step(drive, v_past, out);
     } else {
         off(out);
         if (drive->stage == STAGE_CALIBRATE) {
@@ -159,8 +156,18 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
     }
 }
 
+/* Nothing estimates the position: an identification, or no control at all. */
+PM_RARE static void without_position(drive_t *drive, const drive_in_t *in, drive_out_t *out)
+{
+    if (drive->stage == STAGE_IDENTIFY && !in->hw_fault && protection_passed(drive)) {
+        commissioning_step(drive, out);
+    } else {
+        without_control(drive, in, out);
+    }
+}
+
 /* Open loop at a speed where the observer has an angle of its own. */
-static inline position_out_t imposed(const drive_t *drive)
+static inline position_out_t imposed_frame(const drive_t *drive)
 {
     const pm_dir_t dir = pm_dir(drive->theta_open);
     return (position_out_t){.dir = dir, .i = pm_park(drive->i_ab, dir), .omega = drive->omega_open};
@@ -213,7 +220,7 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
     drive->period++;
     measure(drive, in);
     if (drive->stage < STAGE_OPEN_LOOP || in->hw_fault || !protection_passed(drive)) {
-        without_control(drive, in, out);
+        without_position(drive, in, out);
     } else {
         const pm_ab_t v = pm_pair_ab(&drive->v_acting);
         const pm_ab_t next = pm_pair_ab(&drive->v_next);
@@ -228,7 +235,7 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
         if (drive->stage != STAGE_VECTOR) {
             drive->theta_open += (pm_angle_t)drive->turn_open;
             if (!drive->led) {
-                frame = imposed(drive);
+                frame = imposed_frame(drive);
             }
         }
         control(drive, &frame, out);
@@ -240,7 +247,8 @@ void drive_prepare(drive_t *drive)
     const drive_config_t *c = &drive->config;
     const bool open = drive->stage == STAGE_OPEN_LOOP;
     const pm_q_t v_dc = drive->status.v_dc;
-    const pm_q_t omega = open ? drive->omega_open : drive->position.pll.omega;
+    const bool imposed = open || drive->stage == STAGE_IDENTIFY;
+    const pm_q_t omega = imposed ? drive->omega_open : drive->position.pll.omega;
     const int32_t turn = pm_omega_to_angle(omega, c->k_theta);
     /* at low speed the observer would drift on an imposed angle */
     drive->led = open && pm_abs(omega) < c->position.omega_low;
