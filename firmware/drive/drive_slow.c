@@ -198,17 +198,36 @@ static void move(drive_t *drive)
     }
 }
 
+/* Of a rotor that turns without current control nothing is known. */
+static void report_nothing(drive_t *drive)
+{
+    drive_status_t *s = &drive->status;
+    if (drive->stage != STAGE_IDENTIFY) { /* which has currents of its own */
+        drive->i_ref = (pm_dq_t){0, 0};
+        s->i = (pm_dq_t){0, 0};
+    }
+    drive->position.pll = (pm_pll_t){.theta = 0}; /* the step copies the angle from there */
+    s->omega = 0;
+    s->omega_ref = 0;
+    s->weight = 0;
+    s->quality = 0;
+}
+
 static void report(drive_t *drive)
 {
     drive_status_t *s = &drive->status;
     s->state = drive->fault == DRIVE_FAULT_NONE ? drive->state : DRIVE_FAULT;
     s->fault = drive->fault;
-    s->omega = drive->position.pll.omega;
-    s->omega_ref = drive->stage == STAGE_OPEN_LOOP ? drive->omega_open : drive->speed.reference;
+    if (drive->stage < STAGE_OPEN_LOOP) {
+        report_nothing(drive);
+    } else {
+        s->omega = drive->position.pll.omega;
+        s->omega_ref = drive->stage == STAGE_OPEN_LOOP ? drive->omega_open : drive->speed.reference;
+        s->weight = drive->position.weight;
+        s->quality = drive->position.quality;
+    }
     s->i_ref = drive->i_ref;
     s->v = drive->v_next;
-    s->weight = drive->position.weight;
-    s->quality = drive->position.quality;
 }
 
 void drive_slow(drive_t *drive, const drive_slow_in_t *in)

@@ -104,6 +104,30 @@ TEST(Drive, GoesThroughItsStates)
     EXPECT_EQ(drive_status(&x.loop.app.drive)->fault, DRIVE_FAULT_NONE);
 }
 
+// Off at once, from a turning rotor.
+TEST(Drive, WhatIsNotKnownWithTheBridgeOffIsZero)
+{
+    Closed x;
+    x.run_ms(20);
+    x.command(true, 30);
+    x.run_ms(800);
+    const drive_status_t *status = drive_status(&x.loop.app.drive);
+    EXPECT_GT(status->omega, 0);
+    EXPECT_GT(status->quality, 0);
+    drive_trip(&x.loop.app.drive, DRIVE_FAULT_REMOTE_LOST);
+    x.run_ms(3);
+    EXPECT_NEAR(x.truth().omega_mech_rad_s, 30, 3);
+    EXPECT_EQ(status->i.d, 0);
+    EXPECT_EQ(status->i.q, 0);
+    EXPECT_EQ(status->i_ref.d, 0);
+    EXPECT_EQ(status->i_ref.q, 0);
+    EXPECT_EQ(status->omega, 0);
+    EXPECT_EQ(status->omega_ref, 0);
+    EXPECT_EQ(status->theta, 0U);
+    EXPECT_EQ(status->quality, 0);
+    EXPECT_NE(drive_fault_record(&x.loop.app.drive)->omega, 0); // of the moment, as it was
+}
+
 TEST(Drive, EnableTakenBackStopsTheStart)
 {
     for (const int after_ms : {50, 108, 130, 150}) { // while calibrating, in the pulses, settling

@@ -270,7 +270,7 @@ ENTRIES = (
     Entry(0x2900, 10, "theta", "measured", "u32", "read", "turn", 0, -32, None, None, None, False, False, "none", "tx", {}, 'estimated angle, electrical', ""),
     Entry(0x2900, 11, "omega_e", "measured", "i32", "read", "rad/s", -3, 0, None, None, None, False, False, "none", "tx", {}, 'estimated speed, electrical', ""),
     Entry(0x2900, 12, "temperature", "measured", "i16", "read", "degC", -1, 0, None, None, None, False, False, "none", "tx", {}, 'temperature of the hottest sensor', ""),
-    Entry(0x2900, 13, "quality", "measured", "u16", "read", "1", -3, 0, None, None, None, False, False, "none", "tx", {}, 'of the position: 1 good, 0 lost', ""),
+    Entry(0x2900, 13, "quality", "measured", "u16", "read", "1", -3, 0, None, None, None, False, False, "none", "tx", {}, 'of the position: 1 good, 0 lost, or the bridge is off', ""),
     Entry(0x2900, 14, "weight", "measured", "u16", "read", "1", -3, 0, None, None, None, False, False, "none", "tx", {}, '0: injection leads, 1: the flux observer', "5.9 #69"),
     Entry(0x2900, 15, "drive_state", "measured", "u8", "read", "", 0, 0, None, None, None, False, False, "none", "tx", {0: 'off', 1: 'calibrating', 2: 'finding the position', 3: 'running', 4: 'stopping', 5: 'fault'}, 'state of the drive', ""),
     Entry(0x2900, 16, "drive_fault", "measured", "u8", "read", "", 0, 0, None, None, None, False, False, "none", "tx", {}, 'code of the latched fault, 0: none', ""),
