@@ -251,7 +251,7 @@ void drive_prepare(drive_t *drive)
     const pm_q_t omega = imposed ? drive->omega_open : drive->position.pll.omega;
     const int32_t turn = pm_omega_to_angle(omega, c->k_theta);
     /* at low speed the observer would drift on an imposed angle */
-    drive->led = open && pm_abs(omega) < c->position.omega_low;
+    drive->led = open && pm_abs(drive->omega_ramp) < c->position.omega_low;
     if (drive->led) {
         const pm_pll_t along = {.theta = drive->theta_open, .omega = omega};
         position_lead(&drive->position, &c->position, &along);

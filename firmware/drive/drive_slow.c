@@ -141,7 +141,7 @@ static void run(drive_t *drive)
 static void stop(drive_t *drive)
 {
     run(drive);
-    const pm_q_t omega = drive->stage == STAGE_OPEN_LOOP ? drive->omega_open : drive->position.pll.omega;
+    const pm_q_t omega = drive->stage == STAGE_OPEN_LOOP ? drive->omega_ramp : drive->position.pll.omega;
     const bool ended = drive->stage == STAGE_OPEN_LOOP || drive->speed.reference == 0;
     const bool still = ended && pm_abs(omega) < drive->config.protection.omega_stall;
     drive->still_ms = still ? (uint16_t)(drive->still_ms + 1U) : 0U;
@@ -222,7 +222,7 @@ static void report(drive_t *drive)
         report_nothing(drive);
     } else {
         s->omega = drive->position.pll.omega;
-        s->omega_ref = drive->stage == STAGE_OPEN_LOOP ? drive->omega_open : drive->speed.reference;
+        s->omega_ref = drive->stage == STAGE_OPEN_LOOP ? drive->omega_ramp : drive->speed.reference;
         s->weight = drive->position.weight;
         s->quality = drive->position.quality;
     }

@@ -61,8 +61,10 @@ struct drive {
 
     pm_dq_t i_ref;
     pm_angle_t theta_open; /* open loop: angle of the current vector */
-    pm_q_t omega_open;
-    int32_t turn_open; /* of that speed in a period */
+    pm_q_t omega_ramp;     /* open loop: speed that is wanted, and ... */
+    pm_q_t omega_open;     /* ... that of the vector, which yields to a swinging rotor */
+    pm_q_t emf_open;       /* mean EMF beside that of the ramp */
+    int32_t turn_open;     /* of that speed in a period */
     pm_q_t i_open;
 
     /* references in per-unit, made from the command once */
