@@ -13,7 +13,7 @@
 /* The modulator's smallest link voltage; below v_dc_min, which is larger, the bridge is off. */
 #define V_DC_LEAST PM_Q(0.0625)
 
-drive_result_t drive_init(drive_t *drive, const drive_params_t *params)
+PM_RARE drive_result_t drive_init(drive_t *drive, const drive_params_t *params)
 {
     *drive = (drive_t){.state = DRIVE_OFF, .stage = STAGE_OFF};
     const drive_result_t result = drive_configure(&drive->config, params);
@@ -37,10 +37,11 @@ bool drive_same_frame(const drive_config_t *a, const drive_config_t *b)
            a->injection == b->injection && a->align_first == b->align_first;
 }
 
-void drive_reconfigure(drive_t *drive, const drive_config_t *config)
+PM_RARE void drive_reconfigure(drive_t *drive, const drive_config_t *config)
 {
     const observer_id_t before = drive->config.position.observer.id;
     drive->config = *config;
+    drive->taken = false;
     const position_config_t *position = &drive->config.position;
     if (position->observer.id != before && drive->stage >= STAGE_OPEN_LOOP) {
         position_change_observer(&drive->position, position, drive->i_ab, drive->status.i);
@@ -52,9 +53,14 @@ void drive_reconfigure(drive_t *drive, const drive_config_t *config)
     }
 }
 
-void drive_command(drive_t *drive, const drive_command_t *command)
+PM_RARE void drive_command(drive_t *drive, const drive_command_t *command)
 {
     const drive_mode_t mode = drive->state == DRIVE_OFF ? command->mode : drive->command.mode;
+    const drive_command_t *last = &drive->command;
+    const bool same_references = command->speed_mrad_s == last->speed_mrad_s &&
+                                 command->torque_uNm == last->torque_uNm &&
+                                 command->current_mA == last->current_mA;
+    drive->taken = drive->taken && same_references;
     drive->command = *command;
     drive->command.mode = mode;
     if (!command->enable && drive->stage == STAGE_IDENTIFY) {
@@ -88,7 +94,7 @@ const drive_fault_record_t *drive_fault_record(const drive_t *drive)
 
 static inline void measure(drive_t *drive, const drive_in_t *in)
 {
-    const pm_q_t *zero = drive->calibration.zero;
+    const pm_q_t *zero = drive->zero;
     const pm_pair_t zero_ab = pm_pair(&zero[0], &zero[1]);
     const pm_abc_t i = {
         .a = pm_shl(in->i_leg[0], CURRENT_BITS) - zero_ab.first,
@@ -100,8 +106,9 @@ static inline void measure(drive_t *drive, const drive_in_t *in)
     drive->status.v_dc = pm_shl(in->v_dc, VOLTAGE_BITS);
 }
 
-static void calibrate(calibration_t *self, const drive_in_t *in)
+static void calibrate(drive_t *drive, const drive_in_t *in)
 {
+    calibration_t *self = &drive->start.calibration;
     if (self->count >= DRIVE_OFFSET_PERIODS) {
         return;
     }
@@ -111,7 +118,7 @@ static void calibrate(calibration_t *self, const drive_in_t *in)
     self->count++;
     if (self->count == DRIVE_OFFSET_PERIODS) {
         for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-            self->zero[x] = pm_shl(self->sum[x], CURRENT_BITS - DRIVE_OFFSET_BITS);
+            drive->zero[x] = pm_shl(self->sum[x], CURRENT_BITS - DRIVE_OFFSET_BITS);
         }
     }
 }
@@ -120,7 +127,8 @@ static void pulses(drive_t *drive, drive_out_t *out)
 {
     initial_pulses_out_t p = {.driven = false};
     if (drive->pulses_state == PM_RUNNING) {
-        drive->pulses_state = initial_pulses_step(&drive->pulses, &drive->config.pulses, drive->i_ab, &p);
+        drive->pulses_state =
+            initial_pulses_step(&drive->start.pulses, &drive->config.pulses, drive->i_ab, &p);
     }
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
         const int32_t on = pm_mulh(p.duty[x], pm_shl(drive->config.modulator.counts, 32 - PM_Q_BITS));
@@ -151,7 +159,7 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
     } else {
         off(out);
         if (drive->stage == STAGE_CALIBRATE) {
-            calibrate(&drive->calibration, in);
+            calibrate(drive, in);
         }
     }
 }
@@ -242,7 +250,7 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
     }
 }
 
-void drive_prepare(drive_t *drive)
+PM_RARE void drive_prepare(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
     const bool open = drive->stage == STAGE_OPEN_LOOP;

@@ -1,6 +1,7 @@
 /* The bridge while the machine is identified: plain voltages without compensation, whose mean is exact. */
 #include "firmware/drive/commissioning/commissioning_parts.h"
 #include "firmware/math/compiler.h"
+#include "firmware/math/num.h"
 #include "firmware/math/pair.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
@@ -18,7 +19,7 @@ void commissioning_clear_sums(commissioning_t *self)
 
 pm_q_t commissioning_mean(const commissioning_t *self, uint32_t n)
 {
-    return self->taken == 0 ? 0 : (pm_q_t)(self->sum[n] / self->taken);
+    return (pm_q_t)pm_quotient(self->sum[n], self->taken);
 }
 
 void commissioning_start_current(drive_t *drive)

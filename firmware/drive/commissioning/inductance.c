@@ -7,6 +7,7 @@
  * ampere, the apparent L_q there and by psi_d = L_d i_d + k i_q^2 / 2:    k = sum (dpsi_d - L_d di_d) x / sum
  * x^2, x = i_q di_q the cross inductance k i_q. */
 #include "firmware/drive/commissioning/commissioning_parts.h"
+#include "firmware/math/num.h"
 #include "firmware/math/root.h"
 
 #define SHORTEST    2U
@@ -75,7 +76,7 @@ void inductance_enter(drive_t *drive, bool on_q, bool rated)
 /* Products of two signals are in twice their format. */
 static pm_q_t mean_product(const commissioning_t *self, uint32_t n)
 {
-    return (pm_q_t)(self->sum[n] / FINE / self->taken);
+    return (pm_q_t)pm_quotient(self->sum[n] / FINE, self->taken);
 }
 
 /* Flux per T_s: what the voltage, whose amplitude is the same in all periods, leaves of R and lost voltage.
@@ -84,7 +85,7 @@ static pm_q_t per_unit(const drive_t *drive)
 {
     const commissioning_t *self = &drive->identify.work;
     const square_t *square = &self->of.square;
-    const pm_q_t edges = (pm_q_t)((int64_t)square->negative * PM_ONE / self->taken);
+    const pm_q_t edges = (pm_q_t)pm_quotient((int64_t)square->negative * PM_ONE, self->taken);
     const pm_q_t lost =
         pm_mul(pm_mul(edges, self->lost), square->on_q ? PM_Q(0.577350269) : PM_Q(0.333333333));
     const pm_q_t w = square->voltage - pm_mul(self->R, commissioning_mean(self, SUM_CURRENT)) - lost;
