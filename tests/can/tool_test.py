@@ -529,6 +529,7 @@ class Identification(Bench):
         self.node["identification.L_q_rated"] = 41400000
         self.command("identify", "--only", "inductance", "--yes")
         self.assertEqual((self.node["L_d"], self.node["L_q"], self.node["L_dqh_rated"]), (41750000, 41750000, 0))
+        self.assertEqual((self.node["L_q_rated"], self.node["L_qh_rated"]), (41750000, 41750000))
 
     def test_name_plate(self):
         _, err = self.command("identify", "--yes", "--rated-current", "4A", code=2)

@@ -58,6 +58,15 @@ typedef struct {
 
 #define COMMISSIONING_J_STEPS 1024
 
+/* Incremental L_q at sixteenths of the square of the test current, 16: at all of it; an estimate. psi / i
+ * falls with the square of the current, L_q + (L_q_rated - L_q) (i / i_rated)^2, its tangent three times as
+ * much; but saturation is steeper than that, and psi / i was measured with the i_d that lessens it: four
+ * times. */
+static inline pm_q_t commissioning_tangent(const commissioning_result_t *r, int32_t of_16)
+{
+    return r->L_q + (r->L_q_rated - r->L_q) / 4 * of_16;
+}
+
 typedef struct {
     uint16_t half;   /* periods of half a wave */
     uint16_t count;  /* periods of the present one that have gone */
