@@ -207,7 +207,7 @@ INLINE double take_steps(circuit_t *c, double left_s, shape_t shape, bool swings
         if (!swings) {
             control(c, h, error);
         }
-        if (steps_watching(c)) {
+        if (steps_watching(c, to)) {
             excess_t excess = steps_excess(c, to);
             *event = steps_event(excess);
             if (*event && !steps_landed(excess)) {
