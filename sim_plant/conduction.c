@@ -102,7 +102,16 @@ static bool keeps_rail(const circuit_t *c, int k, gate_t gate, double least_A)
            circuit_leg_A(c, &c->now, k) <= -least_A;
 }
 
-/* Outside the zone of a switch its voltage is then the same, so that no charge moves either. */
+/* Leg k passes between a switch and the diode across it. */
+static void hand_over(circuit_t *c, int k, leg_t leg)
+{
+    if (c->bridge.c_leg_F > 0.0 && c->bridge.v_diode_V != 0.0) {
+        set_leg(c, k, leg);
+    } else {
+        bridge_put(&c->bridge, k, leg);
+    }
+}
+
 bool circuit_switch_early(circuit_t *c, const gates_t *gates, unsigned legs, double within_s)
 {
     bridge_t *b = &c->bridge;
@@ -120,9 +129,9 @@ bool circuit_switch_early(circuit_t *c, const gates_t *gates, unsigned legs, dou
         int k = bridge_first(legs);
         bool low = low_side(b->leg[k]);
         if (gates_conducting(gates, k) == GATE_OFF) {
-            bridge_put(b, k, low ? LEG_DIODE_LOW : LEG_DIODE_HIGH);
+            hand_over(c, k, low ? LEG_DIODE_LOW : LEG_DIODE_HIGH);
         } else {
-            bridge_put(b, k, low ? LEG_LOW : LEG_HIGH);
+            hand_over(c, k, low ? LEG_LOW : LEG_HIGH);
         }
     }
     bridge_sum(b, &c->machine.winding);
