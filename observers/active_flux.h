@@ -29,9 +29,8 @@
 typedef struct {
     observer_model_t model;
     observer_resistance_t resistance;
-    pm_frac_t g;       /* amplitude feedback per radian: g T_s w_base, Q32 */
-    pm_frac_t k_adapt; /* filter constant of psi_ref per slow step */
-    pm_frac_t k_seed;  /* T_s k_q at weight 0, Q32 */
+    pm_frac_t g;      /* amplitude feedback per radian: g T_s w_base, Q32 */
+    pm_frac_t k_seed; /* T_s k_q at weight 0, Q32 */
 } active_flux_config_t;
 
 typedef struct {

@@ -29,7 +29,6 @@ typedef struct {
     observer_resistance_t resistance;
     pm_frac_t k_filter;  /* low-pass of the EMF, per period */
     pm_gain_t lag;       /* of the filter in the stationary frame, emf_machine_t: (2 - k) / k, Q26 */
-    pm_frac_t k_adapt;   /* filter constant of psi_ref per slow step */
     int32_t rate;        /* 1 / (T w_base), Q20 */
     pm_gain_t slow_rate; /* the same of a slow step, Q26 */
     pm_q_t slow_step;    /* a slow step's T w_base */
