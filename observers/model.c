@@ -1,6 +1,8 @@
 #include "observers/model.h"
 
-pm_q_t observer_active_flux(const observer_model_t *model, pm_dq_t i)
+#include "firmware/math/compiler.h"
+
+PM_RARE pm_q_t observer_active_flux(const observer_model_t *model, pm_dq_t i)
 {
     const pm_q_t cross = pm_add_sat(pm_half(model->L_qd), pm_mul(model->L_qd2, i.d));
     const pm_q_t reluctance = pm_mul(pm_sub_sat(model->L_d, observer_L_q(model, i)), i.d);
@@ -8,7 +10,7 @@ pm_q_t observer_active_flux(const observer_model_t *model, pm_dq_t i)
     return pm_max(psi, model->psi_m / 4);
 }
 
-pm_q_t observer_L_q(const observer_model_t *model, pm_dq_t i)
+PM_RARE pm_q_t observer_L_q(const observer_model_t *model, pm_dq_t i)
 {
     const pm_q_t k = pm_add_sat(model->L_qd, pm_mul(model->L_qd2, i.d));
     const pm_q_t along_q = pm_add_sat(model->L_q, pm_mul(model->L_q2, pm_mul(i.q, i.q)));
