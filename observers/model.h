@@ -1,14 +1,16 @@
-/* The machine as all observers know it, and what they share (METHODS.md 1.3.1.3, 2.2.2, 3.4.2; row 27).
+/* The machine as all observers know it, and what they share (METHODS.md 1.3.1.3, 2.2.2, 3.4).
  *
- *   L_q(i) = L_q + L_q2 i_q^2 + k i_d            psi_q / i_q under load, k = L_qd + L_qd2 i_d
- *   psi_a = psi_m + (L_d - L_q(i)) i_d + (L_qd/2 + L_qd2 i_d) i_q^2
- *                                                active flux: the part of the stator flux that lies on the
- * d-axis Cross-coupling: psi_q = (L_q + L_q2 i_q^2) i_q + L_qds i_d with L_qds = k i_q. An observer without
- * it errs by tan = -L_qds i_d / psi_a (3.4.1, row 26). Two identity terms remove that error, whatever the
- * frame: -w L_qds i  (3.4.2, improved extended EMF)     and     w k i_d J i, which L_q(i) gives each model
- * here. They differ by w k |i|^2 along the q-axis: in the length of what lies there, not in its angle. The
- * part of psi_d follows from that of psi_q, since the energy of both is one. psi_a is at least psi_m / 4. All
- * for 1 kHz, not for the step. Tests: tests/unit/observers, tests/scenario/cross_coupling.yaml. */
+ *   L_q(i) = L_q + L_q2 i_q^2 + k i_d, k = L_qd + L_qd2 i_d: psi_q / i_q under load
+ *   psi_a = psi_m + (L_d - L_q(i)) i_d + (L_qd/2 + L_qd2 i_d) i_q^2, >= psi_m/4: active flux, the part of the
+ *           stator flux on the d-axis; the last term follows from that of psi_q, both having one energy.
+ *
+ * Cross-coupling: psi_q has L_qds i_d with L_qds = k i_q. Without it an observer errs by (row 26)
+ *   tan = -L_qds i_d / psi_a.
+ * Two identity terms remove that whatever the frame (row 27): -w L_qds i of the improved extended EMF, and
+ * w k i_d J i, which each model has here by its L_q(i). They differ by w k |i|^2 along q: in what lies there,
+ * not in its angle.
+ *
+ * All for 1 kHz, not for the step. Tests: tests/unit/observers, tests/scenario/cross_coupling.yaml. */
 #ifndef OBSERVERS_MODEL_H
 #define OBSERVERS_MODEL_H
 
@@ -18,7 +20,7 @@ typedef struct {
     pm_q_t R;
     pm_q_t L_d, L_q;
     pm_q_t L_q2;  /* change of L_q with i_q^2, <= 0 ... */
-    pm_q_t L_qd;  /* ... with i_d, <= 0: L_qds / i_q, k_c of the book; 0: cross-coupling is left alone ... */
+    pm_q_t L_qd;  /* ... with i_d, <= 0: k_c of 3.4.2; 0: cross-coupling is left out ... */
     pm_q_t L_qd2; /* ... and with i_d^2 */
     pm_q_t psi_m;
     pm_frac_t t_s; /* T_s w_base, Q32 */
