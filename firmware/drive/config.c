@@ -141,7 +141,8 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     make_modulator(&m, &config->modulator);
     make_current(&m, &config->current);
     make_speed(&m, &config->speed);
-    make_mtpa(&m, &config->mtpa);
+    make_mtpa(&m, &m.mtpa);
+    config->mtpa = m.mtpa;
     make_flux_weakening(&m, &config->field_weakening);
     make_position(&m, &config->position, config->injection);
     make_speed_estimate(&m, &config->speed_estimate);
