@@ -236,6 +236,6 @@ enum {
     OD_BYTES_COUNT = 3,
 };
 
-enum { OD_PARAMETER_COUNT = 66 };
+enum { OD_PARAMETER_COUNT = 69 };
 
 #endif
