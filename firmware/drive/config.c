@@ -148,6 +148,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     make_speed_estimate(&m, &config->speed_estimate);
     config->speed_estimate.k_theta = config->position.pll_low.k_theta;
     config->position.special = config->position.second_harmonic.id != SECOND_HARMONIC_STAYS ||
+                               config->position.mismatch.id != MISMATCH_OFF ||
                                config->position.loop.id != LOOP_PLL ||
                                config->speed_estimate.id != SPEED_LOOP;
     if (!config->align_first) {

@@ -109,6 +109,9 @@ void make_model(maker_t *m, observer_model_t *c);
 #include "observers/observers.def"
 #undef PM_OBSERVER
 
+/* config_mismatch.c */
+void make_mismatch(maker_t *m, mismatch_config_t *c);
+
 /* config_position.c */
 bool salient(const maker_t *m);
 void make_position(maker_t *m, position_config_t *c, bool injection);

@@ -85,4 +85,10 @@ void reference_vector(drive_t *drive)
     }
     drive->status.limits |= limited ? DRIVE_LIMIT_CURRENT : 0U;
     drive->i_ref = (pm_dq_t){.d = flux_current(drive, i_q), .q = i_q};
+    const pm_q_t injected = drive->position.mismatch.injected;
+    if (c->position.mismatch.id == (uint8_t)MISMATCH_D_AXIS) {
+        drive->i_ref.d += injected;
+    } else {
+        drive->i_ref.q = pm_clamp(i_q + injected, i_min, i_max);
+    }
 }

@@ -481,6 +481,10 @@ Names must_be_positive(const drive_config_t &c)
         x.push_back({"second harmonic mu", c.position.second_harmonic.mu});
         x.push_back({"second harmonic k_p", c.position.second_harmonic.k_p});
     }
+    if (c.position.mismatch.id != MISMATCH_OFF) {
+        x.push_back({"mismatch samples", c.position.mismatch.samples - 9});
+        x.push_back({"mismatch current", c.position.mismatch.i});
+    }
     if (c.injection) {
         const pulsating_square_config_t &s = c.position.square;
         x.push_back({"v_h", s.v_h});
@@ -560,6 +564,30 @@ TEST(Config, ModelReferenceLoopAndSpeed)
         EXPECT_NEAR(real(c.speed_estimate.per_turn, 26), 2 * M_PI / (6e-3 * W), 1e-6);
         EXPECT_NEAR(real(c.speed_estimate.k_mean, 32), 2 * M_PI * 5e-3, 1e-8);
     }
+}
+
+// observers/mismatch.h for IPM-1000: 40 Hz are 25 steps of 1 kHz, 30 Hz become 1 / 33 ms.
+TEST(Config, CorrectionOfWrongParameters)
+{
+    EXPECT_FALSE(configure(changed({})).position.special);
+    for (const auto &[frequency, samples] : {std::pair{40.0, 25}, {30.0, 33}, {2.0, 500}, {100.0, 10}}) {
+        const drive_config_t c = configure(changed({{DRIVE_PARAM_mismatch_correction, MISMATCH_Q_AXIS},
+                                                    {DRIVE_PARAM_mismatch_frequency, frequency}}));
+        const mismatch_config_t &m = c.position.mismatch;
+        EXPECT_TRUE(c.position.special);
+        EXPECT_EQ(m.id, MISMATCH_Q_AXIS);
+        EXPECT_EQ(m.periods, 10);
+        EXPECT_EQ(m.samples, samples);
+        EXPECT_NEAR(real(m.i), 0.04, 1e-8);
+        const double w = 2 * M_PI / (samples * 1e-3), psi = 450 / (3 * 180.0);
+        const double swing = 1.5 * 9 * psi * 10 / (0.01 * w * w);
+        EXPECT_NEAR(real(m.swing, 20), swing, 1e-6 + 1e-8 * swing) << frequency;
+    }
+    const drive_params_t light = changed({{DRIVE_PARAM_mismatch_correction, MISMATCH_Q_AXIS},
+                                          {DRIVE_PARAM_mismatch_frequency, 2},
+                                          {DRIVE_PARAM_J, 1e-6}});
+    drive_config_t c;
+    EXPECT_EQ(drive_configure(&c, &light).param, DRIVE_PARAM_mismatch_frequency);
 }
 
 TEST(Config, TheArctangentLeavesNothingToLearnASecondHarmonicFrom)
