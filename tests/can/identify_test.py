@@ -34,6 +34,9 @@ MACHINES = {
     "tmotor_u8ii_kv100": dict(plate=(16.0, 21, 190, 24), truth=(0.0682, 12e-6, 12e-6, 2.382e-3, 1.9e-4), salient=False),
     "grin_all_axle": dict(plate=(30.0, 23, 50, 52), truth=(0.053, 0.13e-3, 0.13e-3, 19.83e-3, 0.08), salient=False),
 }
+# Speeds and loads of the steady state. What no method can show of a round machine at low speed is left out: docs/identify.md.
+SALIENT = (([0, 0.02, 0.05, 0.1, 0.3, 1], [0, 0.5, 1]),)
+ROUND = (([0.08, 0.1, 0.3, 1], [0, 0.5, 1]), ([0.05], [0, 0.5]), ([0], [0]))
 # What the drive was used for before: another motor, on the same board.
 OTHER = {"pole_pairs": 5, "mtpa": 1, "dead_time_comp": 1, "t_align": 0.1, "flux_bandwidth": 20, "flux_gain": 0.3,
          "speed_bandwidth": 3, "injection_bandwidth": 25, "current_bandwidth": 300}
@@ -61,7 +64,7 @@ machine: {machine}
 start: {{theta_e_deg: 0}}
 duration_s: 4.5
 drive: {drive}
-sweep: {{speed: {speeds}, load: [0, 0.5, 1]}}
+sweep: {{speed: {speeds}, load: {loads}}}
 profile:
   - {{t_s: 0, mode: speed, speed_rel: $speed, enable: true}}
   - {{t_s: 2.5, load_rel: $load, ramp_s: 0.2}}
@@ -164,16 +167,17 @@ def check_start(bench, speed):
 
 
 def check_steady(pmsim, name, found, folder):
-    speeds = [0, 0.02, 0.05, 0.1, 0.3, 1] if MACHINES[name]["salient"] else [0.1, 0.3, 1]
     board = ("f_pwm", "timer_counts")
     drive = {key: value for key, value in found.items() if key not in board}
     path = Path(folder) / f"{name}_grid.yaml"
-    path.write_text(GRID.format(machine=ROOT / f"sim_plant/machines/{name}.yaml", drive=yaml_map(drive),
-                                speeds=speeds), encoding="utf-8")
-    result = subprocess.run([pmsim, "run", str(path), "--out", str(Path(folder) / name)], capture_output=True, text=True,
-                            check=False, timeout=300)
-    print("\n".join("      " + line for line in result.stdout.splitlines() if line[:4] in ("PASS", "FAIL")), flush=True)
-    assert result.returncode == 0, result.stdout + result.stderr
+    for speeds, loads in SALIENT if MACHINES[name]["salient"] else ROUND:
+        path.write_text(GRID.format(machine=ROOT / f"sim_plant/machines/{name}.yaml", drive=yaml_map(drive),
+                                    speeds=speeds, loads=loads), encoding="utf-8")
+        result = subprocess.run([pmsim, "run", str(path), "--out", str(Path(folder) / name)], capture_output=True,
+                                text=True, check=False, timeout=300)
+        told = [f"      {line}" for line in result.stdout.splitlines() if line[:4] in ("PASS", "FAIL")]
+        print(f"      speeds {speeds}, loads {loads}", *told, sep="\n", flush=True)
+        assert result.returncode == 0, result.stdout + result.stderr
 
 
 def main():
