@@ -19,6 +19,7 @@ typedef struct {
     pm_num_t impedance, inductance; /* bases */
     uint32_t slow_divider;          /* periods per slow step: the nearest to 1 ms ... */
     pm_num_t t_slow;                /* ... and what that is, s */
+    mtpa_config_t mtpa;             /* already made */
     drive_result_t result;
 } maker_t;
 
@@ -107,6 +108,9 @@ void make_model(maker_t *m, observer_model_t *c);
 #define PM_OBSERVER_OPTIONAL    PM_OBSERVER
 #include "observers/observers.def"
 #undef PM_OBSERVER
+
+/* config_mismatch.c */
+void make_mismatch(maker_t *m, mismatch_config_t *c);
 
 /* config_position.c */
 bool salient(const maker_t *m);

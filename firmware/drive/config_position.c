@@ -209,6 +209,7 @@ void make_position(maker_t *m, position_config_t *c, bool injection)
     c->omega_high = speed(m, DRIVE_PARAM_speed_high);
     make_loop(m, c);
     make_second_harmonic(m, &c->second_harmonic);
+    make_mismatch(m, &c->mismatch);
     if (m->params->speed_high <= m->params->speed_low) {
         refuse(m, DRIVE_PARAM_speed_high, "must be above speed_low");
         return;

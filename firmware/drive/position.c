@@ -14,7 +14,7 @@
 /* The weight follows the speed through 5 ms, so that noise of the speed does not move it. */
 #define K_SPEED PM_FRAC(0.2)
 
-void position_reset(position_t *self, const position_config_t *config, pm_angle_t theta, pm_ab_t i)
+PM_RARE void position_reset(position_t *self, const position_config_t *config, pm_angle_t theta, pm_ab_t i)
 {
     *self = (position_t){.pll.theta = theta,
                          .weight = config->injection ? 0 : PM_ONE,
@@ -28,11 +28,15 @@ void position_reset(position_t *self, const position_config_t *config, pm_angle_
 }
 
 /* What few drives use: one question in the period instead of one for each. */
-PM_RARE static pm_q_t special_eps(position_t *self, const position_config_t *config, pm_q_t eps)
+PM_RARE static pm_q_t special_eps(position_t *self, const position_config_t *config, pm_dq_t i, pm_q_t eps)
 {
     if (config->second_harmonic.id != SECOND_HARMONIC_STAYS) {
         eps = second_harmonic_step(&self->second_harmonic, &config->second_harmonic, pm_dir(self->pll.theta),
                                    eps);
+    }
+    if (config->mismatch.id != (uint8_t)MISMATCH_OFF) {
+        const mismatch_in_t at = {.pll = &self->pll, .k_theta = self->gains.k_theta, .i = i};
+        eps = mismatch_step(&self->mismatch, &config->mismatch, &at, self->weight, eps);
     }
     return loop_eps(&self->loop, &config->loop, &self->pll, &self->gains, eps);
 }
@@ -61,7 +65,7 @@ void position_step(position_t *self, const position_config_t *config, pm_ab_t v,
     }
     if (pm_rarely(config->special)) {
         self->pll = pll; /* by way of the memory, so that otherwise it stays in registers */
-        eps = special_eps(self, config, eps);
+        eps = special_eps(self, config, i_dq, eps);
         pll = self->pll;
     }
     pm_pll_correct(&pll, &self->gains, eps);
@@ -69,13 +73,14 @@ void position_step(position_t *self, const position_config_t *config, pm_ab_t v,
     *out = (position_out_t){.dir = dir, .i = i_dq, .omega = pll.omega};
 }
 
-void position_change_observer(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq)
+PM_RARE void position_change_observer(position_t *self, const position_config_t *config, pm_ab_t i,
+                                      pm_dq_t i_dq)
 {
     const obs_in_t in = {.i = i, .dir = pm_dir(self->pll.theta), .omega = self->pll.omega, .i_dq = i_dq};
     observer_reset(&self->observer, &config->observer, &in);
 }
 
-void position_lead(position_t *self, const position_config_t *config, const pm_pll_t *imposed)
+PM_RARE void position_lead(position_t *self, const position_config_t *config, const pm_pll_t *imposed)
 {
     observer_tie(&self->observer, &config->observer);
     loop_reset(&self->loop);
@@ -116,11 +121,11 @@ static pm_q_t magnitude_after(pm_q_t *filter, pm_q_t x)
 
 /* Means of magnitudes: a source that has slipped shows errors of either sign, slower than the noise that is
  * filtered before. Whichever leads, both must agree. */
-static void set_quality(position_t *self, const position_config_t *config, const obs_out_t *seen)
+static void set_quality(position_t *self, const position_config_t *config, const obs_out_t *seen, pm_dq_t i)
 {
     const pm_q_t square_eps = magnitude_after(&self->square_eps, self->square.eps);
     /* also while the observer is tied: an EMF that the position does not explain */
-    pm_q_t eps = magnitude_after(&self->observer_eps, seen->eps);
+    pm_q_t eps = magnitude_after(&self->observer_eps, seen->eps + mismatch_eps(&self->mismatch, i));
     pm_q_t misfit = self->weight > 0 ? pm_abs(seen->misfit) : 0;
     if (self->weight < PM_ONE) {
         eps = pm_max(eps, square_eps);
@@ -133,7 +138,7 @@ static void set_quality(position_t *self, const position_config_t *config, const
     self->quality = pm_max(0, PM_ONE - worst);
 }
 
-void position_slow(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq)
+PM_RARE void position_slow(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq)
 {
     const obs_in_t in = {.omega = self->pll.omega, .i = i, .i_dq = i_dq};
     const obs_out_t seen = observer_last(&self->observer, &config->observer);
@@ -143,6 +148,9 @@ void position_slow(position_t *self, const position_config_t *config, pm_ab_t i,
     self->gains.ki = between(config->pll_low.ki, config->pll_high.ki, self->weight);
     loop_slow(&self->loop, &config->loop, self->weight);
     second_harmonic_slow(&self->second_harmonic, &config->second_harmonic, self->pll.omega, self->weight);
+    const mismatch_in_t at = {.pll = &self->pll, .k_theta = self->gains.k_theta, .i = i_dq};
+    const observer_model_t *model = &config->observer.active_flux.model; /* the first of each observer's */
+    mismatch_slow(&self->mismatch, &config->mismatch, model, &at, self->weight == PM_ONE);
     observer_slow(&self->observer, &config->observer, &in, &seen, self->weight);
-    set_quality(self, config, &seen);
+    set_quality(self, config, &seen, i_dq);
 }

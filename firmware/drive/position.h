@@ -13,6 +13,7 @@
 #include "firmware/math/pll.h"
 #include "injection/pulsating_square.h"
 #include "observers/loop.h"
+#include "observers/mismatch.h"
 #include "observers/observer.h"
 #include "observers/second_harmonic.h"
 
@@ -22,10 +23,11 @@ typedef struct {
     pm_pll_config_t pll_low, pll_high;
     loop_config_t loop;
     second_harmonic_config_t second_harmonic;
+    mismatch_config_t mismatch;
     pm_q_t omega_low, omega_high;
     int32_t per_span; /* 1 / (omega_high - omega_low), Q20 */
     bool injection;
-    bool special; /* a second harmonic, another loop or an estimate of the speed is to be looked after */
+    bool special; /* something between source and loop, or of the speed, is to be looked after */
 } position_config_t;
 
 typedef struct {
@@ -33,6 +35,7 @@ typedef struct {
     pm_pll_config_t gains; /* between pll_low and pll_high */
     loop_t loop;
     second_harmonic_t second_harmonic;
+    mismatch_t mismatch;
     observer_t observer;
     pulsating_square_t square;
     bool inject;                     /* carrier on */

@@ -1,7 +1,8 @@
 /* What follows a source, each as a function for count.py: the three position observers, the second harmonic's
- * suppression, and at 1 kHz the speed estimate. */
+ * suppression, the correction of wrong parameters, and at 1 kHz that and the speed estimate. */
 #include "firmware/math/trig.h"
 #include "observers/loop.h"
+#include "observers/mismatch.h"
 #include "observers/second_harmonic.h"
 #include "observers/speed.h"
 
@@ -19,6 +20,17 @@ COST(pm_q_t, second_harmonic, second_harmonic_t *self, const second_harmonic_con
      pm_q_t eps)
 {
     return second_harmonic_step(self, c, *dir, eps);
+}
+
+COST(pm_q_t, mismatch, mismatch_t *self, const mismatch_config_t *c, const mismatch_in_t *in, pm_q_t eps)
+{
+    return mismatch_step(self, c, in, PM_ONE, eps);
+}
+
+COST(void, mismatch_slow, mismatch_t *self, const mismatch_config_t *c, const observer_model_t *model,
+     const mismatch_in_t *in)
+{
+    mismatch_slow(self, c, model, in, true);
 }
 
 COST(pm_q_t, speed, speed_t *self, const speed_config_t *c, const speed_in_t *in)
@@ -51,6 +63,14 @@ int main(void)
             const pm_dir_t dir = pm_dir(k * 100000000U);
             sink = cost_second_harmonic(&self, &c, &dir, (int32_t)k * 1000000 - 25000000);
         }
+    }
+    static mismatch_t mismatch;
+    const mismatch_config_t wrong = {.id = MISMATCH_Q_AXIS, .periods = 10, .samples = 10, .i = PM_Q(0.04)};
+    const observer_model_t model = {.L_d = PM_Q(0.22), .L_q = PM_Q(0.25), .psi_m = PM_Q(0.58)};
+    for (uint32_t k = 0; k < 200; k++) { /* at the end of windows too */
+        const mismatch_in_t in = {.pll = &pll, .k_theta = PM_Q(0.55), .i = {0, mismatch.injected}};
+        sink = cost_mismatch(&mismatch, &wrong, &in, 0);
+        cost_mismatch_slow(&mismatch, &wrong, &model, &in);
     }
     static speed_t speed;
     const speed_config_t c = {.id = SPEED_COMBINED,

@@ -193,11 +193,8 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
         {"flux psi_m", c.position.observer.active_flux.model.psi_m, 28, psi / Pb},
         {"flux t_s", c.position.observer.active_flux.model.t_s, 32, T * W},
         {"flux g", c.position.observer.active_flux.g, 32, 0.5 * T * W},
-        {"flux k_adapt", c.position.observer.active_flux.k_adapt, 32, 0.01},
         {"flux k_seed", c.position.observer.active_flux.k_seed, 32, 300 * T},
         {"flux k_R", c.position.observer.active_flux.resistance.k, 26, 300 / 8.0 / (W * i_r * i_r)},
-        {"flux R_min", c.position.observer.active_flux.resistance.min, 28, 0.5 * R / Z},
-        {"flux R_max", c.position.observer.active_flux.resistance.max, 28, 2 * R / Z},
         {"flux omega_R", c.position.observer.active_flux.resistance.omega, 28, 10.5 * P / W},
         {"omega_low", c.position.omega_low, 28, 21 * P / W},
         {"omega_high", c.position.omega_high, 28, 40 * P / W},
@@ -253,8 +250,34 @@ TEST(Config, EmfObserversAreMadeFromTheSameMachine)
         EXPECT_NEAR(e.speed_lag, std::ldexp(1.8 / (2 * kPi * 25 * 1e-3), 26), 16);
         EXPECT_NEAR(e.omega_min, std::ldexp(10.5 * 3 / W, 28), 1);
         EXPECT_NEAR(e.omega_tied, std::ldexp(300 / W, 28), 1);
-        EXPECT_NEAR(e.resistance.k, std::ldexp(1 / (8 * 0.4 * 0.4), 26), 16);
+        EXPECT_NEAR(e.resistance.k, std::ldexp(1 / (64 * 0.4 * 0.4), 26), 16);
     }
+}
+
+// L_q = L_q_rated where maximum torque per ampere is at rated current, and psi_q / i_q of the given L_qd
+// beside it.
+TEST(Config, CrossCouplingIsThatOfTheTwoPointsGiven)
+{
+    const double i_r = 0.4, half = 0.2, Lb = 450.0 / 540 / 10, h = 0.236 / (2 * 32e-3) / 10;
+    const double i_mtpa = h - std::hypot(h, i_r);
+    for (const double mtpa : {1, 0}) {
+        const auto params = changed({{DRIVE_PARAM_L_qd_weak, -5.49e-3},
+                                     {DRIVE_PARAM_L_qd_strong, -7.87e-3},
+                                     {DRIVE_PARAM_mtpa, mtpa}});
+        const observer_model_t &m = configure(params).position.observer.active_flux.model;
+        const auto apparent_H = [&](double i_d) {
+            return std::ldexp(observer_L_q(&m, {static_cast<pm_q_t>(std::ldexp(i_d, 28)), PM_Q(0.4)}), -28) *
+                   Lb;
+        };
+        EXPECT_NEAR(apparent_H(mtpa != 0 ? i_mtpa : 0), 70.835e-3, 1e-8);
+        EXPECT_NEAR(i_r * (apparent_H(-half) - apparent_H(0)), 5.49e-3 * half, 1e-8);
+        EXPECT_NEAR(i_r * (apparent_H(half) - apparent_H(0)), -7.87e-3 * half, 1e-8);
+    }
+    const observer_model_t off =
+        configure(changed({{DRIVE_PARAM_L_qd_weak, -5.49e-3}, {DRIVE_PARAM_saturation_comp, 0}}))
+            .position.observer.active_flux.model;
+    EXPECT_EQ(off.L_qd, 0);
+    EXPECT_EQ(off.L_qd2, 0);
 }
 
 TEST(Config, AnObserverForRoundMachinesRefusesSaliency)
@@ -458,6 +481,10 @@ Names must_be_positive(const drive_config_t &c)
         x.push_back({"second harmonic mu", c.position.second_harmonic.mu});
         x.push_back({"second harmonic k_p", c.position.second_harmonic.k_p});
     }
+    if (c.position.mismatch.id != MISMATCH_OFF) {
+        x.push_back({"mismatch samples", c.position.mismatch.samples - 9});
+        x.push_back({"mismatch current", c.position.mismatch.i});
+    }
     if (c.injection) {
         const pulsating_square_config_t &s = c.position.square;
         x.push_back({"v_h", s.v_h});
@@ -537,6 +564,30 @@ TEST(Config, ModelReferenceLoopAndSpeed)
         EXPECT_NEAR(real(c.speed_estimate.per_turn, 26), 2 * M_PI / (6e-3 * W), 1e-6);
         EXPECT_NEAR(real(c.speed_estimate.k_mean, 32), 2 * M_PI * 5e-3, 1e-8);
     }
+}
+
+// observers/mismatch.h for IPM-1000: 40 Hz are 25 steps of 1 kHz, 30 Hz become 1 / 33 ms.
+TEST(Config, CorrectionOfWrongParameters)
+{
+    EXPECT_FALSE(configure(changed({})).position.special);
+    for (const auto &[frequency, samples] : {std::pair{40.0, 25}, {30.0, 33}, {2.0, 500}, {100.0, 10}}) {
+        const drive_config_t c = configure(changed({{DRIVE_PARAM_mismatch_correction, MISMATCH_Q_AXIS},
+                                                    {DRIVE_PARAM_mismatch_frequency, frequency}}));
+        const mismatch_config_t &m = c.position.mismatch;
+        EXPECT_TRUE(c.position.special);
+        EXPECT_EQ(m.id, MISMATCH_Q_AXIS);
+        EXPECT_EQ(m.periods, 10);
+        EXPECT_EQ(m.samples, samples);
+        EXPECT_NEAR(real(m.i), 0.04, 1e-8);
+        const double w = 2 * M_PI / (samples * 1e-3), psi = 450 / (3 * 180.0);
+        const double swing = 1.5 * 9 * psi * 10 / (0.01 * w * w);
+        EXPECT_NEAR(real(m.swing, 20), swing, 1e-6 + 1e-8 * swing) << frequency;
+    }
+    const drive_params_t light = changed({{DRIVE_PARAM_mismatch_correction, MISMATCH_Q_AXIS},
+                                          {DRIVE_PARAM_mismatch_frequency, 2},
+                                          {DRIVE_PARAM_J, 1e-6}});
+    drive_config_t c;
+    EXPECT_EQ(drive_configure(&c, &light).param, DRIVE_PARAM_mismatch_frequency);
 }
 
 TEST(Config, TheArctangentLeavesNothingToLearnASecondHarmonicFrom)

@@ -208,6 +208,32 @@ TEST(Drive, SpeedReferenceIsHeldToItsLimit)
     EXPECT_EQ(drive_status(&x.loop.app.drive)->fault, DRIVE_FAULT_NONE);
 }
 
+// Per-unit references are made once, and anew with other bases.
+TEST(Drive, ReferencesFollowCommandAndBases)
+{
+    direct::Drive x;
+    x.command.speed_mrad_s = 54000;
+    x.command.current_mA = 2000;
+    x.enable(false);
+    x.run_ms(1);
+    const pm_q_t omega = x.d.omega_target;
+    EXPECT_NEAR(static_cast<double>(omega) / PM_ONE, 54.0 * 3 / 540, 1e-6);
+    EXPECT_NEAR(static_cast<double>(x.d.i_target) / PM_ONE, 0.2, 1e-6);
+    x.command.current_mA = 1000;
+    x.enable(false);
+    x.run_ms(1);
+    EXPECT_EQ(x.d.omega_target, omega);
+    EXPECT_NEAR(static_cast<double>(x.d.i_target) / PM_ONE, 0.1, 1e-6);
+
+    drive_params_t p = direct::params();
+    p.speed_trip *= 2;
+    drive_config_t other = {};
+    ASSERT_TRUE(drive_configure(&other, &p).ok);
+    drive_reconfigure(&x.d, &other);
+    x.run_ms(1);
+    EXPECT_NEAR(x.d.omega_target, omega / 2, 2);
+}
+
 TEST(Drive, EstimateIsTheRotor)
 {
     Closed x;

@@ -1,0 +1,172 @@
+#include "observers/mismatch.h"
+
+#include "firmware/math/filter.h"
+#include "firmware/math/root.h"
+#include "firmware/math/trig.h"
+
+#ifdef PM_OBSERVERS_FEW
+
+/* Left out like the optional observers; config_mismatch.c refuses it. */
+pm_q_t mismatch_step(mismatch_t *self, const mismatch_config_t *config, const mismatch_in_t *in,
+                     pm_q_t weight, pm_q_t eps)
+{
+    (void)self;
+    (void)config;
+    (void)in;
+    (void)weight;
+    return eps;
+}
+
+void mismatch_slow(mismatch_t *self, const mismatch_config_t *config, const observer_model_t *model,
+                   const mismatch_in_t *in, bool leads)
+{
+    (void)self;
+    (void)config;
+    (void)model;
+    (void)in;
+    (void)leads;
+}
+
+#else
+
+/* Means of speed and current: 256 ms. */
+#define K_MEAN PM_FRAC(1.0 / 256)
+/* From where constant speed takes it: 0.1 rad. */
+#define AWAY   ((int32_t)PM_TURN(0.0159))
+/* Of the speed, in k_d. */
+#define LEAST  PM_Q(1.0 / 64)
+/* Steps of rest. */
+#define REST   60000U
+
+pm_q_t mismatch_step(mismatch_t *self, const mismatch_config_t *config, const mismatch_in_t *in,
+                     pm_q_t weight, pm_q_t eps)
+{
+    const pm_q_t left = eps + pm_mul(weight, mismatch_eps(self, in->i));
+    const pm_angle_t seen = in->pll->theta + (pm_angle_t)pm_rad_to_angle(left);
+    self->theta += (pm_angle_t)pm_omega_to_angle(self->omega, in->k_theta);
+    self->x += (pm_angle_t)(pm_angle_diff(seen, self->theta) / 16);
+    self->i += (config->id == (uint8_t)MISMATCH_Q_AXIS ? in->i.q : in->i.d) / 16;
+    return left;
+}
+
+static void begin_window(mismatch_t *self, pm_angle_t x)
+{
+    self->count = 0;
+    self->theta += x;
+    self->angle = (pm_ab_t){0, 0};
+    self->current = (pm_ab_t){0, 0};
+}
+
+/* Q30: what there is of the current is small. */
+static pm_ab_t lifted(pm_ab_t x)
+{
+    return (pm_ab_t){.alpha = pm_shl_sat(x.alpha, 3, 31), .beta = pm_shl_sat(x.beta, 3, 31)};
+}
+
+static pm_q_t real_product(pm_ab_t a, pm_ab_t b)
+{
+    return pm_mulh2(a.alpha, b.alpha, a.beta, b.beta);
+}
+
+/* How the rotor swings, rad per base current: -swing times the flux that makes torque of it. */
+static pm_q_t rotor(const mismatch_config_t *config, const observer_model_t *model, pm_dq_t i)
+{
+    const pm_q_t flux = config->id == (uint8_t)MISMATCH_Q_AXIS ? observer_active_flux(model, i)
+                                                               : pm_mul(model->L_d - model->L_q, i.q);
+    return -pm_shl(pm_sat(pm_mulh(flux, config->swing), 19), 12);
+}
+
+static void learn(mismatch_t *self, const mismatch_config_t *config, const observer_model_t *model,
+                  const mismatch_in_t *in)
+{
+    const pm_ab_t current = lifted(self->current);
+    const pm_q_t square = real_product(current, current);
+    if (square < pm_mul(config->i, config->i) / 4) {
+        return;
+    }
+    const pm_q_t g = pm_div(real_product(lifted(self->angle), current), square);
+    const pm_q_t change = (rotor(config, model, in->i) - g) / (4 + (int32_t)(self->windows / 4U));
+    if (config->id == (uint8_t)MISMATCH_Q_AXIS) {
+        self->k.q = pm_sat(self->k.q + change, PM_Q_BITS);
+    } else {
+        self->k_omega = pm_mul(pm_sat(self->k.d + change, PM_Q_BITS), in->pll->omega);
+    }
+    self->windows++;
+}
+
+/* A step of the window; x: angle beyond that of constant speed. */
+static void collect(mismatch_t *self, const mismatch_config_t *config, pm_angle_t x, pm_q_t i)
+{
+    const uint32_t step = UINT32_MAX / config->samples;
+    const pm_dir_t dir = pm_dir(step * self->count + step / 2U);
+    if (self->count >= config->samples) {
+        const pm_unit_t share = PM_UNIT_MAX / (int32_t)(MISMATCH_PERIODS / 2U * config->samples);
+        const pm_ab_t w = {.alpha = pm_unit(dir.cos, share), .beta = pm_unit(dir.sin, share)};
+        const pm_q_t rad = pm_angle_to_rad((int32_t)x);
+        self->angle.alpha = pm_mulh_add(self->angle.alpha, rad, w.alpha);
+        self->angle.beta = pm_mulh_add(self->angle.beta, rad, w.beta);
+        self->current.alpha = pm_mulh_add(self->current.alpha, i, w.alpha);
+        self->current.beta = pm_mulh_add(self->current.beta, i, w.beta);
+    }
+    const pm_q_t injected = pm_unit(config->i, dir.cos);
+    self->injected = self->windows % 2U == 0U ? injected : -injected;
+    self->count++;
+}
+
+/* Mean of the step's control periods. */
+static int32_t mean(int32_t sum, const mismatch_config_t *config)
+{
+    return pm_shl(sum / (int32_t)config->periods, 4);
+}
+
+/* Two turns of the rotor in a period of the injection: enough to see k_d. */
+static bool turns(const mismatch_config_t *config, const mismatch_in_t *in)
+{
+    const int32_t two = INT32_MAX / (config->samples * config->periods);
+    return config->id == (uint8_t)MISMATCH_Q_AXIS ||
+           pm_abs(pm_omega_to_angle(in->pll->omega, in->k_theta)) / 4 > two;
+}
+
+static void begin_again(mismatch_t *self, const mismatch_config_t *config, pm_angle_t x)
+{
+    begin_window(self, x);
+    self->windows = 0;
+    self->i_record = self->i_q;
+    self->id = config->id;
+}
+
+void mismatch_slow(mismatch_t *self, const mismatch_config_t *config, const observer_model_t *model,
+                   const mismatch_in_t *in, bool leads)
+{
+    const pm_q_t omega = in->pll->omega;
+    (void)pm_lp1(&self->omega, omega, K_MEAN);
+    (void)pm_lp1(&self->i_q, in->i.q, K_MEAN);
+    self->injected = 0;
+    if (config->id == (uint8_t)MISMATCH_OFF) {
+        self->k = (pm_dq_t){0, 0};
+        self->k_omega = 0;
+        return;
+    }
+    const pm_angle_t x = (pm_angle_t)mean((int32_t)self->x, config);
+    const pm_q_t i = mean(self->i, config);
+    self->x = 0;
+    self->i = 0;
+    const pm_q_t k_d = pm_sat(pm_div(self->k_omega, pm_max(pm_abs(omega), LEAST)), PM_Q_BITS);
+    self->k.d = omega < 0 ? -k_d : k_d;
+    const bool other = self->id != config->id || pm_abs(self->i_q - self->i_record) > config->i;
+    if (!leads || other || self->count > REST || !turns(config, in)) {
+        begin_again(self, config, x);
+    } else if (self->windows >= MISMATCH_WINDOWS) {
+        self->count++;
+    } else if (pm_abs((int32_t)x) > AWAY) {
+        begin_window(self, x);
+    } else {
+        collect(self, config, x, i);
+        if (self->count == (MISMATCH_PERIODS + 1U) * config->samples) {
+            learn(self, config, model, in);
+            begin_window(self, x);
+        }
+    }
+}
+
+#endif
