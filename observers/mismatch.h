@@ -26,6 +26,8 @@
 #ifndef OBSERVERS_MISMATCH_H
 #define OBSERVERS_MISMATCH_H
 
+#include <stddef.h>
+
 #include "firmware/math/pll.h"
 #include "observers/model.h"
 
@@ -42,9 +44,14 @@ typedef struct {
     int32_t swing;    /* 1.5 P^2 / (J w^2): rad per base flux and base current, Q20 */
 } mismatch_config_t;
 
+/* What is known. */
 typedef struct {
-    pm_dq_t k;        /* k_d, k_q: rad per base current */
-    pm_q_t k_omega;   /* k_d omega */
+    pm_dq_t k;      /* k_d, k_q: rad per base current */
+    pm_q_t k_omega; /* k_d omega */
+} mismatch_t;
+
+/* The injection and what is seen of it; all zero before the first step. */
+typedef struct {
     pm_angle_t theta; /* of a rotor of constant speed, ... */
     pm_q_t omega;     /* which is the mean of the loop's */
     pm_angle_t x; /* what is seen beyond it, and the current: sums of a step's control periods, a sixteenth */
@@ -57,7 +64,7 @@ typedef struct {
     uint16_t count;  /* steps in the window */
     uint8_t windows;
     uint8_t id; /* for which it learns */
-} mismatch_t;
+} mismatch_window_t;
 
 typedef struct {
     const pm_pll_t *pll; /* of the step: before its correction */
@@ -71,12 +78,13 @@ static inline pm_q_t mismatch_eps(const mismatch_t *self, pm_dq_t i)
     return pm_shl(pm_mulh2(self->k.d, i.d, self->k.q, i.q), 32 - PM_Q_BITS);
 }
 
-/* Every control period, before the loop: eps corrected in the observer's share. */
-pm_q_t mismatch_step(mismatch_t *self, const mismatch_config_t *config, const mismatch_in_t *in,
-                     pm_q_t weight, pm_q_t eps);
+/* Every control period, before the loop: eps corrected in the observer's share. window: NULL while another
+ * source has a share. */
+pm_q_t mismatch_step(const mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
+                     const mismatch_in_t *in, pm_q_t weight, pm_q_t eps);
 
-/* At 1 kHz; `leads`: the position is the observer's alone. */
-void mismatch_slow(mismatch_t *self, const mismatch_config_t *config, const observer_model_t *model,
-                   const mismatch_in_t *in, bool leads);
+/* At 1 kHz. */
+void mismatch_slow(mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
+                   const observer_model_t *model, const mismatch_in_t *in);
 
 #endif
