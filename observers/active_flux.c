@@ -3,9 +3,6 @@
 #include "firmware/math/root.h"
 #include "observers/flux.h"
 
-/* psi_ref stays within this share of the amplitude that the parameters give. */
-#define BAND PM_Q(0.5)
-
 /* To the formats of the state: Q28 to Q29, to Q30, Q32 to Q34. */
 static int32_t to_inductance(pm_q_t L)
 {
@@ -32,7 +29,7 @@ static void set_reference(active_flux_t *self, pm_q_t psi)
 /* What depends on current, speed and temperature, which change little within a millisecond. */
 static void set_operating_point(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in)
 {
-    const pm_q_t L_q = observer_L_q(&config->model, in->i_dq.q);
+    const pm_q_t L_q = observer_L_q(&config->model, in->i_dq);
     self->drop = to_drop(pm_frac(self->R, config->model.t_s));
     self->inductance = pm_add_sat(to_inductance(L_q), self->drop / 4); /* R T_s / 2 */
     self->k_amplitude = to_feedback(pm_mul(pm_abs(in->omega), config->g));
@@ -47,7 +44,7 @@ void active_flux_reset(active_flux_t *self, const active_flux_config_t *config, 
 {
     self->R = config->model.R;
     self->step = config->model.t_s / 4;
-    set_reference(self, observer_active_flux(&config->model, in->i_dq.d));
+    set_reference(self, observer_active_flux(&config->model, in->i_dq));
     set_operating_point(self, config, in);
     active_flux_tie(self, config);
     const pm_dq_t drawn = {.d = pm_mulh(self->inductance, in->i_dq.d),
@@ -87,18 +84,16 @@ obs_out_t active_flux_last(const active_flux_t *self)
 void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in,
                       const obs_out_t *out, pm_q_t weight)
 {
-    const pm_q_t centre = observer_active_flux(&config->model, in->i_dq.d);
     if (weight == 0) {
         /* tied to the position, the flux says nothing of the amplitude */
         active_flux_tie(self, config);
-        set_reference(self, centre);
+        set_reference(self, observer_active_flux(&config->model, in->i_dq));
         const pm_q_t lack = pm_mul(out->vector.q, in->i_dq.q);
-        self->R = observer_resistance(&config->resistance, self->R, in->omega, lack);
+        self->R = observer_resistance(&config->resistance, &config->model, self->R, in->omega, lack);
     } else {
-        const pm_q_t band = pm_mul(centre, BAND);
-        const pm_q_t psi = self->psi_ref + pm_frac(out->vector.d - self->psi_ref, config->k_adapt);
         self->k_seed = 0;
-        set_reference(self, pm_clamp(psi, centre - band, centre + band));
+        set_reference(
+            self, observer_amplitude(&config->model, in->i_dq, self->psi_ref, self->psi_ref - out->vector.d));
     }
     set_operating_point(self, config, in);
 }

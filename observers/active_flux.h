@@ -1,21 +1,21 @@
 /* Active-flux observer for salient machines (METHODS.md 2.2.2, row 13), with the drift and delay remedies
  * of 3.2 (rows 21 to 23).
  *
- * psi += T_s (v - R i), i the mean of both ends of the period; psi_a = psi - L_q(i_q) i lies on the d-axis:
+ * psi += T_s (v - R i), i the mean of both ends of the period; psi_a = psi - L_q(i) i lies on the d-axis:
  *   eps = psi_a,q / psi_ref
  * Correction without a lag: the flux is fed back along the rotor frame,
  *   psi += T_s [k_d (psi_ref - psi_a,d), -k_q psi_a,q].
  * k_d = g |omega| holds the amplitude and so removes the drift of the integration, which appears as a ripple
  * of the amplitude; it moves no angle as long as psi_ref is the mean amplitude. k_q > 0 ties the flux to the
  * present position: a seed while injection leads, zero when this observer leads. psi_ref follows the
- * amplitude slowly within a band around psi_m + (L_d - L_q) i_d, so an error of psi_m moves no angle either.
+ * amplitude slowly within a band around psi_a of model.h, so an error of psi_m moves no angle either.
  * While the flux is tied, its distance from the current model shows an error of the resistance, k_q psi_a,q =
  * (R - R^) i_q, and R follows it; it is kept when the observer leads. An R set 50 % too high would otherwise
  * make the observer unstable under load below a third of rated speed (docs/decisions/004-resistance.md).
- * L_q(i_q) = L_q + L_q2 i_q^2: a constant L_q costs IPM-1000 2.4 degrees at rated load.
+ * L_q(i) of model.h: a constant L_q costs IPM-1000 2.4 degrees at rated load.
  *
  * What is integrated is psi + R T_s/2 i, which needs one current only: the mean of both ends then stands as
- * R T_s/2 beside L_q. L_q(i_q), g |omega| and R T_s are renewed at 1 kHz. Formats are chosen so that each
+ * R T_s/2 beside L_q. L_q(i), g |omega| and R T_s are renewed at 1 kHz. Formats are chosen so that each
  * line is a chain of multiply-accumulates without a shift.
  *
  * Called each period; result belongs to k. Range: |psi| < 4, |i| < 2, L_q < 4, k_d and k_q < 1/8 per period
@@ -29,9 +29,8 @@
 typedef struct {
     observer_model_t model;
     observer_resistance_t resistance;
-    pm_frac_t g;       /* amplitude feedback per radian: g T_s w_base, Q32 */
-    pm_frac_t k_adapt; /* filter constant of psi_ref per slow step */
-    pm_frac_t k_seed;  /* T_s k_q at weight 0, Q32 */
+    pm_frac_t g;      /* amplitude feedback per radian: g T_s w_base, Q32 */
+    pm_frac_t k_seed; /* T_s k_q at weight 0, Q32 */
 } active_flux_config_t;
 
 typedef struct {
@@ -39,7 +38,7 @@ typedef struct {
     pm_ab_t i;           /* current at k-1 */
     int32_t step;        /* T_s w_base, Q30 */
     int32_t drop;        /* R T_s w_base, Q30 */
-    int32_t inductance;  /* L_q(i_q) + R T_s/2, Q29 */
+    int32_t inductance;  /* L_q(i) + R T_s/2, Q29 */
     int32_t reference;   /* psi_ref, Q25 */
     int32_t k_amplitude; /* k_d T_s, Q34 */
     int32_t k_seed;      /* present k_q T_s, Q34 */

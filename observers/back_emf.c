@@ -2,7 +2,7 @@
 
 static emf_machine_t round_machine(const back_emf_config_t *config, const obs_in_t *in)
 {
-    return (emf_machine_t){.L = observer_L_q(&config->model, in->i_dq.q), .saliency = 0, .lag = PM_GAIN(1.0)};
+    return (emf_machine_t){.L = observer_L_q(&config->model, in->i_dq), .saliency = 0, .lag = PM_GAIN(1.0)};
 }
 
 void back_emf_reset(back_emf_t *self, const back_emf_config_t *config, const obs_in_t *in)

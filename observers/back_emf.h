@@ -3,7 +3,7 @@
  *   E = v - R i - L_s pi - w L_s J i in the estimated frame: E_d = -E sin(error), E_q = E cos(error)
  * by the voltage equation of emf.h: w L_s J i is part of the change of a current that does not turn with the
  * frame. The EMF is turned into the frame of the middle of the period and filtered there, without a lag in
- * steady state. L_s = L_q(i_q).
+ * steady state. L_s = L_q(i).
  *
  * Called each period; result belongs to k. vector: EMF. T e is limited to a quarter of the base flux per
  * period. Tests: tests/unit/observers/emf_test.cpp, tests/scenario/spm_emf.yaml. */

@@ -3,7 +3,7 @@
  *   lambda = (L + R T_s / 2) i   in the frame of the present position, for each axis
  *   psi(k) turned back by the frame's turn + T_s v - T_s R (i(k) + i(k+1)) / 2 = psi(k+1)
  * What is kept is psi - R T_s / 2 i in the stationary frame, so that the turn is exact and each sample needs
- * its own current only. L_q(i_q) and R are renewed at 1 kHz. Range: |psi| and |lambda| < 4,
+ * its own current only. L_q(i) and R are renewed at 1 kHz. Range: |psi| and |lambda| < 4,
  * L < 4. */
 #ifndef OBSERVERS_DQ_FLUX_H
 #define OBSERVERS_DQ_FLUX_H

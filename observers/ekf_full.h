@@ -6,7 +6,7 @@
  * frame: psi = (lambda_d + psi_m cos delta + eta sin delta, lambda_q + psi_a sin delta),  eta = (L_d - L_q)
  * i_q psi(k) = psi(k-1) turned back by the frame's turn, + T_s v - T_s R i (mean of both ends) omega(k) =
  * omega(k-1),  delta(k) = delta(k-1) + T_s omega - turn The stator flux is advanced exactly, in the
- * stationary frame, so nothing of omega T_s is neglected. Assumed: L_d constant, L_q(i_q) renewed at 1 kHz, R
+ * stationary frame, so nothing of omega T_s is neglected. Assumed: L_d constant, L_q(i) renewed at 1 kHz, R
  * known. Salient machines need no more than round ones. Measured are both currents, one after the other,
  * which needs no inverse of a matrix.
  *

@@ -9,7 +9,7 @@
  * eta^2)) = sin delta with the variance r psi_m^2 / (psi_a^2 + eta^2) / omega^2 (omega per-unit, r that of
  * rho / u). The other tells the speed, but so does the turning of delta, and a wrong psi_m in a measured
  * speed would move the angle by much. (With the d-component alone the loop is unstable when a salient machine
- * generates: it moves against the angle first.) Assumed: L_d constant, L_q(i_q) renewed at 1 kHz, R known;
+ * generates: it moves against the angle first.) Assumed: L_d constant, L_q(i) renewed at 1 kHz, R known;
  * salient machines need no more than round ones. The noise of rho at successive samples is not independent (a
  * current enters twice, with opposite signs), which the filter does not know: r errs on the safe side.
  *

@@ -3,13 +3,10 @@
 #include "firmware/math/filter.h"
 #include "firmware/math/root.h"
 
-/* psi_ref stays within this share of the amplitude that the parameters give. */
-#define BAND PM_Q(0.5)
-
 emf_machine_t emf_salient(const emf_config_t *config, const obs_in_t *in, pm_gain_t lag)
 {
     const pm_q_t L_d = config->model.L_d;
-    return (emf_machine_t){.L = L_d, .saliency = observer_L_q(&config->model, in->i_dq.q) - L_d, .lag = lag};
+    return (emf_machine_t){.L = L_d, .saliency = observer_L_q(&config->model, in->i_dq) - L_d, .lag = lag};
 }
 
 /* w T psi, Q28 */
@@ -46,7 +43,7 @@ void emf_reset(emf_t *self, const emf_config_t *config, const emf_machine_t *mac
     self->step = config->model.t_s;
     self->rate = config->rate;
     self->R = config->model.R;
-    self->psi_ref = observer_active_flux(&config->model, in->i_dq.d);
+    self->psi_ref = observer_active_flux(&config->model, in->i_dq);
     self->omega_cross = in->omega;
     set_point(self, config, machine, in->omega, config->omega_min);
     self->i = in->i;
@@ -96,16 +93,15 @@ static pm_q_t lacking(const emf_t *self, const emf_config_t *config, pm_q_t sali
 void emf_slow(emf_t *self, const emf_config_t *config, const emf_machine_t *machine, const obs_in_t *in,
               pm_q_t weight)
 {
-    const pm_q_t centre = observer_active_flux(&config->model, in->i_dq.d);
     const obs_out_t out = emf_last(self);
     if (weight == 0) {
-        self->psi_ref = centre;
-        self->R = observer_resistance(&config->resistance, self->R, in->omega,
+        self->psi_ref = observer_active_flux(&config->model, in->i_dq);
+        /* not by the loop's own speed: where it dips below the limit, E_q is more than its w psi_a */
+        self->R = observer_resistance(&config->resistance, &config->model, self->R, self->omega_cross,
                                       lacking(self, config, machine->saliency, out.vector.q, in));
     } else {
-        const pm_q_t band = pm_mul(centre, BAND);
-        const pm_q_t psi = self->psi_ref - pm_mul(pm_frac(out.misfit, config->k_adapt), self->psi_ref);
-        self->psi_ref = pm_clamp(psi, centre - band, centre + band);
+        self->psi_ref =
+            observer_amplitude(&config->model, in->i_dq, self->psi_ref, pm_mul(out.misfit, self->psi_ref));
     }
     self->i_q = in->i_dq.q;
     self->omega = in->omega;

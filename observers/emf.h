@@ -6,10 +6,11 @@
  * It lies on the q-axis of the middle of the period. Two periods are taken together, against what a carrier
  * of half the sampling frequency leaves; their EMF lies w T before k. With psi = E / w of the present speed
  *   eps = -E_d / (w psi_ref),   misfit = 1 - E_q / (w psi_ref).
- * psi_ref follows the amplitude within a band around psi_m + (L_d - L_q) i_d, so an error of psi_m moves no
- * angle. Below omega_min the error signal fades with the EMF instead of rising with the noise; while another
- * source leads, errors of the voltage weigh as they do in a flux that is tied to the position, and below
- * resistance.omega R follows what E_q is more than w psi_a + (L_q - L_d) p i_q.
+ * psi_ref follows the amplitude within a band around psi_a of model.h, so an error of psi_m moves no angle.
+ * Below omega_min the error signal fades with the EMF instead of rising with the noise; while another source
+ * leads, errors of the voltage weigh as they do in a flux that is tied to the position, and below
+ * resistance.omega R follows what E_q is more than w psi_a + (L_q - L_d) p i_q. The speed that decides this
+ * is the lagging one: below a limit for its own wobble, w psi_a would be too small and R grow by 5 %.
  *
  * L, w T, w T (L_q - L_d), 1 / (w psi_ref) and R T are renewed at 1 kHz. Nothing is integrated, so nothing
  * drifts and nothing has to be tied.
@@ -29,7 +30,6 @@ typedef struct {
     observer_resistance_t resistance;
     pm_frac_t k_filter;  /* low-pass of the EMF, per period */
     pm_gain_t lag;       /* of the filter in the stationary frame, emf_machine_t: (2 - k) / k, Q26 */
-    pm_frac_t k_adapt;   /* filter constant of psi_ref per slow step */
     int32_t rate;        /* 1 / (T w_base), Q20 */
     pm_gain_t slow_rate; /* the same of a slow step, Q26 */
     pm_q_t slow_step;    /* a slow step's T w_base */

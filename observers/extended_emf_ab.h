@@ -1,14 +1,14 @@
 /* Extended-EMF observer for salient machines in the stationary frame (METHODS.md 2.3.2.2, row 16).
  *
  *   v = (R + p L_d) i + w (L_q - L_d) J i + E_ex (-sin theta, cos theta)
- * by the voltage equation of emf.h with L_d. The EMF is an alternating quantity here, so the filter
- *   e += k (E - e)
- * lags. Its steady lag at the present speed is known, tan = (2 - k)/k tan(w T/2) with the half period of the
- * sampling, and is turned back in the estimated frame, where the error signal is read (3.2.3, row 23).
+ * by the voltage equation of emf.h with L_d, and L_q(i) of model.h (3.4.2, rows 26 and 27). The EMF is an
+ * alternating quantity here, so the filter e += k (E - e) lags. Its steady lag at the present speed is known,
+ * tan = (2 - k)/k tan(w T/2) with the half period of the sampling, and is turned back in the estimated frame,
+ * where the error signal is read (3.2.3, row 23).
  *
  * Called each period; result belongs to k. vector: extended EMF, lag removed. T e is limited to an eighth of
  * the base flux per period, the lag to 63 degrees. Tests: tests/unit/observers/emf_test.cpp,
- * tests/scenario/ipm_emf.yaml. */
+ * tests/scenario/ipm_emf.yaml, ipm_emf_low.yaml, cross_coupling.yaml. */
 #ifndef OBSERVERS_EXTENDED_EMF_AB_H
 #define OBSERVERS_EXTENDED_EMF_AB_H
 

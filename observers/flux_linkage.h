@@ -8,7 +8,7 @@
  * the flux and a ripple of the position at the frequency of rotation, which active_flux.h damps alike. While
  * another source leads, the flux is not filtered but tied to the present position. The change between both,
  * and that of the sign of w, transform the state. psi_ref, R and the integration are those of active_flux.h;
- * L_s = L_q(i_q).
+ * L_s = L_q(i).
  *
  * Called each period; result belongs to k. Ranges as active_flux.h, g <= 1. Tests:
  * tests/unit/observers/flux_linkage_test.cpp, tests/scenario/spm_flux_linkage.yaml. */

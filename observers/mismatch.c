@@ -74,7 +74,7 @@ static pm_q_t real_product(pm_ab_t a, pm_ab_t b)
 /* How the rotor swings, rad per base current: -swing times the flux that makes torque of it. */
 static pm_q_t rotor(const mismatch_config_t *config, const observer_model_t *model, pm_dq_t i)
 {
-    const pm_q_t flux = config->id == (uint8_t)MISMATCH_Q_AXIS ? observer_active_flux(model, i.d)
+    const pm_q_t flux = config->id == (uint8_t)MISMATCH_Q_AXIS ? observer_active_flux(model, i)
                                                                : pm_mul(model->L_d - model->L_q, i.q);
     return -pm_shl(pm_sat(pm_mulh(flux, config->swing), 19), 12);
 }

@@ -5,11 +5,13 @@
  *   K_q = -dL_q / psi_a,  K_d = dR / (omega psi_a),  d: machine minus parameter,
  * so what is known of them is added to the error signal: eps' = eps + k_q i_q + k_d i_d. A current that
  * swings on the q-axis (row 29) or on the d-axis (row 30) shows what is left, in the angle that the source
- * sees, theta + eps', whatever the loop makes of it: g = Re(X / I);  X, I: amplitudes of that angle and of
- * the measured current (row 31) k -= (g - g_mech) / 4 for each window of whole periods (row 32) g_mech,q =
- * -1.5 P^2 [psi_m + (L_d - L_q) i_d] / (J w^2),  g_mech,d = -1.5 P^2 (L_d - L_q) i_q / (J w^2) is how the
- * rotor really swings. With the measured current in the place of its reference, whatever the current control
- * and the speed control make of the injection is in both amplitudes (docs/methods_notes.md).
+ * sees, theta + eps', whatever the loop makes of it:
+ *   g = Re(X / I);  X, I: amplitudes of that angle and of the measured current (row 31)
+ *   k -= (g - g_mech) / 4 for each window of whole periods (row 32)
+ *   g_mech,q = -1.5 P^2 [psi_m + (L_d - L_q) i_d] / (J w^2),  g_mech,d = -1.5 P^2 (L_d - L_q) i_q / (J w^2)
+ * g_mech is how the rotor really swings. With the measured current in the place of its reference, whatever
+ * the current control and the speed control make of the injection is in both amplitudes
+ * (docs/methods_notes.md).
  *
  * Amplitudes: (X, I) = 2/n sum (x, i) (cos, sin), x against a rotor of constant speed. The current is a
  * cosine whose sign changes from window to window: so an error of the speed, an acceleration, and whatever

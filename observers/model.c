@@ -1,19 +1,35 @@
 #include "observers/model.h"
 
-pm_q_t observer_active_flux(const observer_model_t *model, pm_q_t i_d)
+#include "firmware/math/compiler.h"
+
+PM_RARE pm_q_t observer_active_flux(const observer_model_t *model, pm_dq_t i)
 {
-    return model->psi_m + pm_mul(model->L_d - model->L_q, i_d);
+    const pm_q_t cross = pm_add_sat(pm_half(model->L_qd), pm_mul(model->L_qd2, i.d));
+    const pm_q_t reluctance = pm_mul(pm_sub_sat(model->L_d, observer_L_q(model, i)), i.d);
+    const pm_q_t psi = pm_add_sat(pm_add_sat(model->psi_m, reluctance), pm_mul(cross, pm_mul(i.q, i.q)));
+    return pm_max(psi, model->psi_m / 4);
 }
 
-pm_q_t observer_L_q(const observer_model_t *model, pm_q_t i_q)
+PM_RARE pm_q_t observer_L_q(const observer_model_t *model, pm_dq_t i)
 {
-    return model->L_q + pm_mul(model->L_q2, pm_mul(i_q, i_q));
+    const pm_q_t k = pm_add_sat(model->L_qd, pm_mul(model->L_qd2, i.d));
+    const pm_q_t along_q = pm_add_sat(model->L_q, pm_mul(model->L_q2, pm_mul(i.q, i.q)));
+    return pm_add_sat(along_q, pm_mul(k, i.d));
 }
 
-pm_q_t observer_resistance(const observer_resistance_t *config, pm_q_t R, pm_q_t omega, pm_q_t lack)
+pm_q_t observer_amplitude(const observer_model_t *model, pm_dq_t i, pm_q_t reference, pm_q_t lack)
+{
+    const pm_q_t centre = observer_active_flux(model, i);
+    const pm_q_t band = pm_half(centre);
+    return pm_clamp(reference - pm_frac(lack, PM_FRAC(0.01)), centre - band, centre + band);
+}
+
+pm_q_t observer_resistance(const observer_resistance_t *config, const observer_model_t *model, pm_q_t R,
+                           pm_q_t omega, pm_q_t lack)
 {
     if (pm_abs(omega) >= config->omega) {
         return R;
     }
-    return pm_clamp(R + pm_narrow(pm_gain(lack, config->k)), config->min, config->max);
+    return pm_clamp(R + pm_narrow(pm_gain(lack, config->k)), pm_half(model->R),
+                    pm_add_sat(model->R, model->R));
 }

@@ -17,7 +17,7 @@ pm_q_t mras_speed(const mras_config_t *config, pm_q_t filtered, const obs_in_t *
     return filtered + pm_unit(in->omega - filtered, share);
 }
 
-pm_q_t mras_cross(const mras_config_t *config, pm_q_t omega, pm_q_t i_q)
+pm_q_t mras_cross(const mras_config_t *config, pm_q_t omega, pm_dq_t i)
 {
-    return pm_mul(omega, observer_L_q(&config->model, i_q) - config->model.L_d);
+    return pm_mul(omega, observer_L_q(&config->model, i) - config->model.L_d);
 }

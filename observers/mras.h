@@ -38,8 +38,8 @@ int32_t mras_inverse(const mras_config_t *config, pm_q_t E);
 /* w_f of the next slow step. */
 pm_q_t mras_speed(const mras_config_t *config, pm_q_t filtered, const obs_in_t *in, pm_q_t weight);
 
-/* w_f (L_q(i_q) - L_d), Q28. */
-pm_q_t mras_cross(const mras_config_t *config, pm_q_t omega, pm_q_t i_q);
+/* w_f (L_q(i) - L_d), Q28. */
+pm_q_t mras_cross(const mras_config_t *config, pm_q_t omega, pm_dq_t i);
 
 /* omega T_s / 2, Q32. */
 static inline int32_t mras_half_turn(const mras_config_t *config, pm_q_t omega)

@@ -15,11 +15,11 @@ static void set_operating_point(mras_current_t *self, const mras_current_config_
     self->drive = pm_shl(pm_sat(b, PM_Q_BITS + 1), 2);
     self->response = self->drive / 2;
     self->cross =
-        pm_shl(pm_sat(pm_mul_sat(b, mras_cross(config, self->omega_f, in->i_dq.q)), PM_Q_BITS + 2), 1);
+        pm_shl(pm_sat(pm_mul_sat(b, mras_cross(config, self->omega_f, in->i_dq)), PM_Q_BITS + 2), 1);
     self->half = mras_half_turn(config, in->omega);
     self->emf_per_change = pm_div(PM_ONE / 16, b); /* Q28 of a sixteenth is Q24 */
     self->adapt = pm_shl(pm_sat(pm_mulh(self->emf_per_change, config->k), 26), 4); /* < 4 */
-    self->emf_model = pm_mul(in->omega, observer_active_flux(m, in->i_dq.d));
+    self->emf_model = pm_mul(in->omega, observer_active_flux(m, in->i_dq));
     self->inverse_model = mras_inverse(config, self->emf_model);
     self->inverse = mras_inverse(config, self->emf);
 }
@@ -35,7 +35,7 @@ void mras_current_tie(mras_current_t *self, const mras_current_config_t *config)
 void mras_current_reset(mras_current_t *self, const mras_current_config_t *config, const obs_in_t *in)
 {
     *self = (mras_current_t){.i = in->i, .omega_f = in->omega};
-    self->emf = pm_mul(in->omega, observer_active_flux(&config->model, in->i_dq.d));
+    self->emf = pm_mul(in->omega, observer_active_flux(&config->model, in->i_dq));
     set_operating_point(self, config, in);
     self->adapt = 0;
 }
@@ -87,7 +87,7 @@ void mras_current_slow(mras_current_t *self, const mras_current_config_t *config
     (void)out;
     self->omega_f = mras_speed(config, self->omega_f, in, weight);
     if (weight == 0) {
-        self->emf = pm_mul(in->omega, observer_active_flux(&config->model, in->i_dq.d));
+        self->emf = pm_mul(in->omega, observer_active_flux(&config->model, in->i_dq));
     }
     set_operating_point(self, config, in);
     if (weight == 0) {

@@ -12,11 +12,11 @@ static int32_t over_emf(pm_q_t x, int32_t inverse)
 static void set_operating_point(mras_simple_t *self, const mras_simple_config_t *config, const obs_in_t *in)
 {
     const observer_model_t *m = &config->model;
-    self->emf = pm_mul(self->omega, observer_active_flux(m, in->i_dq.d));
+    self->emf = pm_mul(self->omega, observer_active_flux(m, in->i_dq));
     const int32_t inverse = mras_inverse(config, self->emf);
     self->inverse = over_emf(PM_ONE, inverse);
     self->resistive = over_emf(m->R, inverse);
-    const int32_t per_change = pm_div(observer_L_q(m, in->i_dq.q), m->t_s); /* L_q / T_s, Q24 */
+    const int32_t per_change = pm_div(observer_L_q(m, in->i_dq), m->t_s); /* L_q / T_s, Q24 */
     self->reactive = pm_shl(pm_sat(pm_mulh(per_change, inverse), 25), 6);
     const pm_q_t v_q = self->emf + pm_mul(m->R, in->i_dq.q);
     self->offset = pm_mulh(pm_mulh(v_q, mras_half_turn(config, self->omega)), self->inverse);

@@ -8,10 +8,10 @@
 static void set_operating_point(mras_voltage_t *self, const mras_voltage_config_t *config, const obs_in_t *in)
 {
     const observer_model_t *m = &config->model;
-    const pm_q_t psi_a = pm_max(observer_active_flux(m, in->i_dq.d), PM_Q(1.0 / 128));
+    const pm_q_t psi_a = pm_max(observer_active_flux(m, in->i_dq), PM_Q(1.0 / 128));
     self->drop = m->R / 32;
     self->rise = pm_div(m->L_d, m->t_s); /* a Q28 over a Q32 that is read as Q28: in Q24 */
-    self->cross = mras_cross(config, self->omega_f, in->i_dq.q) / 32;
+    self->cross = mras_cross(config, self->omega_f, in->i_dq) / 32;
     self->half = mras_half_turn(config, in->omega);
     self->psi = psi_a / 32;
     self->adapt = pm_min(pm_div(config->k / 16, psi_a), PM_ONE); /* D_q is held at 2: no step above 2 */

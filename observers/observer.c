@@ -1,5 +1,7 @@
 #include "observers/observer.h"
 
+#include "firmware/math/compiler.h"
+
 /* One case for each of the list; with PM_OBSERVERS_FEW, without the optional ones. */
 
 void observer_reset(observer_t *self, const observer_config_t *config, const obs_in_t *in)
@@ -17,8 +19,8 @@ void observer_reset(observer_t *self, const observer_config_t *config, const obs
     }
 }
 
-void observer_step_other(observer_t *self, const observer_config_t *config, const obs_in_t *in,
-                         obs_out_t *out)
+PM_APART void observer_step_other(observer_t *self, const observer_config_t *config, const obs_in_t *in,
+                                  obs_out_t *out)
 {
     switch (config->id) {
 #define PM_OBSERVER_DEFAULT(name, help)

@@ -57,8 +57,8 @@ static void set_operating_point(sliding_mode_t *self, const sliding_mode_config_
                                 pm_dq_t i_dq, pm_q_t omega_min)
 {
     const observer_model_t *model = &config->model;
-    const pm_q_t L_q = pm_clamp(observer_L_q(model, i_dq.q), PM_Q(0.01), PM_Q(3.99));
-    const pm_q_t psi = pm_max(observer_active_flux(model, i_dq.d), PM_Q(0.01));
+    const pm_q_t L_q = pm_clamp(observer_L_q(model, i_dq), PM_Q(0.01), PM_Q(3.99));
+    const pm_q_t psi = pm_max(observer_active_flux(model, i_dq), PM_Q(0.01));
     const pm_q_t speed = pm_min(pm_abs(omega), PM_Q(2.0));
     const pm_q_t reach = pm_max(speed, omega_min);
     self->inductance = pm_shl(L_q, 1);
@@ -80,7 +80,7 @@ void sliding_mode_reset(sliding_mode_t *self, const sliding_mode_config_t *confi
 {
     *self = (sliding_mode_t){0};
     set_operating_point(self, config, in->omega, in->i_dq, config->omega_min);
-    const pm_q_t emf = pm_mul(in->omega, observer_active_flux(&config->model, in->i_dq.d));
+    const pm_q_t emf = pm_mul(in->omega, observer_active_flux(&config->model, in->i_dq));
     self->vector = (pm_dq_t){.d = 0, .q = emf / 32};
     self->z = pm_park_inverse((pm_dq_t){.d = 0, .q = emf}, in->dir);
     self->w = self->z;

@@ -51,7 +51,7 @@ typedef struct {
     pm_ab_t z;            /* what the switching function gave, voltage */
     pm_ab_t w;            /* integral of super-twisting */
     pm_ab_t e;            /* low-pass of z */
-    int32_t inductance;   /* L_q(i_q), Q29 */
+    int32_t inductance;   /* L_q(i), Q29 */
     pm_frac_t half_decay; /* R T_s / (2 L_q), Q32 */
     pm_q_t K;             /* present gain */
     int32_t steepness;    /* slope / (1.5 K), Q20 */

@@ -8,7 +8,9 @@
 double circuit_advance(circuit_t *c, double duration_s)
 {
     bool event = false;
-    circuit_settle_legs(c);
+    if ((c->bridge.floating | c->bridge.swinging) != 0u) { /* diodes that stop are events */
+        circuit_settle_legs(c);
+    }
     double left_s = circuit_symmetrical(c) ? steps_symmetrical(c, duration_s, &event)
                                            : steps_general(c, duration_s, &event);
     if (event) {

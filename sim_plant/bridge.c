@@ -1,7 +1,6 @@
 #include "sim_plant/bridge.h"
 
 #include <math.h>
-#include <string.h>
 
 /* Margins against rounding: what counts as no current, and how far beyond a diode's threshold a floating
  * terminal must be, so that a diode never stops and starts for the same instant. */
@@ -14,6 +13,7 @@
 /* Bytes of bridge_t.kinds */
 enum { UPPER, BY_HIGH_DIODE, BY_LOW_DIODE, SWINGS, FLOATS, SHORTS, GIVEN };
 #define KIND(byte) ((uint64_t)1 << (8 * (byte)))
+#define ALL(byte)  ((uint64_t)63 << (8 * (byte)))
 
 /* What each kind of leg is */
 typedef struct {
@@ -47,6 +47,7 @@ static void count(bridge_t *b)
         b->inv_zone_1_A[k] = is->switched * b->switched_1_A;
         b->upper[k] = is->upper;
     }
+    b->summed = ~b->kinds; /* nothing is */
 }
 
 void bridge_init(bridge_t *bridge, const plant_config_t *config, int legs)
@@ -70,28 +71,25 @@ void bridge_init(bridge_t *bridge, const plant_config_t *config, int legs)
 
 /* Voltages that the legs have whatever the currents, by coordinate; only where all are tied or swing. Those
  * of a machine whose phases are alike, who alone asks for them. */
-enum { OF_THREE = 2, OF_SIX = 4 };
+enum { OF_ALIKE = 4 };
 
-static void sum_three(bridge_t *b, const winding_t *w, unsigned upper, unsigned high, unsigned low)
+static void sum_rail(bridge_t *b, const winding_t *w)
 {
-    for (int a = 0; a < OF_THREE; a++) {
-        b->rail[a] = w->side[0][upper][a];
-        b->diode_V[a] = b->v_diode_V * (w->side[0][high][a] - w->side[0][low][a]);
+    unsigned upper = legs_of(b, UPPER);
+    const double *first = w->side[0][upper & 7u], *second = w->side[1][upper >> 3];
+    for (int a = 0; a < OF_ALIKE; a++) {
+        b->rail[a] = first[a] + second[a];
     }
 }
 
-static void sum_six(bridge_t *b, const winding_t *w, unsigned upper, unsigned high, unsigned low)
+static void sum_diodes(bridge_t *b, const winding_t *w)
 {
-    const double *upper_1[] = {w->side[0][upper & 7u], w->side[1][upper >> 3]};
-    const double *high_1[] = {w->side[0][high & 7u], w->side[1][high >> 3]};
-    const double *low_1[] = {w->side[0][low & 7u], w->side[1][low >> 3]};
-    double rail[OF_SIX], diode_V[OF_SIX];
-    for (int a = 0; a < OF_SIX; a++) {
-        rail[a] = upper_1[0][a] + upper_1[1][a];
-        diode_V[a] = b->v_diode_V * (high_1[0][a] - low_1[0][a] + (high_1[1][a] - low_1[1][a]));
+    unsigned high = legs_of(b, BY_HIGH_DIODE), low = legs_of(b, BY_LOW_DIODE);
+    for (int a = 0; a < OF_ALIKE; a++) {
+        double first = w->side[0][high & 7u][a] - w->side[0][low & 7u][a];
+        double second = w->side[1][high >> 3][a] - w->side[1][low >> 3][a];
+        b->diode_V[a] = b->v_diode_V * (first + second);
     }
-    memcpy(b->rail, rail, sizeof rail);
-    memcpy(b->diode_V, diode_V, sizeof diode_V);
 }
 
 static void sum_sources(bridge_t *b, const winding_t *w)
@@ -113,28 +111,35 @@ void bridge_put(bridge_t *b, int k, leg_t leg)
     b->upper[k] = is->upper;
 }
 
-void bridge_sum(bridge_t *b, const winding_t *w)
+/* What few circuits have. */
+static void sum_rare(bridge_t *b, const winding_t *w)
 {
-    unsigned upper = legs_of(b, UPPER), high = legs_of(b, BY_HIGH_DIODE), low = legs_of(b, BY_LOW_DIODE);
     bool sources = legs_of(b, GIVEN) != 0u;
-    b->floating = legs_of(b, FLOATS);
-    b->swinging = legs_of(b, SWINGS);
-    b->diodes = high | low;
     b->both = legs_of(b, SHORTS);
-    b->g_through_S = 0.0;
-    if (b->both != 0u) {
-        b->g_through_S = 0.5 * __builtin_popcount(b->both) / fmax(b->r_on_ohm, R_THROUGH_OHM);
-    }
+    b->g_through_S = 0.5 * __builtin_popcount(b->both) / fmax(b->r_on_ohm, R_THROUGH_OHM);
     b->r_series_ohm = sources ? 0.0 : (w->legs > w->phases ? 2.0 : 1.0) * b->r_on_ohm;
-    if (w->legs == 3) {
-        sum_three(b, w, upper, high, low);
-    } else {
-        sum_six(b, w, upper, high, low);
-    }
     if (sources || b->sources) {
         sum_sources(b, w);
     }
     b->sources = sources;
+}
+
+void bridge_sum(bridge_t *b, const winding_t *w)
+{
+    uint64_t moved = b->kinds ^ b->summed;
+    b->summed = b->kinds;
+    b->floating = legs_of(b, FLOATS);
+    b->swinging = legs_of(b, SWINGS);
+    b->diodes = legs_of(b, BY_HIGH_DIODE) | legs_of(b, BY_LOW_DIODE);
+    if ((moved & ALL(UPPER)) != 0u) {
+        sum_rail(b, w);
+    }
+    if ((moved & (ALL(BY_HIGH_DIODE) | ALL(BY_LOW_DIODE))) != 0u && b->v_diode_V != 0.0) {
+        sum_diodes(b, w);
+    }
+    if ((moved & (ALL(SHORTS) | ALL(GIVEN))) != 0u || b->sources) {
+        sum_rare(b, w);
+    }
 }
 
 void bridge_summarise(bridge_t *b, const winding_t *w)

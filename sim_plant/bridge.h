@@ -41,6 +41,7 @@ typedef struct {
     double v_source_V[PLANT_LEGS];
     /* what follows from leg[] */
     uint64_t kinds;                            /* a byte for each, of which bit k is leg k; see bridge.c */
+    uint64_t summed;                           /* those that the following stand for */
     unsigned floating, swinging, diodes, both; /* legs, bit k for leg k */
     bool sources;
     double rail[ACTIVE];             /* by active coordinate: share of the upper rail, */

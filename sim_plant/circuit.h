@@ -27,33 +27,33 @@
 #include <string.h>
 
 /* Elements of the state vector. The INT_ do not act back: integrals since the start. What a plain machine has
- * lies in one piece; swinging terminals come before. */
+ * lies in one piece, two by two; swinging terminals come before. */
 enum {
-    V_LEG_LAST,           /* swinging terminals, V, the first leg last */
-    THETA_E = PLANT_LEGS, /* rad, unwrapped */
-    OMEGA_MECH,
+    V_LEG_LAST, /* swinging terminals, V, the first leg last */
+    OMEGA_MECH = PLANT_LEGS,
     V_DC,
+    INT_IN,      /* from link or sources into the legs, J */
+    INT_MECH,    /* torque times speed, J */
+    INT_COPPER,  /* loss in the windings and eddy circuits, J */
+    INT_DEVICE,  /* in switches and diodes, J */
     INT_V_ALPHA, /* terminal voltage of the first set, V s */
     INT_V_BETA,
-    INT_IN,     /* from link or sources into the legs, J */
-    INT_COPPER, /* loss in the windings and eddy circuits, J */
-    INT_DEVICE, /* in switches and diodes, J */
-    INT_MECH,   /* torque times speed, J */
-    U,          /* active coordinates of the windings, */
+    U, /* active coordinates of the windings, */
     U_ALPHA = U,
     U_BETA,
     EDDY = U + ACTIVE, /* and their eddy circuits */
     OMEGA_LOAD = EDDY + 2 * PLANT_SETS,
-    TWIST, /* rad */
+    TWIST,   /* rad */
+    THETA_E, /* rad, unwrapped */
     ELEMENTS
 };
 #define V_LEG(k) (PLANT_LEGS - 1 - (k))
 
 /* A point of the trajectory with what follows from it. */
 typedef struct {
-    double x[ELEMENTS];
+    _Alignas(16) double x[ELEMENTS];
+    _Alignas(16) double i_A[ACTIVE];
     rotor_t rotor;
-    double i_A[ACTIVE];
     double torque_Nm;
 } point_t;
 

@@ -90,37 +90,51 @@ static bool high_side(leg_t leg)
     return leg == LEG_HIGH || leg == LEG_DIODE_HIGH;
 }
 
-/* Whether a gate leaves leg k at the rail that it is at, whatever its current. */
-static bool keeps_rail(gate_t gate, leg_t leg)
+/* Whether leg k stays at the rail that it is at with that gate, as more than a least current can flow through
+ * the diode there. */
+static bool keeps_rail(const circuit_t *c, int k, gate_t gate, double least_A)
 {
-    return gate == GATE_OFF || (gate == GATE_LOW && low_side(leg)) || (gate == GATE_HIGH && high_side(leg));
+    leg_t leg = c->bridge.leg[k];
+    if (low_side(leg)) {
+        return (gate == GATE_OFF || gate == GATE_LOW) && circuit_leg_A(c, &c->now, k) >= least_A;
+    }
+    return high_side(leg) && (gate == GATE_OFF || gate == GATE_HIGH) &&
+           circuit_leg_A(c, &c->now, k) <= -least_A;
+}
+
+/* Leg k passes between a switch and the diode across it. */
+static void hand_over(circuit_t *c, int k, leg_t leg)
+{
+    if (c->bridge.c_leg_F > 0.0 && c->bridge.v_diode_V != 0.0) {
+        set_leg(c, k, leg);
+    } else {
+        bridge_put(&c->bridge, k, leg);
+    }
 }
 
 bool circuit_switch_early(circuit_t *c, const gates_t *gates, unsigned legs, double within_s)
 {
-    const bridge_t *b = &c->bridge;
-    leg_t to[PLANT_LEGS];
-    if (b->v_diode_V != b->v_switch_V || b->floating != 0u || b->swinging != 0u) {
+    bridge_t *b = &c->bridge;
+    if (b->v_diode_V != b->v_switch_V || (b->floating | b->swinging) != 0u) {
         return false;
     }
+    double slope_A_s = SLOPE_MARGIN * c->machine.gamma_leg_1_H * fabs(c->now.x[V_DC]);
+    double least_A = 2.0 * b->zone_A + slope_A_s * within_s;
     for (unsigned rest = legs; rest != 0u; rest &= rest - 1u) {
-        int k = bridge_first(rest);
-        gate_t gate = gates_conducting(gates, k);
-        if (!keeps_rail(gate, b->leg[k])) {
-            return false;
-        }
-        double i_A = circuit_leg_A(c, &c->now, k);
-        double slope_A_s = SLOPE_MARGIN * c->machine.gamma_leg_1_H * fabs(c->now.x[V_DC]);
-        to[k] = bridge_commutated(b, k, gate, i_A);
-        if (low_side(to[k]) != low_side(b->leg[k]) || high_side(to[k]) != high_side(b->leg[k]) ||
-            fabs(i_A) < 2.0 * b->zone_A + slope_A_s * within_s) {
+        if (!keeps_rail(c, bridge_first(rest), gates_conducting(gates, bridge_first(rest)), least_A)) {
             return false;
         }
     }
     for (; legs != 0u; legs &= legs - 1u) {
-        set_leg(c, bridge_first(legs), to[bridge_first(legs)]);
+        int k = bridge_first(legs);
+        bool low = low_side(b->leg[k]);
+        if (gates_conducting(gates, k) == GATE_OFF) {
+            hand_over(c, k, low ? LEG_DIODE_LOW : LEG_DIODE_HIGH);
+        } else {
+            hand_over(c, k, low ? LEG_LOW : LEG_HIGH);
+        }
     }
-    circuit_summarise(c);
+    bridge_sum(b, &c->machine.winding);
     return true;
 }
 

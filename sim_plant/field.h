@@ -70,6 +70,11 @@ INLINE double total(pair_t x)
     return x[0] + x[1];
 }
 
+INLINE pair_t totals(pair_t x, pair_t y)
+{
+    return (pair_t){x[0], y[0]} + (pair_t){x[1], y[1]};
+}
+
 /* x[0] y[1] - x[1] y[0] */
 INLINE double cross(pair_t x, pair_t y)
 {

@@ -27,11 +27,11 @@ typedef struct {
 
 excess_t steps_excess(const circuit_t *circuit, const point_t *point);
 
-/* Whether there is anything that could. */
-static inline bool steps_watching(const circuit_t *c)
+/* Whether there is anything that could in a step to that point. */
+static inline bool steps_watching(const circuit_t *c, const point_t *to)
 {
-    return c->bridge.floating != 0u || c->bridge.diodes != 0u || c->bridge.swinging != 0u ||
-           c->mech.parameters.T_coulomb_Nm > 0.0 || !dclink_plain(&c->link);
+    return (c->bridge.floating | c->bridge.diodes | c->bridge.swinging) != 0u || !dclink_plain(&c->link) ||
+           c->mech.stuck || mechanics_sliding_excess(&c->mech, to->x[OMEGA_MECH]) > 0.0;
 }
 
 static inline bool steps_event(excess_t excess)

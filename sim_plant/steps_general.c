@@ -204,7 +204,7 @@ static double take_step(circuit_t *c, double left_s, double rate[], bool *event)
         error = step(c, &h, rate, false, true, &next, rate_end);
     }
     control_step(c, h, error);
-    if (steps_watching(c)) {
+    if (steps_watching(c, &next)) {
         excess_t excess = steps_excess(c, &next);
         *event = steps_event(excess);
         if (*event && !steps_landed(excess)) {

@@ -18,27 +18,21 @@
 /* Of d, where all is smooth: about what the embedded solution of a Runge-Kutta pair of this order misses. */
 #define PART 0.125
 
-INLINE double error_norm(const circuit_t *c, const double miss[], const pair_t by[], shape_t shape,
-                         bool swings)
+INLINE double error_norm(const circuit_t *c, const rates_t *miss, shape_t shape, bool swings)
 {
-    double worst = fabs(miss[OMEGA_MECH]) / (fabs(c->now.x[OMEGA_MECH]) + 1.0);
-    double u = 0.0, v = fabs(miss[V_DC]);
+    double worst = fabs(miss->follow[MOTION][0]) / (fabs(c->now.x[OMEGA_MECH]) + 1.0);
+    double u = 0.0, v = fabs(miss->follow[MOTION][1]);
     for (int set = 0; set < shape.sets; set++) {
-        u = larger(u, larger(fabs(by[set][0]), fabs(by[set][1])));
+        u = larger(u, larger(fabs(miss->flux_V[set][0]), fabs(miss->flux_V[set][1])));
     }
-    for (int k = 0; k < shape.legs && swings; k++) {
-        v = larger(v, fabs(miss[V_LEG(k)]));
+    for (unsigned legs = c->bridge.swinging; swings && legs != 0u; legs &= legs - 1u) {
+        v = larger(v, fabs(miss->leg_V_s[bridge_first(legs)]));
     }
     if (pairs(shape) > shape.sets) {
-        worst = larger(worst, fabs(by[shape.sets][0]) * c->inv_i_scale_1_A);
+        worst = larger(worst, fabs(miss->flux_V[shape.sets][0]) * c->inv_i_scale_1_A);
     }
     worst = larger(worst, larger(u * c->inv_u_scale, v * c->inv_v_scale_1_V));
     return worst * c->inv_tolerance;
-}
-
-INLINE int first_of(shape_t shape, bool swings)
-{
-    return swings ? V_LEG(shape.legs - 1) : THETA_E;
 }
 
 /* The Taylor series, without the angle. */
@@ -46,38 +40,54 @@ INLINE void predict(const circuit_t *c, const start_t *s, double h, shape_t shap
                     field_t *f)
 {
     const double half = 0.5 * h, third = h / 3.0;
-    for (int e = first_of(shape, swings); e < U; e++) {
-        x[e] = c->now.x[e] + h * (s->rate[e] + half * s->bend[e]);
+    for (int n = 0; n < FOLLOWERS; n++) {
+        pair_t mean = s->rate.follow[n] + both(half) * s->bend.follow[n];
+        pair_put(&x[FOLLOWER(n)], pair_at(&c->now.x[FOLLOWER(n)]) + both(h) * mean);
     }
-    for (int k = 0; k < shape.legs && swings; k++) {
-        x[V_LEG(k)] += third * half * h * s->v_leg_V_s3[k];
+    for (unsigned legs = c->bridge.swinging; swings && legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        double mean = s->rate.leg_V_s[k] + half * (s->bend.leg_V_s[k] + third * s->leg_V_s3[k]);
+        x[V_LEG(k)] = c->now.x[V_LEG(k)] + h * mean;
     }
     for (int p = 0; p < pairs(shape); p++) {
-        pair_t bend = swings ? s->flux_V_s[p] + both(third) * s->flux_V_s2[p] : s->flux_V_s[p];
-        f->flux[p] = c->field.flux[p] + both(h) * (s->flux_V[p] + both(half) * bend);
+        pair_t bend = swings ? s->bend.flux_V[p] + both(third) * s->flux_V_s2[p] : s->bend.flux_V[p];
+        f->flux[p] = s->flux[p] + both(h) * (s->rate.flux_V[p] + both(half) * bend);
     }
     for (int set = 0; set < shape.sets && shape.sets > 1; set++) {
-        f->core_Wb[set] = c->field.core_Wb[set] + both(h) * s->core_V[set];
+        f->core_Wb[set] = s->core_Wb[set] + both(h) * s->core_V[set];
     }
 }
 
 /* d from the rates at the end; where third derivatives are in the series already, what is missing of it. */
-INLINE void find_miss(const start_t *s, double h, const double end[], const pair_t end_V[], shape_t shape,
-                      bool swings, double miss[], pair_t by[])
+INLINE void find_miss(const circuit_t *c, const start_t *s, double h, const rates_t *end, shape_t shape,
+                      bool swings, rates_t *miss)
 {
     const double third = h / 3.0, cube = third * 0.5 * h * h;
-    for (int e = first_of(shape, swings); e < U; e++) {
-        miss[e] = third * (end[e] - s->rate[e] - h * s->bend[e]);
+    for (int n = 0; n < FOLLOWERS; n++) {
+        miss->follow[n] = both(third) * (end->follow[n] - s->rate.follow[n] - both(h) * s->bend.follow[n]);
     }
     for (int p = 0; p < pairs(shape); p++) {
-        by[p] = both(third) * (end_V[p] - s->flux_V[p] - both(h) * s->flux_V_s[p]);
-        by[p] = swings ? both(0.75) * (by[p] - both(cube) * s->flux_V_s2[p]) : by[p];
+        pair_t d = both(third) * (end->flux_V[p] - s->rate.flux_V[p] - both(h) * s->bend.flux_V[p]);
+        miss->flux_V[p] = swings ? both(0.75) * (d - both(cube) * s->flux_V_s2[p]) : d;
     }
-    for (int k = 0; k < shape.legs && swings; k++) {
-        miss[V_LEG(k)] = 0.75 * (miss[V_LEG(k)] - cube * s->v_leg_V_s3[k]);
+    for (unsigned legs = c->bridge.swinging; swings && legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        double d = third * (end->leg_V_s[k] - s->rate.leg_V_s[k] - h * s->bend.leg_V_s[k]);
+        miss->leg_V_s[k] = 0.75 * (d - cube * s->leg_V_s3[k]);
     }
-    for (int a = 0; a < 2 && swings; a++) {
-        miss[INT_V_ALPHA + a] -= 0.25 * (miss[INT_V_ALPHA + a] - cube * s->v_V_s2[0][a]);
+    if (swings) {
+        miss->follow[VOLTS] -= both(0.25) * (miss->follow[VOLTS] - both(cube) * s->v_V_s2[0]);
+    }
+}
+
+INLINE void add_miss(const circuit_t *c, const rates_t *miss, bool swings, double x[])
+{
+    for (int n = 0; n < FOLLOWERS; n++) {
+        pair_put(&x[FOLLOWER(n)], pair_at(&x[FOLLOWER(n)]) + miss->follow[n]);
+    }
+    for (unsigned legs = c->bridge.swinging; swings && legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        x[V_LEG(k)] += miss->leg_V_s[k];
     }
 }
 
@@ -85,33 +95,35 @@ INLINE void find_miss(const start_t *s, double h, const double end[], const pair
 INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape, bool swings, point_t *to,
                    field_t *f)
 {
-    double end[ELEMENTS], miss[ELEMENTS];
-    pair_t end_V[PAIRS], by[PAIRS];
+    rates_t end, miss;
     tied_t tied;
-    double turn = h * (s->rate[THETA_E] + 0.5 * h * (s->bend[THETA_E] + h / 3.0 * s->omega_jerk));
+    double turn = h * (s->omega_e + 0.5 * h * (s->omega_e_s + h / 3.0 * s->omega_e_s2));
+    double part = swings ? 1.0 : PART;
+    bool steady = s->steady;
+    for (int p = 0; p < pairs(shape); p++) {
+        tied.switch_V[p] = s->tied.switch_V[p];
+    }
     to->rotor = frame_turn(c->now.rotor, turn);
     predict(c, s, h, shape, swings, to->x, f);
     field_at(&c->machine, to->rotor, shape, f);
-    rates_at(c, f, to->x, shape, swings, &tied, end, end_V);
-    find_miss(s, h, end, end_V, shape, swings, miss, by);
-    for (int e = first_of(shape, swings); e < U; e++) {
-        to->x[e] += miss[e];
-    }
+    rates_at(c, f, to->x, shape, swings, steady, &tied, &end);
+    find_miss(c, s, h, &end, shape, swings, &miss);
+    add_miss(c, &miss, swings, to->x);
     to->x[THETA_E] = c->now.x[THETA_E] + turn;
-    field_shift(&c->machine, to->rotor, shape, by, f);
+    field_shift(&c->machine, to->rotor, shape, miss.flux_V, f);
     for (int p = 0; p < pairs(shape); p++) {
         bool linked = shape.sets > 1;
         pair_put(&to->x[U + 2 * p], linked ? from_rotor(f->core_Wb[p], to->rotor) : f->flux[p]);
         pair_put(&to->i_A[2 * p], f->i_A[p]);
     }
     to->torque_Nm = f->torque_Nm;
-    double part = drop_part(&c->bridge, &s->tied, &tied, shape, swings ? 1.0 : PART);
-    return part * error_norm(c, miss, by, shape, swings);
+    part = steady ? part : drop_part(&s->tied, &tied, shape, part);
+    return part * error_norm(c, &miss, shape, swings);
 }
 
 static void retake(const circuit_t *c, const void *start, double h, point_t *to)
 {
-    field_t f;
+    field_t f = c->field;
     bool swings = c->bridge.swinging != 0u;
     *to = c->now;
     switch (c->machine.winding.active) {
@@ -130,7 +142,7 @@ static void retake(const circuit_t *c, const void *start, double h, point_t *to)
 /* Until a swinging terminal arrives at its diode, by the first three derivatives; h if not before. */
 INLINE double arrival_s(const circuit_t *c, const start_t *s, int k, double h)
 {
-    double rate = s->rate[V_LEG(k)], bend = 0.5 * s->bend[V_LEG(k)], jerk = s->v_leg_V_s3[k] / 6.0;
+    double rate = s->rate.leg_V_s[k], bend = 0.5 * s->bend.leg_V_s[k], jerk = s->leg_V_s3[k] / 6.0;
     double end_V = rate > 0.0 ? c->now.x[V_DC] + c->bridge.v_diode_V : -c->bridge.v_diode_V;
     double away_V = end_V - c->now.x[V_LEG(k)];
     double t = 0.0;
@@ -151,14 +163,13 @@ INLINE double arrival_s(const circuit_t *c, const start_t *s, int k, double h)
 }
 
 /* What swinging terminals allow. */
-INLINE double swing_s(const circuit_t *c, const start_t *s, shape_t shape, double h)
+INLINE double swing_s(const circuit_t *c, const start_t *s, double h)
 {
     double bend = 0.0;
-    for (int k = 0; k < shape.legs; k++) {
-        if (c->bridge.leg[k] == LEG_SWINGING) {
-            h = arrival_s(c, s, k, h);
-            bend = larger(bend, fabs(s->bend[V_LEG(k)]));
-        }
+    for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        h = arrival_s(c, s, k, h);
+        bend = larger(bend, fabs(s->bend.leg_V_s[k]));
     }
     double square = c->machine.gamma_leg_1_H * c->bridge.inv_c_leg_1_F; /* of the angular frequency */
     double error = bend * square * h * h * h * h * (c->inv_v_scale_1_V * c->inv_tolerance / 24.0);
@@ -183,50 +194,60 @@ INLINE void know_field(circuit_t *c, shape_t shape)
     }
 }
 
+/* The end of a step becomes the present point. */
+INLINE void arrive(circuit_t *c, const point_t *to, shape_t shape, bool swings)
+{
+    for (int n = 0; n < FOLLOWERS; n++) {
+        pair_put(&c->now.x[FOLLOWER(n)], pair_at(&to->x[FOLLOWER(n)]));
+    }
+    for (unsigned legs = c->bridge.swinging; swings && legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        c->now.x[V_LEG(k)] = to->x[V_LEG(k)];
+    }
+    for (int p = 0; p < pairs(shape); p++) {
+        pair_put(&c->now.x[U + 2 * p], pair_at(&to->x[U + 2 * p]));
+        pair_put(&c->now.i_A[2 * p], pair_at(&to->i_A[2 * p]));
+    }
+    c->now.x[THETA_E] = to->x[THETA_E];
+    c->now.rotor = to->rotor;
+    c->now.torque_Nm = to->torque_Nm;
+}
+
 INLINE double take_steps(circuit_t *c, double left_s, shape_t shape, bool swings, bool *event)
 {
     point_t *to = &c->next;
-    field_t field;
     start_t start;
     know_field(c, shape);
     while (left_s > 0.0 && !*event) {
         begin(c, shape, swings, &start);
         double h = swings || c->step_s > left_s ? left_s : c->step_s;
-        h = steps_turn_s(c, start.rate[THETA_E], h);
-        h = swings ? swing_s(c, &start, shape, h) : h;
+        h = steps_turn_s(c, start.omega_e, h);
+        h = swings ? swing_s(c, &start, h) : h;
         double zone = zone_s(c, &start, shape, h);
         bool smooth = zone == h;
         h = zone;
         h = h > 0.999 * left_s ? left_s : h; /* no sliver at the end */
-        double error = step(c, &start, h, shape, swings, to, &field);
+        double error = step(c, &start, h, shape, swings, to, &c->field);
         while (!(error <= 1.0) && h > 1e-9 * left_s) {
             h = steps_shorter_s(h, error);
             c->step_s = swings || !smooth ? c->step_s : h;
-            error = step(c, &start, h, shape, swings, to, &field);
+            error = step(c, &start, h, shape, swings, to, &c->field);
         }
         if (!swings) {
             control(c, h, error);
         }
-        if (steps_watching(c)) {
+        if (steps_watching(c, to)) {
             excess_t excess = steps_excess(c, to);
             *event = steps_event(excess);
             if (*event && !steps_landed(excess)) {
                 h = steps_locate(c, h, retake, &start, to);
-                step(c, &start, h, shape, swings, to, &field);
+                step(c, &start, h, shape, swings, to, &c->field);
             }
         }
         if (probe_active(&c->probe)) {
             steps_probe(c, to, h);
         }
-        for (int e = first_of(shape, swings); e < U + 2 * pairs(shape); e++) {
-            c->now.x[e] = to->x[e];
-        }
-        for (int a = 0; a < 2 * pairs(shape); a++) {
-            c->now.i_A[a] = to->i_A[a];
-        }
-        c->now.rotor = to->rotor;
-        c->now.torque_Nm = to->torque_Nm;
-        c->field = field;
+        arrive(c, to, shape, swings);
         c->t_s += h;
         left_s -= h;
     }
@@ -258,11 +279,13 @@ WIDER double steps_symmetrical(circuit_t *c, double left_s, bool *event)
 
 INLINE void current_rates(const circuit_t *c, shape_t shape, double i_A_s[ACTIVE])
 {
-    double rate[ELEMENTS];
-    pair_t flux_V[PAIRS], core_V[PLANT_SETS], moved_A_s[PAIRS];
+    rates_t rate;
+    pair_t core_V[PLANT_SETS], moved_A_s[PAIRS];
     tied_t tied;
-    rates_at(c, &c->field, c->now.x, shape, true, &tied, rate, flux_V);
-    field_rates(&c->machine, c->now.rotor, rate[THETA_E], shape, &c->field, flux_V, core_V, moved_A_s);
+    double omega_e = c->machine.pole_pairs * c->now.x[OMEGA_MECH];
+    no_drops(shape, &tied);
+    rates_at(c, &c->field, c->now.x, shape, true, c->bridge.v_switch_V == 0.0, &tied, &rate);
+    field_rates(&c->machine, c->now.rotor, omega_e, shape, &c->field, rate.flux_V, core_V, moved_A_s);
     for (int p = 0; p < pairs(shape); p++) {
         pair_put(&i_A_s[2 * p], moved_A_s[p]);
     }

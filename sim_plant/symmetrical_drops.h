@@ -14,46 +14,60 @@
 #define TURNING   0.5
 #define KINK      4.0
 #define ZONE_EDGE 0.01  /* a step that ends so close to where a turn begins or ends counts as there; */
-#define ZONE_PAST 0.003 /* it aims this far behind an end, so as not to leave a sliver. Units of the zone */
+#define ZONE_PAST 0.003 /* it aims this far behind an end, so as not to leave a sliver; and beyond this, as  \
+                         */
+#define ZONE_FAR 4.0    /* far as the currents' rates say, a drop is constant. Units of the zone */
 
 /* What d says of a step over which drops have moved. */
-INLINE double drop_part(const bridge_t *b, const tied_t *from, const tied_t *to, shape_t shape, double part)
+INLINE double drop_part(const tied_t *from, const tied_t *to, shape_t shape, double part)
 {
-    for (int k = 0; k < shape.legs && b->v_switch_V != 0.0; k++) {
+    for (int k = 0; k < shape.legs; k++) {
         if (from->share[k] != to->share[k]) {
-            double x = fabs(from->i_leg_A[k] * b->inv_zone_1_A[k]);
-            double end = fabs(to->i_leg_A[k] * b->inv_zone_1_A[k]);
-            part = larger(part, larger(x, end) > 1.0 + ZONE_EDGE ? KINK : TURNING);
+            double most = larger(fabs(from->zones[k]), fabs(to->zones[k]));
+            part = larger(part, most > 1.0 + ZONE_EDGE ? KINK : TURNING);
         }
     }
     return part;
 }
 
+/* Of a leg whose current is x now and moves with a speed: how long the step may be. */
+INLINE double turn_s(const circuit_t *c, double x, double speed, double h)
+{
+    double ahead = speed > 0.0 ? x : -x; /* towards the end of a turn at 1 */
+    bool turning = ahead >= -1.0 - ZONE_EDGE;
+    double edge = turning ? 1.0 + ZONE_PAST : -1.0;
+    if (ahead > 1.0 - ZONE_PAST) {
+        return h;
+    }
+    if (ahead + fabs(speed) * h > edge) {
+        h = (edge - ahead) / fabs(speed);
+    }
+    if (turning) {
+        double d_Wb =
+            c->bridge.v_switch_V / 3.0 * fabs(1.5 * x + 0.5 * speed * h) * speed * speed * h * h * h;
+        double error = TURNING * d_Wb * c->inv_u_scale * c->inv_tolerance;
+        h = error > 0.9 ? h * cbrt(0.9 / error) : h;
+    }
+    return h;
+}
+
 /* Steps end where the drop of a closed switch begins or ceases to turn over, and while it does are as long as
  * the error of that allows. */
-INLINE double zone_s(const circuit_t *c, const start_t *s, shape_t shape, double h)
+INLINE double zone_s(const circuit_t *c, start_t *s, shape_t shape, double h)
 {
     const bridge_t *b = &c->bridge;
+    s->steady = true;
     for (int k = 0; k < shape.legs && b->v_switch_V != 0.0; k++) {
-        double x = s->tied.i_leg_A[k] * b->inv_zone_1_A[k];
+        double x = s->tied.zones[k];
         double speed = along(&c->machine.winding, shape, k, s->i_A_s) * b->inv_zone_1_A[k];
         double end = x + speed * h;
-        if (b->inv_zone_1_A[k] == 0.0 || (x >= 1.0 && end >= 1.0) || (x <= -1.0 && end <= -1.0)) {
+        if (b->inv_zone_1_A[k] == 0.0 || (x > ZONE_FAR && end > ZONE_FAR) ||
+            (x < -ZONE_FAR && end < -ZONE_FAR)) {
             continue;
         }
-        double ahead = speed > 0.0 ? x : -x; /* towards the end of a turn at 1 */
-        bool turning = ahead >= -1.0 - ZONE_EDGE;
-        double edge = turning ? 1.0 + ZONE_PAST : -1.0;
-        if (ahead > 1.0 - ZONE_PAST) {
-            continue;
-        }
-        if (ahead + fabs(speed) * h > edge) {
-            h = (edge - ahead) / fabs(speed);
-        }
-        if (turning) {
-            double d_Wb = b->v_switch_V / 3.0 * fabs(1.5 * x + 0.5 * speed * h) * speed * speed * h * h * h;
-            double error = TURNING * d_Wb * c->inv_u_scale * c->inv_tolerance;
-            h = error > 0.9 ? h * cbrt(0.9 / error) : h;
+        s->steady = false;
+        if (!(x >= 1.0 && end >= 1.0) && !(x <= -1.0 && end <= -1.0)) {
+            h = turn_s(c, x, speed, h);
         }
     }
     return h;

@@ -9,33 +9,48 @@
 #include "sim_plant/circuit_rates.h"
 #include "sim_plant/field.h"
 
+/* What follows the windings' linkages, in pairs: elements of the state from OMEGA_MECH to U. */
+enum { MOTION, POWER, LOSS, VOLTS, FOLLOWERS };
+#define FOLLOWER(n) (OMEGA_MECH + 2 * (n))
+
 /* Of the legs at a point */
 typedef struct {
     pair_t v_V[PAIRS], drop_V[PAIRS];
-    double i_leg_A[PLANT_LEGS], share[PLANT_LEGS]; /* of the drop of closed switches, when there is one */
+    pair_t switch_V[PAIRS];     /* drops of closed switches, when there are any: */
+    double zones[PLANT_LEGS];   /* their currents in units of the zone, */
+    double share[PLANT_LEGS];   /* and shares of the drop */
+    bool turning;               /* some are within the zone */
+    double i_leg_A[PLANT_LEGS]; /* of swinging legs */
     double i_dc_A;
 } tied_t;
 
-/* Rates at the start of a step, and what they say about it. */
 typedef struct {
-    double rate[ELEMENTS], bend[ELEMENTS];  /* first and second derivative, */
-    pair_t flux_V[PAIRS], flux_V_s[PAIRS];  /* and of the field's flux */
-    double omega_jerk;                      /* third derivative of the angle */
-    double v_leg_V_s3[PLANT_LEGS];          /* and of swinging terminals, nearly, */
-    pair_t v_V_s2[PAIRS], flux_V_s2[PAIRS]; /* and what these do to voltages and linkages */
+    pair_t flux_V[PAIRS]; /* of the field's flux, */
+    pair_t follow[FOLLOWERS];
+    double leg_V_s[PLANT_LEGS]; /* and of swinging terminals */
+} rates_t;
+
+/* A start of steps: where it is, and first and second derivatives. */
+typedef struct {
+    pair_t flux[PAIRS], core_Wb[PLANT_SETS]; /* of the field */
+    rates_t rate, bend;
+    double omega_e, omega_e_s, omega_e_s2;
     pair_t core_V[PLANT_SETS], i_A_s[PAIRS];
+    double leg_V_s3[PLANT_LEGS];            /* third ones of swinging terminals, nearly, */
+    pair_t v_V_s2[PAIRS], flux_V_s2[PAIRS]; /* and what these do to voltages and linkages */
     tied_t tied;
+    bool steady; /* no drop turns over in the step */
 } start_t;
 
 /* Coordinates that leg k has a part in: of two stars those of its own set. */
 INLINE int leg_first(shape_t shape, int k)
 {
-    return shape.sets > 1 ? k / 3 : 0;
+    return shape.sets > 1 && k >= 3 ? 1 : 0;
 }
 
 INLINE int leg_end(shape_t shape, int k)
 {
-    return shape.sets > 1 ? k / 3 + 1 : pairs(shape);
+    return shape.sets > 1 ? leg_first(shape, k) + 1 : pairs(shape);
 }
 
 INLINE double along(const winding_t *w, shape_t shape, int k, const pair_t x[])
@@ -60,37 +75,47 @@ INLINE pair_t of_state(const machine_t *m, shape_t shape, int p, pair_t flux)
     return p < shape.sets ? flux : flux * both(m->loose_gamma_1_H[2 * shape.sets]);
 }
 
-INLINE void add_drops(const circuit_t *c, const field_t *f, shape_t shape, bool swings, tied_t *t)
+INLINE void no_drops(shape_t shape, tied_t *t)
 {
-    const bridge_t *b = &c->bridge;
-    const winding_t *w = &c->machine.winding;
-    bool each = swings || b->v_switch_V != 0.0;
-    for (int k = 0; k < shape.legs; k++) {
-        t->i_leg_A[k] = each ? along(w, shape, k, f->i_A) : 0.0;
-        t->share[k] = 0.0;
-    }
-    for (int k = 0; k < shape.legs && b->v_switch_V != 0.0; k++) {
-        t->share[k] = bridge_switch_share(t->i_leg_A[k] * b->inv_zone_1_A[k]);
-        spread(w, shape, k, b->v_switch_V * t->share[k], t->drop_V);
+    t->turning = false;
+    for (int p = 0; p < pairs(shape); p++) {
+        t->switch_V[p] = both(0.0);
     }
 }
 
+/* Drops of closed switches, which have one */
+INLINE void find_drops(const circuit_t *c, const field_t *f, shape_t shape, tied_t *t)
+{
+    const bridge_t *b = &c->bridge;
+    const winding_t *w = &c->machine.winding;
+    no_drops(shape, t);
+    for (int k = 0; k < shape.legs; k++) {
+        t->zones[k] = along(w, shape, k, f->i_A) * b->inv_zone_1_A[k];
+        t->share[k] = bridge_switch_share(t->zones[k]);
+        t->turning = t->turning || (b->inv_zone_1_A[k] != 0.0 && fabs(t->zones[k]) < 1.0);
+        spread(w, shape, k, b->v_switch_V * t->share[k], t->switch_V);
+    }
+}
+
+/* steady: drops of closed switches are known already. */
 INLINE void tied_at(const circuit_t *c, const field_t *f, const double x[], shape_t shape, bool swings,
-                    tied_t *t)
+                    bool steady, tied_t *t)
 {
     const bridge_t *b = &c->bridge;
     const winding_t *w = &c->machine.winding;
     pair_t i_dc_A = {0.0}, swing_V[PAIRS] = {{0.0}};
+    if (!steady) {
+        find_drops(c, f, shape, t);
+    }
     for (int p = 0; p < pairs(shape); p++) {
-        t->drop_V[p] = both(b->r_series_ohm) * f->i_A[p] - pair_at(&b->diode_V[2 * p]);
+        t->drop_V[p] = both(b->r_series_ohm) * f->i_A[p] - pair_at(&b->diode_V[2 * p]) + t->switch_V[p];
         i_dc_A += weights(shape, p) * pair_at(&b->rail[2 * p]) * f->i_A[p];
     }
-    add_drops(c, f, shape, swings, t);
-    for (int k = 0; k < shape.legs && swings; k++) {
-        if (b->leg[k] == LEG_SWINGING) {
-            spread(w, shape, k, x[V_LEG(k)], swing_V);
-            spread(w, shape, k, -b->r_on_ohm * t->i_leg_A[k], t->drop_V);
-        }
+    for (unsigned legs = b->swinging; swings && legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        t->i_leg_A[k] = along(w, shape, k, f->i_A);
+        spread(w, shape, k, x[V_LEG(k)], swing_V);
+        spread(w, shape, k, -b->r_on_ohm * t->i_leg_A[k], t->drop_V);
     }
     for (int p = 0; p < pairs(shape); p++) {
         t->v_V[p] = pair_at(&b->rail[2 * p]) * both(x[V_DC]) + pair_at(&b->source_V[2 * p]) - t->drop_V[p];
@@ -100,34 +125,32 @@ INLINE void tied_at(const circuit_t *c, const field_t *f, const double x[], shap
 }
 
 INLINE void rates_at(const circuit_t *c, const field_t *f, const double x[], shape_t shape, bool swings,
-                     tied_t *t, double rate[], pair_t flux_V[])
+                     bool steady, tied_t *t, rates_t *rate)
 {
     const machine_t *m = &c->machine;
     const bridge_t *b = &c->bridge;
     double omega = x[OMEGA_MECH], v_dc = x[V_DC];
     double omega_e = m->pole_pairs * omega;
     pair_t in_W = {0.0}, copper = {0.0}, device_W = {0.0};
-    tied_at(c, f, x, shape, swings, t);
+    tied_at(c, f, x, shape, swings, steady, t);
     for (int p = 0; p < pairs(shape); p++) {
         pair_t power = weights(shape, p) * f->i_A[p];
         pair_t rest_V = t->v_V[p] - both(m->R_s_ohm) * f->i_A[p] - both(omega_e) * f->slope_Wb[p];
-        flux_V[p] = of_state(m, shape, p, rest_V);
+        rate->flux_V[p] = of_state(m, shape, p, rest_V);
         in_W = b->sources ? in_W + power * pair_at(&b->source_V[2 * p]) : in_W;
         copper += power * f->i_A[p];
         device_W += power * t->drop_V[p];
     }
-    for (int k = 0; k < shape.legs && swings; k++) {
-        rate[V_LEG(k)] = b->leg[k] == LEG_SWINGING ? -t->i_leg_A[k] * b->inv_c_leg_1_F : 0.0;
+    for (unsigned legs = b->swinging; swings && legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        rate->leg_V_s[k] = -t->i_leg_A[k] * b->inv_c_leg_1_F;
     }
-    rate[THETA_E] = omega_e;
-    rate[OMEGA_MECH] = mechanics_rate(&c->mech, omega, f->torque_Nm);
-    rate[V_DC] = dclink_plain_rate(&c->link, v_dc, t->i_dc_A);
-    rate[INT_V_ALPHA] = t->v_V[0][0];
-    rate[INT_V_BETA] = t->v_V[0][1];
-    rate[INT_IN] = v_dc * t->i_dc_A + total(in_W);
-    rate[INT_COPPER] = m->R_s_ohm * total(copper);
-    rate[INT_DEVICE] = total(device_W);
-    rate[INT_MECH] = f->torque_Nm * omega;
+    rate->follow[MOTION] =
+        (pair_t){mechanics_rate(&c->mech, omega, f->torque_Nm), dclink_plain_rate(&c->link, v_dc, t->i_dc_A)};
+    rate->follow[POWER] = (pair_t){v_dc, f->torque_Nm} * (pair_t){t->i_dc_A, omega};
+    rate->follow[POWER][0] += b->sources ? total(in_W) : 0.0;
+    rate->follow[LOSS] = totals(copper, device_W) * (pair_t){m->R_s_ohm, 1.0};
+    rate->follow[VOLTS] = t->v_V[0];
 }
 
 /* How voltages of the legs move with the currents. */
@@ -140,24 +163,22 @@ INLINE void tied_bends(const circuit_t *c, const pair_t i_A_s[], shape_t shape, 
     for (int p = 0; p < pairs(shape); p++) {
         drop_V_s[p] = both(b->r_series_ohm) * i_A_s[p];
     }
-    for (int k = 0; k < shape.legs && b->v_switch_V != 0.0; k++) {
-        double x = s->tied.i_leg_A[k] * b->inv_zone_1_A[k];
+    for (int k = 0; k < shape.legs && s->tied.turning; k++) {
+        double x = s->tied.zones[k];
         if (x > -1.0 && x < 1.0) {
             double slope = b->v_switch_V * 1.5 * (1.0 - x * x) * b->inv_zone_1_A[k];
             spread(w, shape, k, slope * along(w, shape, k, i_A_s), drop_V_s);
         }
     }
-    for (int k = 0; k < shape.legs && swings; k++) {
-        s->bend[V_LEG(k)] = 0.0;
-        if (b->leg[k] == LEG_SWINGING) {
-            double moves_A_s = along(w, shape, k, i_A_s);
-            s->bend[V_LEG(k)] = -moves_A_s * b->inv_c_leg_1_F;
-            spread(w, shape, k, s->rate[V_LEG(k)], swing_V_s);
-            spread(w, shape, k, -b->r_on_ohm * moves_A_s, drop_V_s);
-        }
+    for (unsigned legs = b->swinging; swings && legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        double moves_A_s = along(w, shape, k, i_A_s);
+        s->bend.leg_V_s[k] = -moves_A_s * b->inv_c_leg_1_F;
+        spread(w, shape, k, s->rate.leg_V_s[k], swing_V_s);
+        spread(w, shape, k, -b->r_on_ohm * moves_A_s, drop_V_s);
     }
     for (int p = 0; p < pairs(shape); p++) {
-        v_V_s[p] = pair_at(&b->rail[2 * p]) * both(s->rate[V_DC]) - drop_V_s[p];
+        v_V_s[p] = pair_at(&b->rail[2 * p]) * both(s->rate.follow[MOTION][1]) - drop_V_s[p];
         v_V_s[p] = swings ? v_V_s[p] + swing_V_s[p] : v_V_s[p];
     }
 }
@@ -166,15 +187,15 @@ INLINE void tied_bends(const circuit_t *c, const pair_t i_A_s[], shape_t shape, 
 INLINE void other_bends(const circuit_t *c, double torque_Nm_s, double i_dc_A_s, start_t *s)
 {
     const double *x = c->now.x;
-    double v_dc_s = s->rate[V_DC], omega_s = s->rate[OMEGA_MECH];
+    double v_dc_s = s->rate.follow[MOTION][1], omega_s = s->rate.follow[MOTION][0];
     bool fed = c->link.connected && !(c->link.blocks && c->link.v_source_V < x[V_DC]);
     double bend_V = (-(fed ? c->link.g_source_S * v_dc_s : 0.0) - i_dc_A_s) * c->link.inv_C_1_F;
-    s->bend[THETA_E] = c->machine.pole_pairs * omega_s;
-    s->bend[OMEGA_MECH] = c->mech.gain_1_kgm2 * (torque_Nm_s - c->mech.parameters.B_Nms * omega_s);
-    s->bend[V_DC] = x[V_DC] > 0.0 ? bend_V : 0.0;
-    s->bend[INT_IN] += v_dc_s * s->tied.i_dc_A + x[V_DC] * i_dc_A_s;
-    s->bend[INT_MECH] = torque_Nm_s * x[OMEGA_MECH] + c->field.torque_Nm * omega_s;
-    s->omega_jerk = c->machine.pole_pairs * s->bend[OMEGA_MECH];
+    double omega_s2 = c->mech.gain_1_kgm2 * (torque_Nm_s - c->mech.parameters.B_Nms * omega_s);
+    s->omega_e_s = c->machine.pole_pairs * omega_s;
+    s->omega_e_s2 = c->machine.pole_pairs * omega_s2;
+    s->bend.follow[MOTION] = (pair_t){omega_s2, x[V_DC] > 0.0 ? bend_V : 0.0};
+    s->bend.follow[POWER] = (pair_t){v_dc_s, torque_Nm_s} * (pair_t){s->tied.i_dc_A, x[OMEGA_MECH]} +
+                            (pair_t){x[V_DC], c->field.torque_Nm} * (pair_t){i_dc_A_s, omega_s};
 }
 
 /* Second derivatives from those of the currents. */
@@ -185,15 +206,15 @@ INLINE void bends_at(const circuit_t *c, const pair_t i_A_s[], shape_t shape, bo
     const bridge_t *b = &c->bridge;
     pair_t drop_V_s[PAIRS], v_V_s[PAIRS];
     pair_t i_dc_A_s = {0.0}, source_W_s = {0.0}, copper = {0.0}, device_W_s = {0.0}, harmonic = {0.0};
-    double omega_e = s->rate[THETA_E], omega_e_s = m->pole_pairs * s->rate[OMEGA_MECH];
+    double omega_e = s->omega_e, omega_e_s = m->pole_pairs * s->rate.follow[MOTION][0];
     double product = 0.0;
     tied_bends(c, i_A_s, shape, swings, s, drop_V_s, v_V_s);
     for (int p = 0; p < pairs(shape); p++) {
         pair_t i = weights(shape, p) * f->i_A[p], moves = weights(shape, p) * i_A_s[p];
         pair_t turning = both(omega_e) * f->bend_Wb[p];
-        s->flux_V_s[p] = of_state(m, shape, p,
-                                  v_V_s[p] - both(m->R_s_ohm) * i_A_s[p] - both(omega_e_s) * f->slope_Wb[p] -
-                                      both(omega_e) * turning);
+        s->bend.flux_V[p] = of_state(m, shape, p,
+                                     v_V_s[p] - both(m->R_s_ohm) * i_A_s[p] -
+                                         both(omega_e_s) * f->slope_Wb[p] - both(omega_e) * turning);
         i_dc_A_s += pair_at(&b->rail[2 * p]) * moves;
         source_W_s = b->sources ? source_W_s + pair_at(&b->source_V[2 * p]) * moves : source_W_s;
         copper += i * i_A_s[p];
@@ -201,14 +222,12 @@ INLINE void bends_at(const circuit_t *c, const pair_t i_A_s[], shape_t shape, bo
         harmonic += moves * f->slope_Wb[p] + i * turning;
     }
     for (int set = 0; set < shape.sets; set++) {
-        product += cross(s->flux_V[set], f->i_A[set]) + cross(f->flux[set], i_A_s[set]);
+        product += cross(s->rate.flux_V[set], f->i_A[set]) + cross(f->flux[set], i_A_s[set]);
     }
-    s->bend[INT_V_ALPHA] = v_V_s[0][0];
-    s->bend[INT_V_BETA] = v_V_s[0][1];
-    s->bend[INT_IN] = total(source_W_s);
-    s->bend[INT_COPPER] = 2.0 * m->R_s_ohm * total(copper);
-    s->bend[INT_DEVICE] = total(device_W_s);
     other_bends(c, m->torque_gain * product + m->pole_pairs * total(harmonic), total(i_dc_A_s), s);
+    s->bend.follow[POWER][0] += b->sources ? total(source_W_s) : 0.0;
+    s->bend.follow[LOSS] = totals(copper, device_W_s) * (pair_t){2.0 * m->R_s_ohm, 1.0};
+    s->bend.follow[VOLTS] = v_V_s[0];
 }
 
 /* Third derivatives that swinging terminals bring, without those of rotation. */
@@ -216,16 +235,14 @@ INLINE void swing_bends(const circuit_t *c, shape_t shape, start_t *s)
 {
     const machine_t *m = &c->machine;
     pair_t core_V_s[PLANT_SETS], i_A_s2[PAIRS];
-    field_rates(m, c->now.rotor, 0.0, shape, &c->field, s->flux_V_s, core_V_s, i_A_s2);
+    field_rates(m, c->now.rotor, 0.0, shape, &c->field, s->bend.flux_V, core_V_s, i_A_s2);
     for (int p = 0; p < pairs(shape); p++) {
         s->v_V_s2[p] = both(-c->bridge.r_series_ohm) * i_A_s2[p];
     }
-    for (int k = 0; k < shape.legs; k++) {
-        s->v_leg_V_s3[k] = 0.0;
-        if (c->bridge.leg[k] == LEG_SWINGING) {
-            s->v_leg_V_s3[k] = -along(&m->winding, shape, k, i_A_s2) * c->bridge.inv_c_leg_1_F;
-            spread(&m->winding, shape, k, s->bend[V_LEG(k)], s->v_V_s2);
-        }
+    for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        s->leg_V_s3[k] = -along(&m->winding, shape, k, i_A_s2) * c->bridge.inv_c_leg_1_F;
+        spread(&m->winding, shape, k, s->bend.leg_V_s[k], s->v_V_s2);
     }
     for (int p = 0; p < pairs(shape); p++) {
         s->flux_V_s2[p] = of_state(m, shape, p, s->v_V_s2[p] - both(m->R_s_ohm) * i_A_s2[p]);
@@ -234,9 +251,16 @@ INLINE void swing_bends(const circuit_t *c, shape_t shape, start_t *s)
 
 INLINE void begin(const circuit_t *c, shape_t shape, bool swings, start_t *s)
 {
-    rates_at(c, &c->field, c->now.x, shape, swings, &s->tied, s->rate, s->flux_V);
-    field_rates(&c->machine, c->now.rotor, s->rate[THETA_E], shape, &c->field, s->flux_V, s->core_V,
-                s->i_A_s);
+    for (int p = 0; p < pairs(shape); p++) {
+        s->flux[p] = c->field.flux[p];
+    }
+    for (int set = 0; set < shape.sets && shape.sets > 1; set++) {
+        s->core_Wb[set] = c->field.core_Wb[set];
+    }
+    s->omega_e = c->machine.pole_pairs * c->now.x[OMEGA_MECH];
+    no_drops(shape, &s->tied);
+    rates_at(c, &c->field, c->now.x, shape, swings, c->bridge.v_switch_V == 0.0, &s->tied, &s->rate);
+    field_rates(&c->machine, c->now.rotor, s->omega_e, shape, &c->field, s->rate.flux_V, s->core_V, s->i_A_s);
     bends_at(c, s->i_A_s, shape, swings, s);
     if (swings) {
         swing_bends(c, shape, s);

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The part of a link script that names the sections of all that a function reaches: code and constant tables.
 
-usage: hot_sections.py IMAGE.elf --root FUNCTION... --out hot.ld
+usage: hot_sections.py IMAGE.elf --root FUNCTION... [--without FUNCTION...] --out hot.ld
 
 The image has to be linked with --emit-relocs. What is reached through data that changes is not seen. Functions
 whose address is taken count as reached, text for people (string literals) does not.
@@ -14,11 +14,11 @@ sys.dont_write_bytecode = True
 from image_graph import Image  # noqa: E402
 
 
-def sections(image, roots):
+def sections(image, roots, without):
     """Patterns of input sections, each once."""
     low, high = image.symbols["port_flash"], image.symbols["port_store"]
     patterns = []
-    for item in image.reachable(roots):
+    for item in image.reachable(roots, without):
         if not low <= item.address < high:
             continue  # variables and registers
         for name in item.names:
@@ -33,9 +33,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("image", type=Path)
     parser.add_argument("--root", nargs="+", required=True)
+    parser.add_argument("--without", nargs="*", default=[], help="stay in flash, with what only they reach")
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
-    lines = sections(Image(options.image), options.root)
+    lines = sections(Image(options.image), options.root, options.without)
     options.out.write_text("".join(f"{line}\n" for line in lines))
 
 

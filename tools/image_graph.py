@@ -129,13 +129,13 @@ class Image:
                 return item
         raise SystemExit(f"{self.path.name}: no function {name}")
 
-    def reachable(self, names):
-        """Every item that these functions call, or refer to, at any depth."""
+    def reachable(self, names, without=()):
+        """Every item that these functions call, or refer to, at any depth, but for some and what only they reach."""
         todo = [self.function(name) for name in names]
         found = {}
         while todo:
             item = todo.pop()
-            if item.address not in found:
+            if item.address not in found and item.name.split(".")[0] not in without:
                 found[item.address] = item
                 todo.extend(self.items[address] for address in item.refers)
         return [found[address] for address in sorted(found)]

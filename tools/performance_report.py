@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Fills docs/performance.md, between `<!-- measured -->` and `<!-- end -->`, with what is measured now.
 
-The builds must be there: tools/performance_report makes them first.
+The builds must be there: tools/performance_report makes them first. --keep-speed leaves the speed of the emulation as it
+stands: on a machine that is not quiet.
 """
 import json
 import re
@@ -15,6 +16,7 @@ PAGE = ROOT / "docs/performance.md"
 PMSIM = ROOT / "out/build/host-release/tools/pmsim/pmsim"
 TARGET = ROOT / "out/build/stm32g431"
 IMAGE = TARGET / "pmdrive.elf"
+IMAGE_ALL = TARGET / "pmdrive_all.elf"
 SCENARIOS = ROOT / "tests/scenario"
 FAST = (SCENARIOS / "board/identity.yaml", "--set", "theta=0")  # at 20 kHz
 RUNS = 5
@@ -33,10 +35,10 @@ def count_step(folder):
                               "--", record]))["functions"]
 
 
-def run_board(folder, *words):
+def run_board(folder, *words, image=IMAGE):
     """Figures of a run on the emulated board."""
     figures = folder / "figures.json"
-    output([PMSIM, "board", IMAGE, *words, "--jobs", "1", "--quiet", "--figures", figures])
+    output([PMSIM, "board", image, *words, "--jobs", "1", "--quiet", "--figures", figures])
     return json.loads(figures.read_text())
 
 
@@ -46,15 +48,19 @@ def board_speed(*words):
     return max(run["simulated_s"] / run["wall_s"] for run in runs)
 
 
-def limits():
-    """What -> (bytes, bound) of the image."""
-    text = output([sys.executable, ROOT / "tests/target/image/limits.py", IMAGE])
+def limits(*words):
+    """What -> (bytes, bound) of an image."""
+    text = output([sys.executable, ROOT / "tests/target/image/limits.py", *words])
     return re.findall(r"(?m)^ok\s+(.+?): (\d+) of (\d+) bytes", text)
 
 
+# Number -> name of those that pmdrive.elf leaves out.
+OBSERVERS = {6: "`ekf_full`", 7: "`ekf_reduced`", 8: "`mras_current`", 9: "`mras_voltage`", 10: "`mras_simple`"}
+SPEEDS = ("speed of the emulation with plant and comparison, simulated s per wall s",
+          "the same for the demonstration, at 10 kHz")
 MODES_RUN = SCENARIOS / "board/modes.yaml"
 MODES = [("off", "off"), ("calibrate", "calibration"), ("pulses", "initial-position pulses"),
-         ("align", "alignment"), ("open_loop", "open-loop current"),
+         ("identify", "identification"), ("align", "alignment"), ("open_loop", "open-loop current"),
          ("injection", "injection"), ("blend", "injection and observer"), ("flux", "active flux"),
          ("weakening", "active flux, field weakening"), ("limited", "of these: at the voltage limit"),
          ("fault", "of these: a fault found"), ("swap", "of these: after a swap of parameters")]
@@ -65,6 +71,22 @@ def table(head, rows):
     return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
 
 
+def speeds(keep):
+    """Simulated seconds per wall second, fast and demonstration, as text: measured, or as the page has them."""
+    if keep:
+        page = PAGE.read_text()
+        return [re.search(rf"(?m)^\| {re.escape(what)} \| ([\d.]+)", page)[1] for what in SPEEDS]
+    return [f"{board_speed(*FAST):.1f}", f"{board_speed(SCENARIOS / 'demo.yaml'):.1f}"]
+
+
+def observer_rows(folder):
+    """Of pmdrive_all.elf, by optional observer."""
+    for number, name in OBSERVERS.items():
+        run = run_board(folder, SCENARIOS / "board/observers.yaml", "--set", f"observer={number}", image=IMAGE_ALL)
+        yield [name, *(f"{run[f'control.{key}']:.0f}" for key in ("flux.mean", "blend.mean", "worst")),
+               f"{run['control.worst_percent']:.1f} %", f"{run['load_percent']:.1f} %"]
+
+
 def main():
     with tempfile.TemporaryDirectory(prefix="pm_performance") as name:
         folder = Path(name)
@@ -73,7 +95,8 @@ def main():
         fast = run_board(folder, *FAST)
         modes = run_board(folder, MODES_RUN)
         busy = run_board(folder, MODES_RUN, "--busy")
-        slow_speed, speed = board_speed(SCENARIOS / "demo.yaml"), board_speed(*FAST)
+        optional = list(observer_rows(folder))
+        speed, slow_speed = speeds("--keep-speed" in sys.argv[1:])
 
     def mode(key):
         return [f"{demo[f'control.{key}.mean']:.0f}", f"{demo[f'control.{key}.worst']:.0f}",
@@ -104,9 +127,12 @@ def main():
                ["stack, measured", f"{max(demo['stack_bytes'], fast['stack_bytes']):.0f} bytes", "2048"],
                ["interrupts after which the drive's memory was the host's, bit for bit",
                 f"{demo['identical'] + fast['identical']:.0f} of as many", "all"],
-               ["speed of the emulation with plant and comparison, simulated s per wall s", f"{speed:.1f}", "4"],
-              ["the same for the demonstration, at 10 kHz", f"{slow_speed:.1f}", ""]]),
-        table(["image", "bytes", "budget"], [[what, size.strip(), bound.strip()] for what, size, bound in limits()]),
+               [SPEEDS[0], speed, "4"], [SPEEDS[1], slow_speed, ""]]),
+        table(["control interrupt of `pmdrive_all.elf`, 20 kHz", "observer, mean", "with injection, mean", "worst",
+               "of the period, worst", "processor load"], optional),
+        table(["image", "bytes", "budget", "with all observers"],
+              [[what, size, bound, all_size] for (what, size, bound), (_, all_size, _)
+               in zip(limits(IMAGE), limits(IMAGE_ALL, "--flash", "73728", "--without", "commissioning_step"))]),
     ]
     text, found = re.subn(r"(?s)(<!-- measured -->\n).*?(<!-- end -->)",
                           lambda m: m[1] + "\n" + "\n\n".join(parts) + "\n\n" + m[2], PAGE.read_text())

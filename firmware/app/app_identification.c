@@ -60,14 +60,6 @@ static int32_t in_row(const app_t *app, const result_row_t *row)
     return app_in_units(x, base_of(&app->drive.config, (base_t)row->base), row->exponent);
 }
 
-/* psi / i falls with the square of the current, L_q + (L_q_rated - L_q) (i / i_rated)^2, its tangent three
- * times as much; but saturation is steeper than that, and psi / i was measured with the i_d that lessens it:
- * four times. */
-static pm_q_t tangent(const commissioning_result_t *r, int32_t of_16)
-{
-    return r->L_q + (r->L_q_rated - r->L_q) / 4 * of_16;
-}
-
 bool app_identify_value(const app_t *app, uint16_t slot, int32_t *value)
 {
     const commissioning_report_t *report = &app->drive.commissioning_report;
@@ -92,10 +84,10 @@ bool app_identify_value(const app_t *app, uint16_t slot, int32_t *value)
         *value = report->reason;
         return true;
     case OD_LIVE_IDENTIFICATION_L_QH_RATED:
-        *value = app_in_units(tangent(r, 16), base_of(&app->drive.config, IN_HENRY), 9);
+        *value = app_in_units(commissioning_tangent(r, 16), base_of(&app->drive.config, IN_HENRY), 9);
         return true;
     case OD_LIVE_IDENTIFICATION_CROSS_HALF: {
-        const pm_num_t part = pm_num_ratio(r->L_dq_rated / 2, tangent(r, 4));
+        const pm_num_t part = pm_num_ratio(r->L_dq_rated / 2, commissioning_tangent(r, 4));
         (void)pm_num_to_fixed(pm_num_mul(part, pm_num(1000000)), 0, value);
         return true;
     }

@@ -208,8 +208,20 @@ bool app_save(hal_t *hal, const drive_params_t *params)
     return write_page(hal, &selection);
 }
 
+/* While flash is written it cannot be read: control comes late, and what is left of its period is too short
+ * for the slow interrupt. The bridge is off meanwhile. */
+static void rest_slow(app_t *app, bool rest)
+{
+    hal_lock(app->hal);
+    app->slow_at = app->periods + (rest ? 0U : app->slow_divider); /* the former does not come for days */
+    hal_unlock(app->hal);
+}
+
 bool app_store_group(app_t *app, uint32_t group, bool keep)
 {
     selection_t selection = {.app = app, .params = &app->params, .group = group, .keep = keep};
-    return write_page(app->hal, &selection);
+    rest_slow(app, true);
+    const bool done = write_page(app->hal, &selection);
+    rest_slow(app, false);
+    return done;
 }

@@ -89,8 +89,8 @@ static const signal_row_t signals[] = {
     {OD_LIVE_VELOCITY_ACTUAL, offsetof(drive_t, position.pll.omega), IN_SPEED_MECH},
     {OD_LIVE_VELOCITY_DEMAND, offsetof(drive_t, status.omega_ref), IN_SPEED_MECH},
     {OD_LIVE_DC_LINK_VOLTAGE, offsetof(drive_t, status.v_dc), IN_VOLTAGE},
-    {OD_LIVE_QUALITY, offsetof(drive_t, position.quality), IN_SHARE},
-    {OD_LIVE_WEIGHT, offsetof(drive_t, position.weight), IN_SHARE},
+    {OD_LIVE_QUALITY, offsetof(drive_t, status.quality), IN_SHARE},
+    {OD_LIVE_WEIGHT, offsetof(drive_t, status.weight), IN_SHARE},
 };
 
 static const signal_row_t *signal_of(uint16_t slot)

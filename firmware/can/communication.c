@@ -1,7 +1,6 @@
 /* Communication objects: which values make sense, and what follows from a new one. */
 #include "firmware/can/node_parts.h"
 
-#include <stddef.h>
 #include <string.h>
 
 #define COB_OFF      0x80000000U
@@ -76,15 +75,14 @@ static uint32_t check_map(const node_t *node, const od_entry_t *entry, uint32_t 
     const uint16_t map = entry->index;
     const uint16_t pdo = (uint16_t)(map - (uint16_t)OD_RPDO_MAP + (uint16_t)OD_RPDO);
     const bool in_use = (object_word(node, pdo, 1) & COB_OFF) == 0U;
-    const od_entry_t *mapped;
     if (in_use || (entry->sub > 0U && object_word(node, map, 0) != 0U)) {
         return SDO_UNSUPPORTED;
     }
     if (entry->sub > 0U) {
-        return value == 0U ? SDO_OK : pdo_mappable(value, receive, &mapped);
+        return value == 0U ? SDO_OK : pdo_mappable(value, receive);
     }
-    node_pdo_t trial;
-    return value > (uint32_t)NODE_MAPPED ? SDO_PDO_LENGTH : pdo_map(node, map, (uint8_t)value, &trial);
+    uint32_t length;
+    return value > (uint32_t)NODE_MAPPED ? SDO_PDO_LENGTH : pdo_length(node, map, value, &length);
 }
 
 /* Number of the PDO that an index belongs to, with its four ranges */
@@ -140,7 +138,7 @@ uint32_t communication_put(node_t *node, const od_entry_t *entry, uint32_t value
 {
     const uint32_t code = check(node, entry, value);
     if (code == SDO_OK) {
-        node->word[entry->slot] = value;
+        object_set_node_word(node, entry, value);
         follow(node, entry->index);
     }
     return code;
@@ -156,14 +154,14 @@ void node_recall(node_t *node, const od_entry_t *entry, int32_t value)
 {
     if (entry->kind == (uint8_t)OD_NODE && !(node->recalled && outlives_reset(entry))) {
         const uint32_t relative = (entry->flags & (uint32_t)OD_NODE_ID) != 0U ? node->id : 0U;
-        node->word[entry->slot] = (uint32_t)value + relative;
+        object_set_node_word(node, entry, (uint32_t)value + relative);
     }
 }
 
 int32_t node_stored(const node_t *node, const od_entry_t *entry)
 {
     const uint32_t relative = (entry->flags & (uint32_t)OD_NODE_ID) != 0U ? node->id : 0U;
-    return (int32_t)(node->word[entry->slot] - relative);
+    return (int32_t)(object_node_word(node, entry) - relative);
 }
 
 static void preset_words(node_t *node)

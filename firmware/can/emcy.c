@@ -1,8 +1,6 @@
 /* Errors: register, history and messages. */
 #include "firmware/can/node_parts.h"
 
-#include <stddef.h>
-
 #define COB_OFF 0x80000000U
 #define COB_ID  0x000007FFU
 
@@ -32,21 +30,15 @@ static uint8_t update_register(node_t *node)
     for (uint32_t source = 0; source < (uint32_t)NODE_ERRORS; source++) {
         bits |= node->error[source] != 0U ? bits_of(node->error[source]) : 0U;
     }
-    uint32_t *place = object_place(node, OD_ERROR_REGISTER, 0);
-    if (place != NULL) {
-        *place = bits;
-    }
+    node->word[OD_NODE_ERROR_REGISTER] = bits;
     return (uint8_t)bits;
 }
 
 /* The newest first; sub 0 counts. */
 static void remember(node_t *node, uint32_t code, uint32_t info)
 {
-    uint32_t *count = object_place(node, OD_ERROR_HISTORY, 0);
-    uint32_t *newest = object_place(node, OD_ERROR_HISTORY, 1);
-    if (count == NULL || newest == NULL) {
-        return;
-    }
+    uint32_t *count = &node->word[OD_NODE_ERROR_HISTORY_COUNT];
+    uint32_t *newest = &node->word[OD_NODE_ERROR_HISTORY_1];
     for (uint32_t n = (uint32_t)NODE_HISTORY - 1U; n > 0U; n--) {
         newest[n] = newest[n - 1U];
     }

@@ -1,6 +1,5 @@
 #include "firmware/can/node.h"
 
-#include <stddef.h>
 #include <string.h>
 
 #include "firmware/can/node_parts.h"
@@ -95,10 +94,7 @@ void node_init(node_t *node, void *context, uint32_t serial, uint32_t now_us)
     node->context = context;
     node->now_us = now_us;
     node_boot_up(node);
-    uint32_t *place = object_place(node, OD_IDENTITY, 4);
-    if (place != NULL) {
-        *place = serial;
-    }
+    node->word[OD_NODE_IDENTITY_SERIAL_NUMBER] = serial;
 }
 
 /* What takes the controls from the master's hands is an alarm while the application is on. */

@@ -64,8 +64,9 @@ static inline bool node_elapsed(const node_t *node, uint32_t since_us, uint32_t 
 /* object.c: entries of the dictionary with all checks; results are abort codes */
 uint32_t object_find(uint16_t index, uint8_t sub, const od_entry_t **entry);
 uint32_t object_word(const node_t *node, uint16_t index,
-                     uint8_t sub);                                 /* OD_NODE or constant; 0: there is none */
-uint32_t *object_place(node_t *node, uint16_t index, uint8_t sub); /* OD_NODE that must be there */
+                     uint8_t sub); /* OD_NODE or constant; 0: there is none */
+uint32_t object_node_word(const node_t *node, const od_entry_t *entry); /* OD_NODE */
+void object_set_node_word(node_t *node, const od_entry_t *entry, uint32_t value);
 int32_t object_preset(const node_t *node, const od_entry_t *entry);
 int32_t object_get(const node_t *node, const od_entry_t *entry); /* a number */
 uint32_t object_check_write(const node_t *node, const od_entry_t *entry);
@@ -86,8 +87,10 @@ void emcy_run(node_t *node);
 void emcy_forget(node_t *node); /* what waits to be told */
 
 /* pdo.c, pdo_transmit.c */
-uint32_t pdo_map(const node_t *node, uint16_t map_index, uint8_t count, node_pdo_t *pdo);
-uint32_t pdo_mappable(uint32_t mapping, bool receive, const od_entry_t **entry);
+uint32_t pdo_mappable(uint32_t mapping, bool receive);
+uint32_t pdo_length(const node_t *node, uint16_t map_index, uint32_t count,
+                    uint32_t *length); /* of its first objects */
+const od_entry_t *pdo_object(const node_t *node, const node_pdo_t *pdo, uint32_t n); /* mapped in place n */
 void pdo_setup(node_t *node, bool receive, uint32_t number);
 void pdo_start(node_t *node); /* OPERATIONAL is entered */
 void pdo_receive(node_t *node, const node_frame_t *frame);

@@ -11,12 +11,11 @@ enum { NODE_RING = 8, NODE_PDOS = 4, NODE_MAPPED = 8, NODE_CONSUMERS = 2, NODE_H
 typedef struct {
     uint16_t id; /* 0: off */
     uint8_t type;
-    uint8_t count, length;     /* mapped objects, bytes */
-    uint8_t syncs;             /* since the last transmission */
-    bool waiting;              /* RPDO: for SYNC; TPDO: an event has come */
-    bool timed;                /* RPDO: its time-out runs; TPDO: one has been sent */
-    uint16_t row[NODE_MAPPED]; /* of od_table */
-    uint8_t data[8];           /* RPDO: received; TPDO: sent last */
+    uint8_t count, length; /* mapped objects, bytes */
+    uint8_t syncs;         /* since the last transmission */
+    bool waiting;          /* RPDO: for SYNC; TPDO: an event has come */
+    bool timed;            /* RPDO: its time-out runs; TPDO: one has been sent */
+    uint8_t data[8];       /* RPDO: received; TPDO: sent last */
     uint32_t event_us, inhibit_us, last_us;
 } node_pdo_t;
 
@@ -73,7 +72,8 @@ struct node {
     uint8_t id;    /* in use; 255: none */
     bool recalled; /* the words of node id and bit rate have been given */
     uint32_t now_us;
-    uint32_t word[OD_NODE_COUNT];
+    uint32_t word[OD_NODE_WORDS];
+    uint16_t mapped[OD_NODE_MAPPINGS]; /* rows of od_table, PDO after PDO as in `pdo`; 0: none */
 
     node_frame_t ring[NODE_RING];
     uint8_t ring_first, ring_count;
@@ -91,8 +91,8 @@ struct node {
     node_bus_t bus;
 
     uint16_t sync_id;
-    uint32_t scan_us; /* TPDOs were looked at */
-    node_pdo_t rpdo[NODE_PDOS], tpdo[NODE_PDOS];
+    uint32_t scan_us;              /* TPDOs were looked at */
+    node_pdo_t pdo[2 * NODE_PDOS]; /* received, then transmitted */
     node_sdo_t sdo;
     node_lss_t lss;
 };

@@ -40,11 +40,28 @@ int32_t object_preset(const node_t *node, const od_entry_t *entry)
     return (int32_t)((uint32_t)od_values_of(entry)->preset + relative);
 }
 
-uint32_t *object_place(node_t *node, uint16_t index, uint8_t sub)
+/* A place of a PDO is shown as index, sub-index and bits of the object there. */
+uint32_t object_node_word(const node_t *node, const od_entry_t *entry)
 {
-    bool has_index;
-    const od_entry_t *entry = od_find(index, sub, &has_index);
-    return (entry != NULL && entry->kind == (uint8_t)OD_NODE) ? &node->word[entry->slot] : NULL;
+    if (entry->slot < (uint32_t)OD_NODE_WORDS) {
+        return node->word[entry->slot];
+    }
+    const od_entry_t *mapped = &od_table[node->mapped[entry->slot - (uint32_t)OD_NODE_WORDS]];
+    const uint32_t shown =
+        ((uint32_t)mapped->index << 16) | ((uint32_t)mapped->sub << 8) | (8U * od_size(mapped));
+    return mapped == od_table ? 0U : shown;
+}
+
+void object_set_node_word(node_t *node, const od_entry_t *entry, uint32_t value)
+{
+    if (entry->slot < (uint32_t)OD_NODE_WORDS) {
+        node->word[entry->slot] = value;
+    } else {
+        const od_entry_t *mapped;
+        const bool found =
+            object_find((uint16_t)(value >> 16), (uint8_t)((value >> 8) & 0xFFU), &mapped) == SDO_OK;
+        node->mapped[entry->slot - (uint32_t)OD_NODE_WORDS] = found ? (uint16_t)(mapped - od_table) : 0U;
+    }
 }
 
 uint32_t object_word(const node_t *node, uint16_t index, uint8_t sub)
@@ -54,14 +71,15 @@ uint32_t object_word(const node_t *node, uint16_t index, uint8_t sub)
     if (entry == NULL) {
         return 0;
     }
-    return entry->kind == (uint8_t)OD_NODE ? node->word[entry->slot] : (uint32_t)object_preset(node, entry);
+    return entry->kind == (uint8_t)OD_NODE ? object_node_word(node, entry)
+                                           : (uint32_t)object_preset(node, entry);
 }
 
 int32_t object_get(const node_t *node, const od_entry_t *entry)
 {
     switch ((od_kind_t)entry->kind) {
     case OD_NODE:
-        return (int32_t)node->word[entry->slot];
+        return (int32_t)object_node_word(node, entry);
     case OD_PARAMETER:
     case OD_LIVE:
         return node_host_get(node->context, entry);

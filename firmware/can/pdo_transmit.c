@@ -11,7 +11,7 @@ static void collect(node_t *node, const node_pdo_t *pdo, uint8_t data[8])
     uint32_t at = 0;
     (void)memset(data, 0, 8);
     for (uint32_t n = 0; n < pdo->count; n++) {
-        const od_entry_t *entry = &od_table[pdo->row[n]];
+        const od_entry_t *entry = pdo_object(node, pdo, n);
         const uint32_t size = od_size(entry);
         le_put(&data[at], size, (uint32_t)object_get(node, entry));
         at += size;
@@ -40,7 +40,7 @@ static bool changed(node_t *node, const node_pdo_t *pdo)
 void pdo_transmit_sync(node_t *node)
 {
     for (uint32_t n = 0; n < (uint32_t)NODE_PDOS; n++) {
-        node_pdo_t *pdo = &node->tpdo[n];
+        node_pdo_t *pdo = &node->pdo[(uint32_t)NODE_PDOS + n];
         if (pdo->id == 0U || pdo->type >= TYPE_EVENT) {
             continue;
         }
@@ -58,7 +58,7 @@ void pdo_transmit_run(node_t *node)
         node->scan_us = node->now_us;
     }
     for (uint32_t n = 0; n < (uint32_t)NODE_PDOS; n++) {
-        node_pdo_t *pdo = &node->tpdo[n];
+        node_pdo_t *pdo = &node->pdo[(uint32_t)NODE_PDOS + n];
         if (pdo->id == 0U || (pdo->type > 0U && pdo->type < TYPE_EVENT)) {
             continue;
         }

@@ -34,14 +34,31 @@ static uint32_t length_of(const trace_t *trace)
     return trace->count == 0U ? 0U : trace->size / trace->count;
 }
 
-/* Level in the unit of the signal to raw: a value beyond what can be kept is never crossed. */
+static uint32_t size_of(int32_t x)
+{
+    return x < 0 ? 0U - (uint32_t)x : (uint32_t)x;
+}
+
+/* Level in the unit of the signal to raw, bit by bit: a value beyond what can be kept is never crossed. */
 static int32_t raw_level(const trace_t *trace, const trace_signal_t *signal)
 {
-    const int64_t raw = ((int64_t)trace->set_level * 32768) / (signal->scale == 0 ? 1 : signal->scale);
-    if (raw > 32767) {
-        return 32768;
+    const uint32_t scale = signal->scale == 0 ? 1U : size_of(signal->scale);
+    const bool positive = (trace->set_level < 0) == (signal->scale < 0);
+    const uint32_t level = size_of(trace->set_level);
+    if (level / scale > 1U) {
+        return positive ? 32768 : -32769;
     }
-    return raw < -32768 ? -32769 : (int32_t)raw;
+    uint32_t raw = level / scale;
+    uint32_t rest = level % scale;
+    for (uint32_t n = 0; n < 15U; n++) {
+        rest *= 2U;
+        raw = 2U * raw + (rest >= scale ? 1U : 0U);
+        rest -= rest >= scale ? scale : 0U;
+    }
+    if (positive) {
+        return raw > 32767U ? 32768 : (int32_t)raw;
+    }
+    return raw > 32768U ? -32769 : -(int32_t)raw;
 }
 
 static uint32_t set_trigger(trace_t *trace)

@@ -17,6 +17,25 @@ static void make_base(maker_t *m)
     m->inductance = pm_num_div(b->psi, b->i);
 }
 
+/* A rotor swings about the current vector like a pendulum, w^2 = 3/2 p^2 psi i / J. The vector yields by k
+ * times what the rotor's speed has above a low-pass at SWING_CORNER w, so that J need not be known well:
+ * damping ratio k / (2 SWING_CORNER). */
+#define SWING_CORNER 3
+
+static void make_damping(maker_t *m, open_loop_config_t *c)
+{
+    const pm_num_t psi = si(m, DRIVE_PARAM_psi_m);
+    const pm_num_t stiffness =
+        mul3(pm_num_mul(pm_num_ratio(3, 2), square(pole_pairs(m))), psi, si(m, DRIVE_PARAM_i_open_loop));
+    const pm_num_t swing = pm_num_sqrt(pm_num_div(stiffness, si(m, DRIVE_PARAM_J)));
+    const pm_num_t emf = pm_num_div(pm_num_mul(swing, psi), m->base.v);
+    const pm_num_t corner = mul3(pm_num(SWING_CORNER), swing, m->t_slow);
+    const pm_num_t k = pm_num_mul(pm_num(2 * SWING_CORNER), si(m, DRIVE_PARAM_open_loop_damping));
+    c->k_swing = fixed(m, least(corner, pm_num_ratio(2, 5)), FRAC_BITS, DRIVE_PARAM_J);
+    c->v_swing = fixed(m, least(emf, pm_num(1)), Q_BITS, DRIVE_PARAM_J);
+    c->per_swing = fixed(m, pm_num_mul(k, pm_num_div(m->base.psi, psi)), SMALL_BITS, DRIVE_PARAM_psi_m);
+}
+
 static void make_open_loop(maker_t *m, open_loop_config_t *c)
 {
     const pm_num_t slope = pm_num_mul(si(m, DRIVE_PARAM_open_loop_acceleration), pole_pairs(m));
@@ -24,6 +43,7 @@ static void make_open_loop(maker_t *m, open_loop_config_t *c)
     c->i_slope = c->i / 50 + 1;
     c->slope = fixed(m, pm_num_div(pm_num_mul(slope, m->t_slow), m->base.omega), Q_BITS,
                      DRIVE_PARAM_open_loop_acceleration);
+    make_damping(m, c);
     c->align_ms = (uint16_t)m->params->t_align;
     c->sweep = PM_TURN(0.5) / (uint32_t)m->params->t_align;
 }
@@ -121,7 +141,8 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     make_modulator(&m, &config->modulator);
     make_current(&m, &config->current);
     make_speed(&m, &config->speed);
-    make_mtpa(&m, &config->mtpa);
+    make_mtpa(&m, &m.mtpa);
+    config->mtpa = m.mtpa;
     make_flux_weakening(&m, &config->field_weakening);
     make_position(&m, &config->position, config->injection);
     make_speed_estimate(&m, &config->speed_estimate);

@@ -41,9 +41,12 @@ typedef struct {
 
 /* Align and open-loop start, current mode. */
 typedef struct {
-    pm_q_t i;       /* current amplitude */
-    pm_q_t i_slope; /* per ms */
-    pm_q_t slope;   /* of the speed, per ms */
+    pm_q_t i;          /* current amplitude */
+    pm_q_t i_slope;    /* per ms */
+    pm_q_t slope;      /* of the speed, per ms */
+    pm_frac_t k_swing; /* low-pass that knows swinging from steady turning, at 1 kHz */
+    pm_q_t v_swing;    /* largest EMF of swinging that is damped */
+    int32_t per_swing; /* speed against such an EMF; pm_small_gain */
     uint16_t align_ms;
     pm_angle_t sweep; /* of the vector per ms while aligning: a quarter turn in half the time */
 } open_loop_config_t;

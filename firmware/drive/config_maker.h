@@ -19,6 +19,7 @@ typedef struct {
     pm_num_t impedance, inductance; /* bases */
     uint32_t slow_divider;          /* periods per slow step: the nearest to 1 ms ... */
     pm_num_t t_slow;                /* ... and what that is, s */
+    mtpa_config_t mtpa;             /* already made */
     drive_result_t result;
 } maker_t;
 

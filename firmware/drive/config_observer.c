@@ -1,20 +1,41 @@
 /* Configuration of the fundamental-model observers: what they share, flux, EMF and sliding mode. */
 #include "firmware/drive/config_maker.h"
+#include "firmware/math/root.h"
+
+static pm_q_t quotient(maker_t *m, pm_q_t x, pm_q_t y, drive_param_id_t blame)
+{
+    const pm_q_t q = pm_div(x, y);
+    if (pm_abs(q) > PM_Q(7.9)) {
+        refuse(m, blame, "does not fit the fixed-point format with these bases");
+    }
+    return q;
+}
+
+/* L_q_rated belongs to i_d of maximum torque per ampere, L_qd_weak and _strong to -+ half rated. */
+static void make_saturation(maker_t *m, observer_model_t *c)
+{
+    const pm_q_t i_rated = per_unit(m, DRIVE_PARAM_i_rated, m->base.i);
+    const pm_q_t square = pm_mul(i_rated, i_rated);
+    const pm_q_t weak = per_unit(m, DRIVE_PARAM_L_qd_weak, m->inductance);
+    const pm_q_t strong = per_unit(m, DRIVE_PARAM_L_qd_strong, m->inductance);
+    c->L_qd = quotient(m, pm_half(weak) + pm_half(strong), i_rated, DRIVE_PARAM_L_qd_weak);
+    c->L_qd2 = quotient(m, pm_sub_sat(strong, weak), square, DRIVE_PARAM_L_qd_strong);
+    const pm_q_t rated = per_unit(m, DRIVE_PARAM_L_q_rated, m->inductance);
+    const pm_dq_t i = {.d = mtpa_i_d(&m->mtpa, i_rated), .q = 0};
+    c->L_q2 = quotient(m, pm_sub_sat(rated, observer_L_q(c, i)), square, DRIVE_PARAM_L_q_rated);
+}
 
 void make_model(maker_t *m, observer_model_t *c)
 {
     const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
-    const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
-    const pm_num_t change = pm_num_sub(si(m, DRIVE_PARAM_L_q_rated), si(m, DRIVE_PARAM_L_q));
     c->R = per_unit(m, DRIVE_PARAM_R_s, m->impedance);
     c->L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
     c->L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);
     /* observers hold it in Q29 */
     (void)fixed(m, pm_num_div(si(m, DRIVE_PARAM_L_q), m->inductance), Q_BITS + 1, DRIVE_PARAM_L_q);
-    c->L_q2 = 0;
+    c->L_q2 = c->L_qd = c->L_qd2 = 0;
     if (m->params->saturation_comp != 0) {
-        c->L_q2 = fixed(m, pm_num_div(pm_num_div(change, m->inductance), square(i_rated)), Q_BITS,
-                        DRIVE_PARAM_L_q_rated);
+        make_saturation(m, c);
     }
     c->psi_m = per_unit(m, DRIVE_PARAM_psi_m, m->base.psi);
     c->t_s = fixed(m, step, FRAC_BITS, DRIVE_PARAM_f_pwm);
@@ -25,16 +46,16 @@ void make_model(maker_t *m, observer_model_t *c)
 
 /* R follows in 8 ms at rated current. */
 #define FOLLOW pm_num_ratio(1, 8)
+/* In the EMF stands the loop's speed, whose wobble R must not follow: 64 ms. */
+#define FOLLOW_EMF pm_num_ratio(1, 64)
 
-static void make_resistance(maker_t *m, const observer_model_t *model, observer_resistance_t *c, pm_num_t k)
+static void make_resistance(maker_t *m, observer_resistance_t *c, pm_num_t k)
 {
     c->k = 0;
     if (m->params->resistance_adaptation != 0) {
         c->k = fixed(m, k, GAIN_BITS, DRIVE_PARAM_i_rated);
     }
     c->omega = speed(m, DRIVE_PARAM_speed_low) / 2;
-    c->min = model->R / 2;
-    c->max = model->R < PM_Q(4.0) ? model->R * 2 : PM_Q(7.9);
 }
 
 void make_active_flux(maker_t *m, active_flux_config_t *c)
@@ -42,10 +63,9 @@ void make_active_flux(maker_t *m, active_flux_config_t *c)
     const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
     const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
     make_model(m, &c->model);
-    make_resistance(m, &c->model, &c->resistance,
+    make_resistance(m, &c->resistance,
                     pm_num_div(pm_num_mul(FOLLOW, TIE), pm_num_mul(m->base.omega, square(i_rated))));
     c->g = fixed(m, pm_num_mul(si(m, DRIVE_PARAM_flux_gain), step), FRAC_BITS, DRIVE_PARAM_flux_gain);
-    c->k_adapt = PM_FRAC(0.01);
     c->k_seed = fixed(m, pm_num_mul(TIE, m->base.t_s), FRAC_BITS, DRIVE_PARAM_f_pwm);
 }
 
@@ -56,7 +76,6 @@ static void make_emf_filter(maker_t *m, emf_config_t *c)
     const pm_num_t k = pm_num_div(w, pm_num_add(pm_num(1), w));
     c->k_filter = gain(m, k, FRAC_BITS, DRIVE_PARAM_emf_bandwidth);
     c->lag = fixed(m, pm_num_div(pm_num_sub(pm_num(2), k), k), GAIN_BITS, DRIVE_PARAM_emf_bandwidth);
-    c->k_adapt = PM_FRAC(0.01);
 }
 
 /* Of a period, of a slow step, of the loop: 2 zeta / w_n. */
@@ -76,7 +95,7 @@ static void make_emf(maker_t *m, emf_config_t *c)
 {
     const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
     make_model(m, &c->model);
-    make_resistance(m, &c->model, &c->resistance, pm_num_div(FOLLOW, square(i_rated)));
+    make_resistance(m, &c->resistance, pm_num_div(FOLLOW_EMF, square(i_rated)));
     make_emf_filter(m, c);
     make_emf_rates(m, c);
     c->omega_min = speed(m, DRIVE_PARAM_speed_low) / 2;

@@ -13,7 +13,7 @@
 /* The modulator's smallest link voltage; below v_dc_min, which is larger, the bridge is off. */
 #define V_DC_LEAST PM_Q(0.0625)
 
-drive_result_t drive_init(drive_t *drive, const drive_params_t *params)
+PM_RARE drive_result_t drive_init(drive_t *drive, const drive_params_t *params)
 {
     *drive = (drive_t){.state = DRIVE_OFF, .stage = STAGE_OFF};
     const drive_result_t result = drive_configure(&drive->config, params);
@@ -37,10 +37,11 @@ bool drive_same_frame(const drive_config_t *a, const drive_config_t *b)
            a->injection == b->injection && a->align_first == b->align_first;
 }
 
-void drive_reconfigure(drive_t *drive, const drive_config_t *config)
+PM_RARE void drive_reconfigure(drive_t *drive, const drive_config_t *config)
 {
     const observer_id_t before = drive->config.position.observer.id;
     drive->config = *config;
+    drive->taken = false;
     const position_config_t *position = &drive->config.position;
     if (position->observer.id != before && drive->stage >= STAGE_OPEN_LOOP) {
         position_change_observer(&drive->position, position, drive->i_ab, drive->status.i);
@@ -52,9 +53,14 @@ void drive_reconfigure(drive_t *drive, const drive_config_t *config)
     }
 }
 
-void drive_command(drive_t *drive, const drive_command_t *command)
+PM_RARE void drive_command(drive_t *drive, const drive_command_t *command)
 {
     const drive_mode_t mode = drive->state == DRIVE_OFF ? command->mode : drive->command.mode;
+    const drive_command_t *last = &drive->command;
+    const bool same_references = command->speed_mrad_s == last->speed_mrad_s &&
+                                 command->torque_uNm == last->torque_uNm &&
+                                 command->current_mA == last->current_mA;
+    drive->taken = drive->taken && same_references;
     drive->command = *command;
     drive->command.mode = mode;
     if (!command->enable && drive->stage == STAGE_IDENTIFY) {
@@ -88,7 +94,7 @@ const drive_fault_record_t *drive_fault_record(const drive_t *drive)
 
 static inline void measure(drive_t *drive, const drive_in_t *in)
 {
-    const pm_q_t *zero = drive->calibration.zero;
+    const pm_q_t *zero = drive->zero;
     const pm_pair_t zero_ab = pm_pair(&zero[0], &zero[1]);
     const pm_abc_t i = {
         .a = pm_shl(in->i_leg[0], CURRENT_BITS) - zero_ab.first,
@@ -100,8 +106,9 @@ static inline void measure(drive_t *drive, const drive_in_t *in)
     drive->status.v_dc = pm_shl(in->v_dc, VOLTAGE_BITS);
 }
 
-static void calibrate(calibration_t *self, const drive_in_t *in)
+static void calibrate(drive_t *drive, const drive_in_t *in)
 {
+    calibration_t *self = &drive->start.calibration;
     if (self->count >= DRIVE_OFFSET_PERIODS) {
         return;
     }
@@ -111,7 +118,7 @@ static void calibrate(calibration_t *self, const drive_in_t *in)
     self->count++;
     if (self->count == DRIVE_OFFSET_PERIODS) {
         for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-            self->zero[x] = pm_shl(self->sum[x], CURRENT_BITS - DRIVE_OFFSET_BITS);
+            drive->zero[x] = pm_shl(self->sum[x], CURRENT_BITS - DRIVE_OFFSET_BITS);
         }
     }
 }
@@ -120,7 +127,8 @@ static void pulses(drive_t *drive, drive_out_t *out)
 {
     initial_pulses_out_t p = {.driven = false};
     if (drive->pulses_state == PM_RUNNING) {
-        drive->pulses_state = initial_pulses_step(&drive->pulses, &drive->config.pulses, drive->i_ab, &p);
+        drive->pulses_state =
+            initial_pulses_step(&drive->start.pulses, &drive->config.pulses, drive->i_ab, &p);
     }
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
         const int32_t on = pm_mulh(p.duty[x], pm_shl(drive->config.modulator.counts, 32 - PM_Q_BITS));
@@ -137,30 +145,37 @@ static void off(drive_out_t *out)
     }
 }
 
-/* A period without current control: a fault, the bridge off, calibration, pulses. */
+/* A period without control: a fault, the bridge off, calibration, pulses. */
 PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_out_t *out)
 {
     drive->hw_fault = in->hw_fault;
     protection_step(drive);
-    const pm_ab_t v_past = drive->v_acting;
     drive->v_acting = drive->v_next;
     drive->v_next = (pm_ab_t){0, 0};
     drive->status.theta = drive->position.pll.theta;
     out->trip = drive->fault != DRIVE_FAULT_NONE;
     if (drive->stage == STAGE_PULSES) {
         pulses(drive, out);
-    } else if (drive->stage == STAGE_IDENTIFY) {
-        commissioning_step(drive, v_past, out);
     } else {
         off(out);
         if (drive->stage == STAGE_CALIBRATE) {
-            calibrate(&drive->calibration, in);
+            calibrate(drive, in);
         }
     }
 }
 
+/* Nothing estimates the position: an identification, or no control at all. */
+PM_RARE static void without_position(drive_t *drive, const drive_in_t *in, drive_out_t *out)
+{
+    if (drive->stage == STAGE_IDENTIFY && !in->hw_fault && protection_passed(drive)) {
+        commissioning_step(drive, out);
+    } else {
+        without_control(drive, in, out);
+    }
+}
+
 /* Open loop at a speed where the observer has an angle of its own. */
-static inline position_out_t imposed(const drive_t *drive)
+static inline position_out_t imposed_frame(const drive_t *drive)
 {
     const pm_dir_t dir = pm_dir(drive->theta_open);
     return (position_out_t){.dir = dir, .i = pm_park(drive->i_ab, dir), .omega = drive->omega_open};
@@ -213,7 +228,7 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
     drive->period++;
     measure(drive, in);
     if (drive->stage < STAGE_OPEN_LOOP || in->hw_fault || !protection_passed(drive)) {
-        without_control(drive, in, out);
+        without_position(drive, in, out);
     } else {
         const pm_ab_t v = pm_pair_ab(&drive->v_acting);
         const pm_ab_t next = pm_pair_ab(&drive->v_next);
@@ -228,22 +243,23 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
         if (drive->stage != STAGE_VECTOR) {
             drive->theta_open += (pm_angle_t)drive->turn_open;
             if (!drive->led) {
-                frame = imposed(drive);
+                frame = imposed_frame(drive);
             }
         }
         control(drive, &frame, out);
     }
 }
 
-void drive_prepare(drive_t *drive)
+PM_RARE void drive_prepare(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
     const bool open = drive->stage == STAGE_OPEN_LOOP;
     const pm_q_t v_dc = drive->status.v_dc;
-    const pm_q_t omega = open ? drive->omega_open : drive->position.pll.omega;
+    const bool imposed = open || drive->stage == STAGE_IDENTIFY;
+    const pm_q_t omega = imposed ? drive->omega_open : drive->position.pll.omega;
     const int32_t turn = pm_omega_to_angle(omega, c->k_theta);
     /* at low speed the observer would drift on an imposed angle */
-    drive->led = open && pm_abs(omega) < c->position.omega_low;
+    drive->led = open && pm_abs(drive->omega_ramp) < c->position.omega_low;
     if (drive->led) {
         const pm_pll_t along = {.theta = drive->theta_open, .omega = omega};
         position_lead(&drive->position, &c->position, &along);

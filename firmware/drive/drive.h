@@ -77,7 +77,8 @@ enum {
     DRIVE_LIMIT_SPEED = 1 << 4,       /* reference clamped to speed_max */
 };
 
-/* A snapshot for traces, CAN and tests; per-unit values as in config.h. */
+/* A snapshot for traces, CAN and tests; per-unit values as in config.h. While there is no current control,
+ * the bridge off, say, position, speed, currents and quality are zero. */
 typedef struct {
     drive_state_t state;
     drive_fault_t fault;

@@ -48,8 +48,7 @@ void open_loop_resume(drive_t *drive);
 /* commissioning/commissioning.c: identification. Started after the calibration, with the bridge still off. */
 void commissioning_start(drive_t *drive);
 void commissioning_slow(drive_t *drive);
-void commissioning_abort(drive_t *drive); /* it has not come to its end */
-/* commissioning/bridge.c: one period; v_past acted over the one that has just ended. */
-void commissioning_step(drive_t *drive, pm_ab_t v_past, drive_out_t *out);
+void commissioning_abort(drive_t *drive);                  /* it has not come to its end */
+void commissioning_step(drive_t *drive, drive_out_t *out); /* bridge.c: one period */
 
 #endif

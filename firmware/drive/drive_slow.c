@@ -20,14 +20,14 @@ static void switch_off(drive_t *drive)
 
 static void begin_calibration(drive_t *drive)
 {
-    drive->calibration = (calibration_t){0};
+    drive->start.calibration = (calibration_t){0};
     enter(drive, DRIVE_CALIBRATING, STAGE_CALIBRATE);
 }
 
 static void begin_finding(drive_t *drive)
 {
     const bool pulses = !drive->config.align_first && drive->command.mode != DRIVE_MODE_CURRENT;
-    initial_pulses_reset(&drive->pulses);
+    initial_pulses_reset(&drive->start.pulses);
     drive->pulses_state = PM_RUNNING;
     drive->stall_ms = 0;
     drive->lost_ms = 0;
@@ -42,12 +42,11 @@ static void begin_finding(drive_t *drive)
 
 static void finish_calibration(drive_t *drive)
 {
-    const calibration_t *c = &drive->calibration;
-    if (c->count < DRIVE_OFFSET_PERIODS) {
+    if (drive->start.calibration.count < DRIVE_OFFSET_PERIODS) {
         return;
     }
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-        if (pm_abs(c->zero[x] - PM_ONE) > pm_shl(drive->config.protection.offset_max, PM_Q_BITS - 15)) {
+        if (pm_abs(drive->zero[x] - PM_ONE) > pm_shl(drive->config.protection.offset_max, PM_Q_BITS - 15)) {
             drive_trip(drive, DRIVE_FAULT_SENSOR_OFFSET);
             return;
         }
@@ -74,7 +73,7 @@ static void begin_injection(drive_t *drive, pm_angle_t theta)
 static void finish_pulses(drive_t *drive)
 {
     if (drive->pulses_state == PM_DONE) {
-        begin_injection(drive, drive->pulses.theta);
+        begin_injection(drive, drive->start.pulses.theta);
     } else if (drive->pulses_state != PM_RUNNING) {
         drive_trip(drive, DRIVE_FAULT_POSITION_NOT_FOUND);
     }
@@ -141,7 +140,7 @@ static void run(drive_t *drive)
 static void stop(drive_t *drive)
 {
     run(drive);
-    const pm_q_t omega = drive->stage == STAGE_OPEN_LOOP ? drive->omega_open : drive->position.pll.omega;
+    const pm_q_t omega = drive->stage == STAGE_OPEN_LOOP ? drive->omega_ramp : drive->position.pll.omega;
     const bool ended = drive->stage == STAGE_OPEN_LOOP || drive->speed.reference == 0;
     const bool still = ended && pm_abs(omega) < drive->config.protection.omega_stall;
     drive->still_ms = still ? (uint16_t)(drive->still_ms + 1U) : 0U;
@@ -198,17 +197,36 @@ static void move(drive_t *drive)
     }
 }
 
+/* Of a rotor that turns without current control nothing is known. */
+static void report_nothing(drive_t *drive)
+{
+    drive_status_t *s = &drive->status;
+    if (drive->stage != STAGE_IDENTIFY) { /* which has currents of its own */
+        drive->i_ref = (pm_dq_t){0, 0};
+        s->i = (pm_dq_t){0, 0};
+    }
+    drive->position.pll = (pm_pll_t){.theta = 0}; /* the step copies the angle from there */
+    s->omega = 0;
+    s->omega_ref = 0;
+    s->weight = 0;
+    s->quality = 0;
+}
+
 static void report(drive_t *drive)
 {
     drive_status_t *s = &drive->status;
     s->state = drive->fault == DRIVE_FAULT_NONE ? drive->state : DRIVE_FAULT;
     s->fault = drive->fault;
-    s->omega = drive->position.pll.omega;
-    s->omega_ref = drive->stage == STAGE_OPEN_LOOP ? drive->omega_open : drive->speed.reference;
+    if (drive->stage < STAGE_OPEN_LOOP) {
+        report_nothing(drive);
+    } else {
+        s->omega = drive->position.pll.omega;
+        s->omega_ref = drive->stage == STAGE_OPEN_LOOP ? drive->omega_ramp : drive->speed.reference;
+        s->weight = drive->position.weight;
+        s->quality = drive->position.quality;
+    }
     s->i_ref = drive->i_ref;
     s->v = drive->v_next;
-    s->weight = drive->position.weight;
-    s->quality = drive->position.quality;
 }
 
 void drive_slow(drive_t *drive, const drive_slow_in_t *in)
@@ -218,8 +236,9 @@ void drive_slow(drive_t *drive, const drive_slow_in_t *in)
     drive->current.limited = false;
     drive->modulator.limited = false;
     if (drive->fault == DRIVE_FAULT_NONE) {
-        if (drive->stage != STAGE_IDENTIFY) { /* which goes on with what it began with */
+        if (!drive->taken && drive->stage != STAGE_IDENTIFY) { /* which goes on with what it began with */
             reference_take(drive);
+            drive->taken = true;
         }
         drive->state_ms = (uint16_t)(drive->state_ms + (drive->state_ms < UINT16_MAX ? 1U : 0U));
         move(drive);

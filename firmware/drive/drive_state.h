@@ -20,7 +20,6 @@ typedef enum {
 
 /* Offsets of the current channels: means of so many periods. */
 typedef struct {
-    pm_q_t zero[DRIVE_LEGS]; /* code at zero current, one being full scale */
     int32_t sum[DRIVE_LEGS];
     uint16_t count; /* periods taken */
 } calibration_t;
@@ -34,12 +33,13 @@ struct drive {
     drive_stage_t stage;
     uint32_t period;
 
-    calibration_t calibration;
+    pm_q_t zero[DRIVE_LEGS]; /* code of the current channels at zero current, one being full scale */
     pm_abc_t i_abc;
     pm_ab_t i_ab;
     bool hw_fault;
     bool carrier;      /* injection is on */
     bool led;          /* open loop: the observer is led along */
+    bool taken;        /* the command's references are in per-unit */
     pm_dir_t ahead;    /* one and a half periods of rotation: from the sample to where the voltage acts */
     pm_unit_t v_share; /* share of v_dc for current control */
     pm_dq_t u;         /* voltage of the current control, without carrier; Q22 */
@@ -47,10 +47,17 @@ struct drive {
     pm_ab_t v_next;    /* commanded at k: acts over [k+1, k+2) */
     modulator_t modulator;
 
-    union { /* while it identifies, nothing estimates the position */
+    union { /* as long as nothing estimates the position, what comes before; its loop stays as it was */
         position_t position;
         struct {
-            pm_pll_t pll; /* of position: stays */
+            pm_pll_t pll;
+            union {
+                calibration_t calibration;
+                initial_pulses_t pulses;
+            };
+        } start;
+        struct {
+            pm_pll_t pll;
             commissioning_t work;
         } identify;
     };
@@ -61,11 +68,13 @@ struct drive {
 
     pm_dq_t i_ref;
     pm_angle_t theta_open; /* open loop: angle of the current vector */
-    pm_q_t omega_open;
-    int32_t turn_open; /* of that speed in a period */
+    pm_q_t omega_ramp;     /* open loop: speed that is wanted, and ... */
+    pm_q_t omega_open;     /* ... that of the vector, which yields to a swinging rotor */
+    pm_q_t emf_open;       /* mean EMF beside that of the ramp */
+    int32_t turn_open;     /* of that speed in a period */
     pm_q_t i_open;
 
-    /* references in per-unit, made from the command once */
+    /* references in per-unit, made from the command when it is another */
     pm_q_t omega_target;
     pm_q_t torque_target;
     pm_q_t i_target;
@@ -80,7 +89,6 @@ struct drive {
     drive_command_t command;
     drive_fault_record_t record;
     commissioning_report_t commissioning_report;
-    initial_pulses_t pulses;
     speed_t speed_estimate;
 };
 

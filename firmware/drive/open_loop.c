@@ -1,5 +1,6 @@
 #include "firmware/drive/drive_parts.h"
 
+#include "firmware/math/filter.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
 
@@ -15,7 +16,9 @@ void open_loop_start(drive_t *drive)
     drive->state_ms = 0;
     drive->agree_ms = 0;
     drive->theta_open = SWEEP_FROM;
+    drive->omega_ramp = 0;
     drive->omega_open = 0;
+    drive->emf_open = 0;
     drive->i_open = 0;
     position_reset(&drive->position, &drive->config.position, 0, drive->i_ab);
     current_control_reset(&drive->current, (pm_dq_t){0, 0});
@@ -29,7 +32,9 @@ void open_loop_resume(drive_t *drive)
     const pm_ab_t v = {.alpha = pm_narrow(drive->u.d), .beta = pm_narrow(drive->u.q)};
     const pm_dq_t u = pm_park(v, pm_dir(turn));
     drive->theta_open = drive->position.pll.theta + turn;
-    drive->omega_open = drive->position.pll.omega;
+    drive->omega_ramp = drive->position.pll.omega;
+    drive->omega_open = drive->omega_ramp;
+    drive->emf_open = 0;
     drive->i_open = pm_hypot(i.d, i.q);
     current_control_reset(&drive->current, u);
     drive->agree_ms = 0;
@@ -66,6 +71,20 @@ static pm_q_t wanted_speed(const drive_t *drive)
     return pm_clamp(drive->omega_target, -drive->config.omega_max, drive->config.omega_max);
 }
 
+/* A rotor on a vector of constant current swings undamped. Across the vector, where there is no current, the
+ * voltage is the EMF of the rotor's speed: the vector falls behind a rotor that is too fast and runs ahead of
+ * one that is too slow. */
+static void damp(drive_t *drive)
+{
+    const drive_config_t *c = &drive->config;
+    const pm_q_t across =
+        pm_narrow_sat(drive->u.q) - pm_mul(drive->omega_open, pm_mul(c->current.L_d, drive->status.i.d));
+    const pm_q_t emf =
+        pm_clamp(across - pm_mul(drive->omega_ramp, c->psi_m), -c->open_loop.v_swing, c->open_loop.v_swing);
+    const pm_q_t swing = emf - pm_lp1(&drive->emf_open, emf, c->open_loop.k_swing);
+    drive->omega_open = drive->omega_ramp - pm_small_gain(pm_small(swing), c->open_loop.per_swing);
+}
+
 void open_loop_slow(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
@@ -73,15 +92,16 @@ void open_loop_slow(drive_t *drive)
     const pm_q_t i_wanted = current_mode ? pm_min(pm_abs(drive->i_target), c->i_max) : c->open_loop.i;
     drive->i_open = approach(drive->i_open, i_wanted, c->open_loop.i_slope);
     drive->i_ref = (pm_dq_t){.d = drive->i_open, .q = 0};
+    damp(drive);
     if (drive->state_ms < c->open_loop.align_ms) {
-        const pm_angle_t left = 0U - drive->theta_open; /* to angle zero */
-        drive->theta_open += left < c->open_loop.sweep ? left : c->open_loop.sweep;
+        const bool sweeping = 2U * drive->state_ms <= c->open_loop.align_ms;
+        drive->theta_open += sweeping ? c->open_loop.sweep : 0U;
         return;
     }
     const pm_q_t target = wanted_speed(drive);
-    drive->omega_open = approach(drive->omega_open, target, c->open_loop.slope);
+    drive->omega_ramp = approach(drive->omega_ramp, target, c->open_loop.slope);
 
-    const pm_q_t omega = drive->omega_open;
+    const pm_q_t omega = drive->omega_ramp;
     const bool agree = pm_abs(omega) >= c->position.omega_high &&
                        pm_abs(drive->position.pll.omega - omega) < pm_abs(omega) / 4 &&
                        drive->position.quality > PM_Q(0.5);

@@ -14,7 +14,7 @@
 /* The weight follows the speed through 5 ms, so that noise of the speed does not move it. */
 #define K_SPEED PM_FRAC(0.2)
 
-void position_reset(position_t *self, const position_config_t *config, pm_angle_t theta, pm_ab_t i)
+PM_RARE void position_reset(position_t *self, const position_config_t *config, pm_angle_t theta, pm_ab_t i)
 {
     *self = (position_t){.pll.theta = theta,
                          .weight = config->injection ? 0 : PM_ONE,
@@ -80,13 +80,14 @@ void position_step(position_t *self, const position_config_t *config, pm_ab_t v,
     *out = (position_out_t){.dir = dir, .i = i_dq, .omega = pll.omega};
 }
 
-void position_change_observer(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq)
+PM_RARE void position_change_observer(position_t *self, const position_config_t *config, pm_ab_t i,
+                                      pm_dq_t i_dq)
 {
     const obs_in_t in = {.i = i, .dir = pm_dir(self->pll.theta), .omega = self->pll.omega, .i_dq = i_dq};
     observer_reset(&self->observer, &config->observer, &in);
 }
 
-void position_lead(position_t *self, const position_config_t *config, const pm_pll_t *imposed)
+PM_RARE void position_lead(position_t *self, const position_config_t *config, const pm_pll_t *imposed)
 {
     observer_tie(&self->observer, &config->observer);
     loop_reset(&self->loop);
@@ -145,7 +146,7 @@ static void set_quality(position_t *self, const position_config_t *config, const
     self->quality = pm_max(0, PM_ONE - worst);
 }
 
-void position_slow(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq)
+PM_RARE void position_slow(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq)
 {
     const obs_in_t in = {.omega = self->pll.omega, .i = i, .i_dq = i_dq};
     const obs_out_t seen = observer_last(&self->observer, &config->observer);

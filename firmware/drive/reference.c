@@ -46,7 +46,8 @@ static pm_q_t flux_current(drive_t *drive, pm_q_t i_q)
         field_weakening_step(&drive->field_weakening, &c->field_weakening,
                              pm_hypot(pm_narrow(drive->u.d), pm_narrow(drive->u.q)), v_top - v_top / 20);
     const pm_q_t light = pm_mul(c->i_d_light, drive->position.weight);
-    return pm_max(pm_min(mtpa_i_d(&c->mtpa, i_q), -light) + weak, -c->i_max);
+    const pm_q_t i_d = light < 0 ? -light : pm_min(mtpa_i_d(&c->mtpa, i_q), -light);
+    return pm_max(i_d + weak, -c->i_max);
 }
 
 static pm_q_t measured_speed(drive_t *drive)

@@ -6,6 +6,7 @@
 
 #define PM_INLINE static inline __attribute__((always_inline))
 #define PM_RARE   __attribute__((noinline, cold))
+#define PM_APART  __attribute__((noinline)) /* called from what is rare, but not rare itself */
 
 /* A condition of the control period that is next to never true. */
 static inline bool pm_rarely(bool x)

@@ -25,6 +25,32 @@ static uint64_t magnitude(int32_t x)
     return (uint64_t)(x < 0 ? -(int64_t)x : (int64_t)x);
 }
 
+/* The upper half at once, of the lower bit by bit; den <= 2^31, so that the rest fits when it is doubled. */
+static uint64_t quotient(uint64_t num, uint32_t den)
+{
+    const uint32_t top = (uint32_t)(num >> 32);
+    uint32_t low = (uint32_t)num;
+    uint32_t rest = top % den;
+    for (int n = 0; n < 32; ++n) {
+        rest = (rest << 1) | (low >> 31);
+        low <<= 1;
+        if (rest >= den) {
+            rest -= den;
+            low |= 1U;
+        }
+    }
+    return ((uint64_t)(top / den) << 32) | low;
+}
+
+int64_t pm_quotient(int64_t num, int32_t den)
+{
+    if (den == 0) {
+        return 0;
+    }
+    const uint64_t size = quotient(num < 0 ? 0U - (uint64_t)num : (uint64_t)num, (uint32_t)magnitude(den));
+    return (int64_t)((num < 0) == (den < 0) ? size : 0U - size);
+}
+
 pm_num_t pm_num(int32_t value)
 {
     return make(value < 0, magnitude(value), 0);
@@ -87,7 +113,8 @@ pm_num_t pm_num_div(pm_num_t a, pm_num_t b)
         return (pm_num_t){0, 0};
     }
     /* 33 or 34 bits of quotient: cutting it costs an eighth of a unit in the last place of 31. */
-    return make((a.m < 0) != (b.m < 0), (magnitude(a.m) << 33) / magnitude(b.m), a.e - b.e - 33);
+    return make((a.m < 0) != (b.m < 0), quotient(magnitude(a.m) << 33, (uint32_t)magnitude(b.m)),
+                a.e - b.e - 33);
 }
 
 pm_num_t pm_num_sqrt(pm_num_t a)

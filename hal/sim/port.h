@@ -36,7 +36,8 @@ struct hal {
     hal_can_state_t can_state;
     uint32_t can_lost, watchdog_fed;
     uint32_t store[HAL_STORE_PAGES][HAL_STORE_PAGE_SIZE / sizeof(uint32_t)];
-    uint32_t store_bytes_left; /* flash loses power after so many bytes; UINT32_MAX: never */
+    uint32_t store_bytes_left;         /* flash loses power after so many bytes; UINT32_MAX: never */
+    void (*while_storing)(app_t *app); /* what interrupts there are for each double word; NULL: none */
     char console[SIM_CONSOLE];
     bool led, reset;
 };

@@ -45,6 +45,9 @@ bool hal_store_write(hal_t *hal, uint32_t page, uint32_t offset, const uint32_t 
             return false;
         }
         memcpy(&to[at], &from[at], UNIT);
+        if (hal->while_storing != NULL) {
+            hal->while_storing(hal->app);
+        }
         hal->store_bytes_left -= hal->store_bytes_left != UINT32_MAX ? UNIT : 0U;
     }
     return true;

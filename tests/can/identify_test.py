@@ -1,8 +1,11 @@
-"""From a motor that nobody knows to one that runs: name plate, identify, tune, save, restart, start, on live nodes with
-the whole plant; then the steady state of what was found, against the plant's truth.
+"""From a motor that nobody knows to one that runs: scan, name plate, identify, tune, save, restart, start, stop, on live
+nodes with the whole plant; then the steady state of what was found, against the plant's truth.
 
-usage: identify_test.py PMSIM [MACHINE...]
+usage: identify_test.py PMSIM [--image ELF] [MACHINE...]
+
+The drive is `pmsim node`, with --image the flashed image on the emulated board, live; then without the steady state.
 """
+import argparse
 import contextlib
 import io
 import json
@@ -19,10 +22,10 @@ import pmdrive  # noqa: E402
 from node_bus import Node  # noqa: E402
 from pmdrive import cli, names  # noqa: E402
 
-PMSIM = str(Path(sys.argv[1]).resolve())
 # The issue's bounds
 R_REL, L_REL, PSI_REL = 0.05, 0.07, 0.03
 J_REL = 0.15
+SPEED_REL = 0.03  # of the speed that is asked for, while it runs
 # Name plate: A peak, pole pairs, rad/s, V. Truth: R with a switch, L_d, L_q at zero current, psi, J. The carrier can lead
 # at standstill where there is saliency; without, the flux observer takes over above 8 % of the speed.
 MACHINES = {
@@ -31,6 +34,9 @@ MACHINES = {
     "tmotor_u8ii_kv100": dict(plate=(16.0, 21, 190, 24), truth=(0.0682, 12e-6, 12e-6, 2.382e-3, 1.9e-4), salient=False),
     "grin_all_axle": dict(plate=(30.0, 23, 50, 52), truth=(0.053, 0.13e-3, 0.13e-3, 19.83e-3, 0.08), salient=False),
 }
+# Speeds and loads of the steady state. What no method can show of a round machine at low speed is left out: docs/identify.md.
+SALIENT = (([0, 0.02, 0.05, 0.1, 0.3, 1], [0, 0.5, 1]),)
+ROUND = (([0.08, 0.1, 0.3, 1], [0, 0.5, 1]), ([0.05], [0, 0.5]), ([0], [0]))
 # What the drive was used for before: another motor, on the same board.
 OTHER = {"pole_pairs": 5, "mtpa": 1, "dead_time_comp": 1, "t_align": 0.1, "flux_bandwidth": 20, "flux_gain": 0.3,
          "speed_bandwidth": 3, "injection_bandwidth": 25, "current_bandwidth": 300}
@@ -58,7 +64,7 @@ machine: {machine}
 start: {{theta_e_deg: 0}}
 duration_s: 4.5
 drive: {drive}
-sweep: {{speed: {speeds}, load: [0, 0.5, 1]}}
+sweep: {{speed: {speeds}, load: {loads}}}
 profile:
   - {{t_s: 0, mode: speed, speed_rel: $speed, enable: true}}
   - {{t_s: 2.5, load_rel: $load, ramp_s: 0.2}}
@@ -83,9 +89,9 @@ def yaml_map(values):
 class Bench:
     """A live node and the command line on its bus."""
 
-    def __init__(self, scenario):
+    def __init__(self, pmsim, image, scenario):
         self.spec = f"socketcand:localhost:{free_port()}"
-        self.node = Node(PMSIM, self.spec, "--quiet", scenario=scenario)
+        self.node = Node(pmsim, self.spec, scenario=scenario, image=image)
 
     def command(self, *words, code=0):
         out, err = io.StringIO(), io.StringIO()
@@ -93,6 +99,12 @@ class Bench:
             got = cli.main(["--can", self.spec, *words])
         assert got == code, f"{words}: {got}\n{out.getvalue()}{err.getvalue()}\n{self.node.text()}"
         return out.getvalue()
+
+    def answers(self, *words):
+        return [json.loads(line) for line in self.command("--json", *words).splitlines()]
+
+    def answer(self, *words):
+        return self.answers(*words)[-1]
 
     def parameters(self):
         with pmdrive.connect(self.spec) as drive:
@@ -114,7 +126,7 @@ def check_results(values, truth):
     print("      " + ", ".join(told), flush=True)
 
 
-def run_live(name, folder):
+def run_live(pmsim, image, name, folder):
     """Its parameters after identification and tuning."""
     machine = MACHINES[name]
     current, pole_pairs, speed, dc_link = machine["plate"]
@@ -126,42 +138,61 @@ def run_live(name, folder):
     path = Path(folder) / f"{name}.yaml"
     path.write_text(NODE.format(machine=ROOT / f"sim_plant/machines/{name}.yaml", seed=len(name),
                                 offset=0.005 * current, drive=yaml_map(wrong)), encoding="utf-8")
-    bench = Bench(path)
+    bench = Bench(pmsim, image, path)
     try:
+        assert bench.answer("scan") == {"nodes": [1]}
         bench.command("identify", "--yes", "--rated-current", f"{current}A", "--pole-pairs", str(pole_pairs),
                       "--max-speed", f"{speed}rad/s", "--dc-link", f"{dc_link}V")
         check_results(bench.parameters(), machine["truth"])
         bench.command("tune", "--yes")
+        found = bench.parameters()
         bench.command("save")
         bench.command("reset")
-        found = bench.parameters()
-        bench.command("run", "speed", f"{0.3 * speed}rad/s", "--for", "4")
-        out = bench.command("--json", "faults")
-        assert json.loads(out)["fault"] is None, out
+        assert bench.parameters() == found, "what was saved is not what is there after the restart"
+        check_start(bench, 0.3 * speed)
     finally:
-        bench.node.stop()
+        code = bench.node.stop()
+    assert code == 0, f"exit code {code}\n{bench.node.text()}"
     return found
 
 
-def check_steady(name, found, folder):
-    speeds = [0, 0.02, 0.05, 0.1, 0.3, 1] if MACHINES[name]["salient"] else [0.1, 0.3, 1]
+def check_start(bench, speed):
+    """To that speed without a sensor, and off again; no fault."""
+    seen = bench.answers("run", "speed", f"{speed}rad/s", "--for", "4")
+    reached = seen[-1]["velocity_actual"]["value"]
+    within("speed", reached, speed, SPEED_REL)
+    assert bench.answer("stop")["state"] == "switch on disabled"
+    faults = bench.answer("faults")
+    assert faults["fault"] is None and not faults["history"], faults
+
+
+def check_steady(pmsim, name, found, folder):
     board = ("f_pwm", "timer_counts")
     drive = {key: value for key, value in found.items() if key not in board}
     path = Path(folder) / f"{name}_grid.yaml"
-    path.write_text(GRID.format(machine=ROOT / f"sim_plant/machines/{name}.yaml", drive=yaml_map(drive),
-                                speeds=speeds), encoding="utf-8")
-    result = subprocess.run([PMSIM, "run", str(path), "--out", str(Path(folder) / name)], capture_output=True, text=True,
-                            check=False, timeout=300)
-    print("\n".join("      " + line for line in result.stdout.splitlines() if line[:4] in ("PASS", "FAIL")), flush=True)
-    assert result.returncode == 0, result.stdout + result.stderr
+    for speeds, loads in SALIENT if MACHINES[name]["salient"] else ROUND:
+        path.write_text(GRID.format(machine=ROOT / f"sim_plant/machines/{name}.yaml", drive=yaml_map(drive),
+                                    speeds=speeds, loads=loads), encoding="utf-8")
+        result = subprocess.run([pmsim, "run", str(path), "--out", str(Path(folder) / name)], capture_output=True,
+                                text=True, check=False, timeout=300)
+        told = [f"      {line}" for line in result.stdout.splitlines() if line[:4] in ("PASS", "FAIL")]
+        print(f"      speeds {speeds}, loads {loads}", *told, sep="\n", flush=True)
+        assert result.returncode == 0, result.stdout + result.stderr
 
 
 def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("pmsim")
+    parser.add_argument("machines", nargs="*", default=list(MACHINES))
+    parser.add_argument("--image", help="pmdrive.elf of the cross build")
+    arguments = parser.parse_intermixed_args()
     with tempfile.TemporaryDirectory() as folder:
-        for name in sys.argv[2:] or MACHINES:
+        for name in arguments.machines:
             began = time.monotonic()
             print(f"      {name}", flush=True)
-            check_steady(name, run_live(name, folder), folder)
+            found = run_live(arguments.pmsim, arguments.image, name, folder)
+            if arguments.image is None:  # what has been found is the same
+                check_steady(arguments.pmsim, name, found, folder)
             print(f"PASS  {name}, {time.monotonic() - began:.1f} s", flush=True)
 
 

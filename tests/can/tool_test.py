@@ -198,6 +198,37 @@ class Values(Bench):
     def test_monitor(self):
         self.assertEqual(len(self.json("monitor", "velocity_actual", "--count", "3", "--interval", "0")), 3)
 
+        out, _ = self.command("monitor", "velocity_actual", "i_q", "--count", "1")
+        self.assertEqual(out.splitlines()[-1].split(), ["-", "0", "A"])  # the bridge is off: nothing is known of the speed
+
+    def test_bits_and_shaft_speeds_in_words(self):
+        self.node["drive_limits"] = 0x11
+        self.command("set", "target_velocity=300rpm")
+        out, _ = self.command("get", "drive_limits", "error_register", "target_velocity")
+        self.assertIn("0x11 (current, speed)", out)
+        self.assertIn("0x0 (none)", out)
+        self.assertIn("31.416 rad/s (300.0 rpm)", out)
+
+    def test_two_programs_at_one_node(self):
+        """Each hears what the other has asked for."""
+        ended = threading.Event()
+
+        def other():
+            with self.connect() as drive:
+                while not ended.is_set():
+                    drive.read("psi_m")
+                    time.sleep(0.002)
+
+        thread = threading.Thread(target=other)
+        thread.start()
+        try:
+            with self.connect() as drive:
+                for _ in range(200):
+                    self.assertEqual(drive.read("R_s"), 6000000)
+        finally:
+            ended.set()
+            thread.join()
+
     def test_data_sheet_in_the_device(self):
         path = self.path("device.eds")
         self.command("eds", "--out", path)
@@ -238,6 +269,9 @@ class Sets(Bench):
         """In the order of the file, i_max alone would be refused."""
         self.command("load", self.write("i_max: 20 A\ni_trip: 30 A\n"), "--yes")
         self.assertEqual((self.node["i_max"], self.node["i_trip"]), (20000, 30000))
+
+        self.command("set", "i_max=21 A", "i_trip=31 A")
+        self.assertEqual((self.node["i_max"], self.node["i_trip"]), (21000, 31000))
 
     def test_refused_together_is_undone(self):
         _, err = self.command("load", self.write("R_s: 7 ohm\ni_max: 40 A\ni_trip: 30 A\n"), "--yes", code=1)
@@ -495,6 +529,7 @@ class Identification(Bench):
         self.node["identification.L_q_rated"] = 41400000
         self.command("identify", "--only", "inductance", "--yes")
         self.assertEqual((self.node["L_d"], self.node["L_q"], self.node["L_dqh_rated"]), (41750000, 41750000, 0))
+        self.assertEqual((self.node["L_q_rated"], self.node["L_qh_rated"]), (41750000, 41750000))
 
     def test_name_plate(self):
         _, err = self.command("identify", "--yes", "--rated-current", "4A", code=2)

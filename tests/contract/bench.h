@@ -165,11 +165,8 @@ inline active_flux_config_t flux_config(const Machine &m, const Base &b, double 
     active_flux_config_t c = {};
     c.model = model(m, b, L_d_H, L_q_H, L_q_rated_H, i_rated_A);
     c.g = fixed(g * step, 32);
-    c.k_adapt = fixed(0.01, 32);
     c.k_seed = fixed(300 * b.period_s, 32);
     c.resistance.k = fixed(300.0 / 8 / (b.omega_rad_s * i_rated * i_rated), 26);
-    c.resistance.min = c.model.R / 2;
-    c.resistance.max = c.model.R * 2;
     c.resistance.omega = PM_Q(0.06);
     return c;
 }
@@ -179,7 +176,7 @@ inline active_flux_config_t flux_config(const Machine &linear, const Base &b, do
     return flux_config(linear, b, linear.L_d0_H, linear.L_q0_H, linear.L_q0_H, 4.0, g);
 }
 
-// observers/emf.h. R follows in 8 ms at i_rated, amplitude filter 100 ms.
+// observers/emf.h. R follows in 64 ms at i_rated, amplitude filter 100 ms.
 inline emf_config_t emf_config(const Machine &m, const Base &b, double L_d_H, double L_q_H,
                                double L_q_rated_H, double i_rated_A, double bandwidth_Hz = 300)
 {
@@ -187,13 +184,10 @@ inline emf_config_t emf_config(const Machine &m, const Base &b, double L_d_H, do
     const double w = 2 * kPi * bandwidth_Hz * b.period_s, k = w / (1 + w);
     emf_config_t c = {};
     c.model = model(m, b, L_d_H, L_q_H, L_q_rated_H, i_rated_A);
-    c.resistance.k = fixed(1.0 / 8 / (i_rated * i_rated), 26);
-    c.resistance.min = c.model.R / 2;
-    c.resistance.max = c.model.R * 2;
+    c.resistance.k = fixed(1.0 / 64 / (i_rated * i_rated), 26);
     c.resistance.omega = PM_Q(0.06);
     c.k_filter = fixed(k, 32);
     c.lag = fixed((2 - k) / k, 26);
-    c.k_adapt = fixed(0.01, 32);
     c.rate = fixed(1 / (b.period_s * b.omega_rad_s), 20);
     c.slow_rate = fixed(1 / (1e-3 * b.omega_rad_s), 26);
     c.slow_step = fixed(1e-3 * b.omega_rad_s, 28);

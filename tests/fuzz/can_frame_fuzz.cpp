@@ -271,7 +271,11 @@ void operate(Device &d, Input &input)
     step(d);
     demand(d.node.ring_count <= NODE_RING && d.node.emcy_count <= NODE_EMCY);
     demand(d.node.sdo.held_count <= 7 && d.node.sdo.block <= 127);
-    demand(d.trace.next >= d.ring && d.trace.next < d.ring + sizeof d.ring / sizeof d.ring[0]);
+    if (d.trace.next == nullptr) { // it was never armed
+        demand(d.trace.countdown == 0);
+    } else {
+        demand(d.trace.next >= d.ring && d.trace.next < d.ring + sizeof d.ring / sizeof d.ring[0]);
+    }
 }
 
 } // namespace

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import jinja2
 
-from . import emit_c, emit_dbc, emit_docs, emit_eds, ledger, reader
+from . import emit_c, emit_dbc, emit_docs, emit_eds, ledger, model, reader
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = "firmware/params/parameters.yaml"
@@ -28,8 +28,8 @@ def _environment():
 def _c_files(render, dictionary, sheet):
     render("firmware/drive/parameters.def", "parameters.def.j2", objects=dictionary.objects)
     render("firmware/app/error_codes.def", "error_codes.def.j2", faults=dictionary.faults)
-    render("firmware/can/dictionary_slots.h", "dictionary_slots.h.j2", node=dictionary.of("node"),
-           live=dictionary.of("live"), parameters=dictionary.of("parameter"),
+    render("firmware/can/dictionary_slots.h", "dictionary_slots.h.j2", words=[e for e in dictionary.of("node") if not model.is_mapping(e)],
+           mappings=[e for e in dictionary.of("node") if model.is_mapping(e)], live=dictionary.of("live"), parameters=dictionary.of("parameter"),
            bytes=[e for e in dictionary.of("constant") if e.bits == 0])
     render("firmware/can/dictionary_table.c", "dictionary_table.c.j2", entries=dictionary.entries,
            values=emit_c.all_values(dictionary), schema=emit_c.schema(dictionary))

@@ -210,9 +210,14 @@ def link_alias(dictionary):
             entry.access, entry.book = target.access, target.book
 
 
+def is_mapping(entry):
+    """One place of a PDO: the node keeps which object stands there instead of a word."""
+    return entry.lives == "node" and entry.sub > 0 and (entry.index & 0xFE00 == 0x1600 or entry.index & 0xFE00 == 0x1A00)
+
+
 def number_slots(dictionary):
     for lives in LIVES:
-        for slot, entry in enumerate(dictionary.of(lives)):
+        for slot, entry in enumerate(sorted(dictionary.of(lives), key=is_mapping)):
             entry.slot = slot
     for slot, entry in enumerate(x for x in dictionary.of("constant") if x.bits == 0):
         entry.slot = slot

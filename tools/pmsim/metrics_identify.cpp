@@ -123,6 +123,9 @@ class Identified : public Metric
         if (kind_ == "identify_L_q_rated_error_rel") {
             return relative(last_.L_q_rated_H, rated_point(setup_).psi_q() / setup_.rated.i_rated_A);
         }
+        if (kind_ == "identify_L_qh_rated_error_rel") {
+            return relative(last_.L_qh_rated_H, rated_point(setup_).L_qh());
+        }
         if (kind_ == "identify_L_dq_error_rel") { // of L_q
             return (last_.L_dq_rated_H - rated_point(setup_).L_dqh()) / zero.L_qh();
         }
@@ -168,6 +171,8 @@ std::vector<SpecialMetric> identify_metrics()
         number("identify_L_d_error_rel", "L_d at zero current, found against the plant's"),
         number("identify_L_q_error_rel", "L_q at zero current, found against the plant's"),
         number("identify_L_q_rated_error_rel", "psi_q / i_q at rated current, found against the plant's"),
+        number("identify_L_qh_rated_error_rel",
+               "incremental L_q at rated current, estimated against the plant's"),
         number("identify_L_dq_error_rel", "error of the cross inductance at rated current, of L_q"),
         number("identify_psi_m_error_rel", "magnet flux found against the plant's"),
         number("identify_J_error_rel", "inertia found against the plant's"),

@@ -31,7 +31,7 @@ typedef struct {
 typedef struct {
     int state, reason; /* COMMISSIONING_... */
     double R_s_ohm, lost_V;
-    double L_d_H, L_q_H, L_q_rated_H, L_dq_rated_H;
+    double L_d_H, L_q_H, L_q_rated_H, L_qh_rated_H, L_dq_rated_H;
     double psi_m_Wb;
     double J_kgm2, viscous_Nms, coulomb_Nm;
 } rig_identified_t;

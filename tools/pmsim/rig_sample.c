@@ -77,6 +77,7 @@ static rig_identified_t identified(const rig_scale_t *scale, const commissioning
         .L_d_H = L_H * r->L_d,
         .L_q_H = L_H * r->L_q,
         .L_q_rated_H = L_H * r->L_q_rated,
+        .L_qh_rated_H = L_H * commissioning_tangent(r, 16),
         .L_dq_rated_H = L_H * r->L_dq_rated,
         .psi_m_Wb = scale->psi_Wb * r->psi_m,
         .J_kgm2 = scale->J_kgm2 * r->J,

@@ -1,11 +1,13 @@
 /* The bridge while the machine is identified: plain voltages without compensation, whose mean is exact. */
 #include "firmware/drive/commissioning/commissioning_parts.h"
+#include "firmware/math/compiler.h"
+#include "firmware/math/num.h"
+#include "firmware/math/pair.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
 
-#define V_DC_LEAST PM_Q(0.0625)
 /* Timer counts are carried in 128ths: what a period cannot give the next one does. */
-#define PART 128
+#define PART 128U
 
 void commissioning_clear_sums(commissioning_t *self)
 {
@@ -17,7 +19,7 @@ void commissioning_clear_sums(commissioning_t *self)
 
 pm_q_t commissioning_mean(const commissioning_t *self, uint32_t n)
 {
-    return self->taken == 0 ? 0 : (pm_q_t)(self->sum[n] / self->taken);
+    return (pm_q_t)pm_quotient(self->sum[n], self->taken);
 }
 
 void commissioning_start_current(drive_t *drive)
@@ -40,69 +42,67 @@ void commissioning_set_gains(drive_t *drive)
     drive->identify.work.pi = (pm_pi_config_t){.kp = kp, .ki = ki, .kb = pm_shl(ratio, 31 - PM_Q_BITS)};
 }
 
-static void write_legs(drive_t *drive, pm_ab_t v, drive_out_t *out)
+/* A share of the period in Q20; what a period's counts cannot give the next ones do. */
+static inline void write_leg(int32_t share, int32_t parts, int32_t *rest, uint16_t *compare)
 {
-    commissioning_t *self = &drive->identify.work;
-    const modulator_config_t *m = &drive->config.modulator;
-    const pm_abc_t u = pm_clarke_inverse(v);
-    const pm_q_t leg[DRIVE_LEGS] = {u.a, u.b, u.c};
-    const int32_t per_volt = pm_per_volt(pm_max(drive->status.v_dc, V_DC_LEAST));
-    const int32_t parts = pm_shl(m->counts, 39 - 31); /* PART, and a share in Q31 */
-    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-        const int32_t share = pm_shl(pm_sat(pm_mulh(leg[x], per_volt), PM_SHARE_BITS), 31 - PM_SHARE_BITS);
-        const int32_t wanted = m->counts * (PART / 2) + pm_mulh(share, parts) + self->rest[x];
-        const int32_t on = pm_clamp(wanted, 0, m->counts * PART) / PART;
-        self->rest[x] = (uint8_t)pm_clamp(wanted - on * PART, 0, PART);
-        out->compare[x][0] = (uint16_t)on;
-        out->compare[x][1] = (uint16_t)on;
-        out->driven[x] = true;
-    }
-    out->trip = false;
-    drive->v_next = v;
+    const pm_unit_t within = pm_share_to_unit(pm_sat_positive(share, PM_SHARE_BITS));
+    const uint32_t wanted = (uint32_t)pm_mulh_add(*rest, within, parts);
+    *rest = (int32_t)(wanted % PART);
+    pm_store_twice(compare, (int32_t)(wanted / PART));
 }
 
-static int32_t axis_voltage(drive_t *drive, pm_pi_t *pi, pm_q_t error)
+static inline void write_legs(drive_t *drive, pm_abc_t u, drive_out_t *out)
+{
+    commissioning_t *self = &drive->identify.work;
+    const int32_t per_volt = pm_per_volt(drive->status.v_dc);
+    const int32_t parts = pm_shl(drive->config.modulator.counts, 39 - 31); /* PART, and a share in Q31 */
+    write_leg(pm_mulh_add(PM_SHARE_HALF, u.a, per_volt), parts, &self->rest[0], out->compare[0]);
+    write_leg(pm_mulh_add(PM_SHARE_HALF, u.b, per_volt), parts, &self->rest[1], out->compare[1]);
+    write_leg(pm_mulh_add(PM_SHARE_HALF, u.c, per_volt), parts, &self->rest[2], out->compare[2]);
+    out->driven[0] = true;
+    out->driven[1] = true;
+    out->driven[2] = true;
+    out->trip = false;
+}
+
+static inline pm_wide_t axis_voltage(const drive_t *drive, pm_pi_t *pi, pm_q_t error)
 {
     const pm_pi_config_t *c = &drive->identify.work.pi;
-    const pm_wide_t top = pm_widen(pm_mul(drive->status.v_dc, PM_Q(0.4)));
+    const pm_wide_t top = pm_gain(drive->status.v_dc, PM_GAIN(0.4));
     const pm_wide_t u = pm_pi_output(pi, c, error, 0);
     const pm_wide_t limited = pm_clamp(u, -top, top);
     pm_pi_update(pi, c, error, limited - u);
-    return pm_narrow(limited);
+    return limited;
 }
 
 /* What the legs will lose, by the current wanted there: linear below an eighth of it. */
-static pm_ab_t regained(const drive_t *drive, pm_dir_t dir)
+static inline pm_abc_t regain(pm_abc_t u, pm_half_dir_t dir, pm_q_t lost)
 {
-    const pm_abc_t i = pm_clarke_inverse((pm_ab_t){.alpha = dir.cos / 8, .beta = dir.sin / 8}); /* Q28 */
-    const pm_q_t lost = drive->identify.work.lost;
-    const pm_abc_t v = {
-        .a = pm_mul(lost, 8 * pm_clamp(i.a, -PM_ONE / 8, PM_ONE / 8)),
-        .b = pm_mul(lost, 8 * pm_clamp(i.b, -PM_ONE / 8, PM_ONE / 8)),
-        .c = pm_mul(lost, 8 * pm_clamp(i.c, -PM_ONE / 8, PM_ONE / 8)),
+    const pm_abc_t i = pm_clarke_inverse((pm_ab_t){.alpha = dir.cos, .beta = dir.sin}); /* Q30 */
+    const int32_t height = pm_shl(pm_sat(lost, 26), 5);
+    return (pm_abc_t){
+        .a = pm_mulh_add(u.a, pm_sat(i.a, 27), height),
+        .b = pm_mulh_add(u.b, pm_sat(i.b, 27), height),
+        .c = pm_mulh_add(u.c, pm_sat(i.c, 27), height),
     };
-    return pm_clarke(v);
 }
 
 /* The vector turns on; its voltage acts one and a half periods later. While it stands, q is without voltage:
  * what a swinging rotor induces there drives a current through the winding's own resistance, which damps it.
  */
-static void turn(drive_t *drive)
+static inline pm_abc_t turn(drive_t *drive)
 {
     commissioning_t *self = &drive->identify.work;
-    const int32_t step = pm_omega_to_angle(drive->omega_open, drive->config.k_theta);
+    const int32_t step = drive->turn_open;
     drive->theta_open += (pm_angle_t)step;
-    const pm_dq_t i = pm_park(drive->i_ab, pm_dir(drive->theta_open));
-    pm_dq_t u = {.d = axis_voltage(drive, &drive->current.d, drive->i_ref.d - i.d), .q = 0};
+    const pm_dir_t dir = pm_dir(drive->theta_open);
+    const pm_dq_t i = pm_park(drive->i_ab, dir);
+    pm_dq_t u = {.d = pm_narrow(axis_voltage(drive, &drive->current.d, drive->i_ref.d - i.d)), .q = 0};
     if (step != 0) {
-        u.q = axis_voltage(drive, &drive->current.q, -i.q);
+        u.q = pm_narrow(axis_voltage(drive, &drive->current.q, -i.q));
     } else {
         drive->current.q.integral = 0;
     }
-    const pm_dir_t ahead = pm_dir(drive->theta_open + (pm_angle_t)step + (pm_angle_t)pm_half(step));
-    const pm_ab_t v = pm_park_inverse(u, ahead);
-    const pm_ab_t more = regained(drive, ahead);
-    self->v = (pm_ab_t){.alpha = v.alpha + more.alpha, .beta = v.beta + more.beta};
     drive->status.i = i;
     drive->u = u;
     self->sum[0] += u.d;
@@ -110,6 +110,10 @@ static void turn(drive_t *drive)
     self->sum[2] += i.d;
     self->sum[3] += i.q;
     self->taken++;
+    const pm_half_dir_t ahead = pm_dir_sum(dir, drive->ahead);
+    const pm_ab_t v = pm_park_inverse_quarter((pm_dq_t){.d = pm_shl(u.d, 2), .q = pm_shl(u.q, 2)}, ahead);
+    self->v = v;
+    return regain(pm_clarke_inverse(v), ahead, self->lost);
 }
 
 static void hold_voltage(drive_t *drive)
@@ -122,34 +126,34 @@ static void hold_voltage(drive_t *drive)
     drive->status.i = (pm_dq_t){.d = drive->i_ab.alpha, .q = drive->i_ab.beta};
 }
 
-/* For the d-axis voltage beside a square wave on q. */
-static void bias(drive_t *drive)
+/* The voltage of the wave, and that of the d-axis beside one on q. */
+static void wave(drive_t *drive, pm_ab_t v_past)
 {
     commissioning_t *self = &drive->identify.work;
-    const square_t *square = &self->of.square;
-    if (square->on_q && square->bias != 0) {
-        const pm_q_t wanted = square->state >= (uint8_t)SQUARE_MEASURES ? -square->bias : square->bias;
-        self->v.alpha = axis_voltage(drive, &drive->current.d, wanted - drive->i_ab.alpha);
+    square_step(drive, v_past);
+    const pm_q_t bias = self->of.square.bias;
+    if (bias != 0) {
+        self->v.alpha = pm_narrow(axis_voltage(drive, &drive->current.d, bias - drive->i_ab.alpha));
     }
 }
 
-void commissioning_step(drive_t *drive, pm_ab_t v_past, drive_out_t *out)
+PM_APART void commissioning_step(drive_t *drive, drive_out_t *out)
 {
     commissioning_t *self = &drive->identify.work;
-    switch (self->kind) {
-    case KIND_CURRENT:
-        turn(drive);
-        break;
-    case KIND_SQUARE:
-        square_step(drive, v_past);
-        bias(drive);
-        break;
-    case KIND_VOLTAGE:
-    default:
-        hold_voltage(drive);
-        break;
+    const pm_ab_t v_past = pm_pair_ab(&drive->v_acting);
+    drive->v_acting = drive->v_next;
+    pm_abc_t u;
+    if (self->kind == (uint8_t)KIND_CURRENT) {
+        u = turn(drive);
+    } else {
+        if (self->kind == (uint8_t)KIND_SQUARE) {
+            wave(drive, v_past);
+        } else {
+            hold_voltage(drive);
+        }
+        u = pm_clarke_inverse(self->v);
     }
-    self->i_last = drive->i_abc;
     drive->status.theta = drive->theta_open;
-    write_legs(drive, self->v, out);
+    drive->v_next = self->v;
+    write_legs(drive, u, out);
 }

@@ -58,16 +58,32 @@ typedef struct {
 
 #define COMMISSIONING_J_STEPS 1024
 
+/* Incremental L_q at sixteenths of the square of the test current, 16: at all of it; an estimate. psi / i
+ * falls with the square of the current, L_q + (L_q_rated - L_q) (i / i_rated)^2, its tangent three times as
+ * much; but saturation is steeper than that, and psi / i was measured with the i_d that lessens it: four
+ * times. */
+static inline pm_q_t commissioning_tangent(const commissioning_result_t *r, int32_t of_16)
+{
+    return r->L_q + (r->L_q_rated - r->L_q) / 4 * of_16;
+}
+
 typedef struct {
     uint16_t half;   /* periods of half a wave */
     uint16_t count;  /* periods of the present one that have gone */
     uint16_t cycles; /* whole waves since the amplitude was found */
+    uint8_t settled; /* so many of them before the first that counts, */
+    uint8_t enough;  /* and when the last has been */
     uint8_t state;   /* SQUARE_... */
     bool on_q, up, leading;
     pm_q_t voltage;
     pm_q_t wanted;   /* amplitude of the current */
     pm_q_t top, low; /* of the present wave, either direction */
-    pm_q_t bias; /* i_d meanwhile: positive while the amplitude is sought, negative while it is measured */
+    pm_q_t far;      /* near the amplitude: what lies beyond shows the other axis */
+    pm_q_t bias;  /* i_d meanwhile: positive while the amplitude is sought, negative while it is measured */
+    pm_ab_t last; /* currents of the last period, */
+    pm_abc_t i_last;  /* and the legs' */
+    int32_t negative; /* sum of the edges at which a current was negative, as the axis sees them */
+    pm_q_t third;     /* of the lost voltage */
 } square_t;
 
 /* At work; shares its place with the estimators of the position. */
@@ -75,12 +91,11 @@ typedef struct {
     int64_t sum[5];
     int32_t taken;
     pm_ab_t v;       /* what the bridge is to give next */
-    pm_abc_t i_last; /* currents of the last period */
+    int32_t rest[3]; /* of the timer's counts, 128ths */
     pm_pi_config_t pi;
     pm_q_t R, lost, L_d, L_q; /* per-unit, as far as they are known */
     uint16_t ms;              /* in this phase */
     uint8_t phase, part, kind;
-    uint8_t rest[3]; /* of the timer's counts, 128ths */
     union {
         square_t square;
         struct {

@@ -13,11 +13,12 @@ void commissioning_set_gains(drive_t *drive);     /* by R and L_d */
 void commissioning_clear_sums(commissioning_t *self);
 pm_q_t commissioning_mean(const commissioning_t *self, uint32_t n); /* of sum n over what was taken */
 
-/* square.c: one period of the square wave; what is summed up, beside currents and fluxes in w = v - R i -
- * lost per T_s. */
+/* square.c: one period of the square wave. What is summed up, s the sign of the voltage: mean of the currents
+ * at both ends of the period, s i, and their change, s di; for the other axis, x = i_q di_q, w x per T_s with
+ * w = v_d - R i_d - lost, di_d x, x x. */
 enum { SQUARE_WAITS, SQUARE_SEEKS, SQUARE_MEASURES, SQUARE_DONE, SQUARE_FAILED };
 #define SQUARE_LONGEST 256U /* periods of half a wave */
-enum { SUM_FLUX, SUM_CURRENT, SUM_D_FLUX, SUM_D_CURRENT, SUM_SQUARE };
+enum { SUM_CURRENT, SUM_CHANGE, SUM_D_FLUX, SUM_D_CHANGE, SUM_SQUARE };
 void square_step(drive_t *drive, pm_ab_t v_past);
 
 /* One millisecond of a phase each; PM_RUNNING, PM_DONE, or else the phase has failed by *reason. */

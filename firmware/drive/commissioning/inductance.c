@@ -7,10 +7,19 @@
  * ampere, the apparent L_q there and by psi_d = L_d i_d + k i_q^2 / 2:    k = sum (dpsi_d - L_d di_d) x / sum
  * x^2, x = i_q di_q the cross inductance k i_q. */
 #include "firmware/drive/commissioning/commissioning_parts.h"
+#include "firmware/math/num.h"
 #include "firmware/math/root.h"
 
 #define SHORTEST    2U
 #define SHARE_SMALL PM_Q(0.3)
+#define SHARE_FAR   PM_Q(0.8)
+/* Whole waves. With negative i_d the rotor stands on its edge: it must not be long. */
+#define SETTLE_CYCLES        3U
+#define CYCLES               24U
+#define BIASED_SETTLE_CYCLES 1U
+#define BIASED_CYCLES        2U
+/* Of products, before they are divided by their number. */
+#define FINE 65536
 
 /* The i_d of most torque per ampere: h - sqrt(h^2 + i^2), h = psi_m / (2 (L_q - L_d)), but so much
  * that its leg's current has a sign; none without saliency. */
@@ -40,14 +49,20 @@ static void foresee(const drive_t *drive, square_t *square)
 void inductance_enter(drive_t *drive, bool on_q, bool rated)
 {
     commissioning_t *self = &drive->identify.work;
-    const pm_q_t i = commissioning_current(drive);
+    const pm_q_t i = rated ? commissioning_current(drive) : pm_mul(commissioning_current(drive), SHARE_SMALL);
+    const pm_q_t bias = rated ? -best_i_d(drive, i) : 0;
+    const uint32_t settled = bias != 0 ? BIASED_SETTLE_CYCLES : SETTLE_CYCLES;
     self->of.square = (square_t){
         .half = SHORTEST,
+        .settled = (uint8_t)settled,
+        .enough = (uint8_t)(settled + (bias != 0 ? BIASED_CYCLES : CYCLES)),
         .on_q = on_q,
         .leading = true,
         .voltage = drive->status.v_dc / 128,
-        .wanted = rated ? i : pm_mul(i, SHARE_SMALL),
-        .bias = rated ? -best_i_d(drive, i) : 0,
+        .wanted = i,
+        .far = pm_mul(i, SHARE_FAR),
+        .bias = bias,
+        .third = drive->identify.work.lost / 3,
     };
     if (rated) {
         foresee(drive, &self->of.square);
@@ -58,20 +73,31 @@ void inductance_enter(drive_t *drive, bool on_q, bool rated)
     current_control_reset(&drive->current, (pm_dq_t){0, 0});
 }
 
+/* Products of two signals are in twice their format. */
+static pm_q_t mean_product(const commissioning_t *self, uint32_t n)
+{
+    return (pm_q_t)pm_quotient(self->sum[n] / FINE, self->taken);
+}
+
+/* Flux per T_s: what the voltage, whose amplitude is the same in all periods, leaves of R and lost voltage.
+ */
 static pm_q_t per_unit(const drive_t *drive)
 {
     const commissioning_t *self = &drive->identify.work;
-    const pm_q_t flux = pm_mul(commissioning_mean(self, SUM_FLUX), commissioning_period(drive));
-    return pm_div(flux, commissioning_mean(self, SUM_CURRENT));
+    const square_t *square = &self->of.square;
+    const pm_q_t edges = (pm_q_t)pm_quotient((int64_t)square->negative * PM_ONE, self->taken);
+    const pm_q_t lost =
+        pm_mul(pm_mul(edges, self->lost), square->on_q ? PM_Q(0.577350269) : PM_Q(0.333333333));
+    const pm_q_t w = square->voltage - pm_mul(self->R, commissioning_mean(self, SUM_CURRENT)) - lost;
+    return pm_div(pm_mul(w, commissioning_period(drive)), commissioning_mean(self, SUM_CHANGE));
 }
 
 static pm_q_t cross(const drive_t *drive)
 {
     const commissioning_t *self = &drive->identify.work;
-    const pm_q_t flux = pm_mul(commissioning_mean(self, SUM_D_FLUX), commissioning_period(drive));
-    const pm_q_t current =
-        pm_mul(commissioning_mean(self, SUM_D_CURRENT), drive->commissioning_report.result.L_d);
-    const pm_q_t slope = pm_div(flux - current, commissioning_mean(self, SUM_SQUARE));
+    const pm_q_t flux = pm_mul(mean_product(self, SUM_D_FLUX), commissioning_period(drive));
+    const pm_q_t current = pm_mul(mean_product(self, SUM_D_CHANGE), drive->commissioning_report.result.L_d);
+    const pm_q_t slope = pm_div(flux - current, mean_product(self, SUM_SQUARE));
     return pm_mul_sat(slope, commissioning_current(drive));
 }
 
@@ -103,9 +129,10 @@ phase_result_t inductance_slow(drive_t *drive, bool on_q, bool rated)
     if (self->of.square.state != (uint8_t)SQUARE_DONE) {
         return (phase_result_t){.done = false};
     }
-    if (self->sum[SUM_FLUX] <= 0 || self->sum[SUM_CURRENT] <= 0) {
+    const pm_q_t L = self->sum[SUM_CHANGE] > 0 ? per_unit(drive) : 0;
+    if (L <= 0) {
         return (phase_result_t){.failed = COMMISSIONING_IMPLAUSIBLE};
     }
-    conclude(drive, on_q, rated, per_unit(drive));
+    conclude(drive, on_q, rated, L);
     return (phase_result_t){.done = true};
 }

@@ -6,6 +6,7 @@
  * half difference is J times the acceleration, and neither R nor friction are in it. Friction at two speeds
  * gives the viscous part. */
 #include "firmware/drive/commissioning/commissioning_parts.h"
+#include "firmware/math/num.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
 
@@ -60,8 +61,7 @@ static void take_torque(drive_t *drive)
 
 static pm_q_t mean_torque(const commissioning_t *self)
 {
-    const int32_t count = self->of.rotation.count;
-    return count == 0 ? 0 : (pm_q_t)(self->sum[TORQUE] / count);
+    return (pm_q_t)pm_quotient(self->sum[TORQUE], self->of.rotation.count);
 }
 
 /* A rotor on a vector that turns by itself swings like a pendulum. u_d rises by u_q per radian that it falls

@@ -1,87 +1,84 @@
 /* The square wave that measures an inductance, period by period: inductance.c. */
 #include "firmware/drive/commissioning/commissioning_parts.h"
+#include "firmware/math/compiler.h"
 
-#define SETTLE_CYCLES 3U
-#define CYCLES        24U
-#define BIASED_CYCLES 2U
-/* Of products, so that the sum of thousands fits. */
-#define FINE 65536
-
-static int32_t sign_of(pm_q_t i)
+/* -1 for each edge at which a leg's current was negative. The current moves while legs differ: the leg that
+ * is up longest switches before and after that, the one that is up shortest in the middle of it. */
+PM_INLINE int32_t edges(pm_q_t from, pm_q_t to, pm_q_t u, pm_q_t edge)
 {
-    return i < 0 ? -1 : 1;
+    const pm_q_t moved = to - from;
+    const pm_q_t before = u > edge ? 0 : (u < -edge ? pm_half(moved) : pm_half(pm_half(moved)));
+    return (from + before < 0 ? -1 : 0) + (to - before < 0 ? -1 : 0);
 }
 
-/* Sum of the signs of a leg's current at its two edges. The current moves while legs differ: the leg that is
- * up longest switches before and after that, the one that is up shortest in the middle of it. */
-static int32_t signs(pm_q_t from, pm_q_t to, pm_q_t u, pm_q_t edge)
-{
-    if (u > edge) {
-        return sign_of(from) + sign_of(to);
-    }
-    if (u < -edge) {
-        return 2 * sign_of(from + to);
-    }
-    return sign_of(3 * from + to) + sign_of(from + 3 * to);
-}
+/* What the lost voltage is multiplied with; what the legs have in common is free. */
+typedef struct {
+    int32_t alpha; /* thirds */
+    int32_t beta;  /* 1 / sqrt(3) */
+} edges_t;
 
-static pm_ab_t lost(const drive_t *drive, const commissioning_t *self, pm_ab_t v)
+static inline edges_t edges_of(const square_t *square, pm_abc_t i, pm_ab_t v)
 {
-    const pm_q_t half = self->lost / 2;
-    const pm_q_t edge = self->of.square.voltage / 4;
+    const pm_q_t edge = pm_half(pm_half(square->voltage));
     const pm_abc_t u = pm_clarke_inverse(v);
-    const pm_abc_t x = {
-        .a = signs(self->i_last.a, drive->i_abc.a, u.a, edge) * half,
-        .b = signs(self->i_last.b, drive->i_abc.b, u.b, edge) * half,
-        .c = signs(self->i_last.c, drive->i_abc.c, u.c, edge) * half,
-    };
-    return pm_clarke(x);
+    const int32_t a = edges(square->i_last.a, i.a, u.a, edge);
+    const int32_t b = edges(square->i_last.b, i.b, u.b, edge);
+    const int32_t c = edges(square->i_last.c, i.c, u.c, edge);
+    return (edges_t){.alpha = 2 * a - b - c, .beta = b - c};
 }
 
-static void take(drive_t *drive, pm_ab_t v)
+static inline void sum_axis(commissioning_t *self, pm_q_t i, pm_q_t di, int32_t negative, bool positive)
 {
-    commissioning_t *self = &drive->identify.work;
-    const pm_ab_t last = pm_clarke(self->i_last);
-    const pm_ab_t di = {.alpha = drive->i_ab.alpha - last.alpha, .beta = drive->i_ab.beta - last.beta};
-    const pm_ab_t mean = {.alpha = last.alpha + di.alpha / 2, .beta = last.beta + di.beta / 2};
+    self->sum[SUM_CURRENT] += positive ? i : -i;
+    self->sum[SUM_CHANGE] += positive ? di : -di;
+    self->of.square.negative += positive ? negative : -negative;
     self->taken++;
-    const pm_ab_t gone = lost(drive, self, v);
-    const pm_ab_t w = {.alpha = v.alpha - pm_mul(self->R, mean.alpha) - gone.alpha,
-                       .beta = v.beta - pm_mul(self->R, mean.beta) - gone.beta};
-    if (self->of.square.on_q) {
-        self->sum[SUM_FLUX] += v.beta < 0 ? -w.beta : w.beta;
-        self->sum[SUM_CURRENT] += v.beta < 0 ? -di.beta : di.beta;
-        const pm_q_t far = pm_mul(self->of.square.wanted, PM_Q(0.8)); /* near the current that it is for */
-        const pm_q_t x = pm_abs(mean.beta) > far ? pm_mul(mean.beta, di.beta) : 0;
-        self->sum[SUM_D_FLUX] += (int64_t)w.alpha * x / FINE;
-        self->sum[SUM_D_CURRENT] += (int64_t)di.alpha * x / FINE;
-        self->sum[SUM_SQUARE] += (int64_t)x * x / FINE;
-    } else {
-        self->sum[SUM_FLUX] += v.alpha < 0 ? -w.alpha : w.alpha;
-        self->sum[SUM_CURRENT] += v.alpha < 0 ? -di.alpha : di.alpha;
+}
+
+/* Of whole products sums stay below 16 i^4. */
+static inline void sum_other(commissioning_t *self, pm_q_t v, pm_ab_t i, pm_ab_t di, int32_t negative)
+{
+    const square_t *square = &self->of.square;
+    if (pm_magnitude(i.beta) > square->far) {
+        const pm_q_t x = pm_mul(i.beta, di.beta);
+        const pm_q_t w = v - pm_mul(self->R, i.alpha) - negative * square->third;
+        self->sum[SUM_D_FLUX] += (int64_t)w * x;
+        self->sum[SUM_D_CHANGE] += (int64_t)di.alpha * x;
+        self->sum[SUM_SQUARE] += (int64_t)x * x;
     }
 }
 
-/* With negative i_d the rotor stands on its edge: it must not be long. */
-static uint32_t settling(const square_t *square)
+static inline void take(commissioning_t *self, pm_ab_t i, pm_abc_t legs, pm_ab_t v)
 {
-    return square->bias != 0 ? 1U : SETTLE_CYCLES;
+    const square_t *square = &self->of.square;
+    const pm_ab_t last = square->last;
+    const pm_ab_t di = {.alpha = i.alpha - last.alpha, .beta = i.beta - last.beta};
+    const pm_ab_t mean = {.alpha = last.alpha + pm_half(di.alpha), .beta = last.beta + pm_half(di.beta)};
+    const edges_t n = edges_of(square, legs, v);
+    if (square->on_q) {
+        sum_axis(self, mean.beta, di.beta, n.beta, v.beta >= 0);
+        if (square->bias != 0) {
+            sum_other(self, v.alpha, mean, di, n.alpha);
+        }
+    } else {
+        sum_axis(self, mean.alpha, di.alpha, n.alpha, v.alpha >= 0);
+    }
 }
 
 /* A whole wave has ended, in the middle of its rise: the current is zero, and a change of the voltage here
  * leaves no mean behind, which would turn the rotor. */
 static void judge(drive_t *drive, square_t *square)
 {
-    const uint32_t cycles = square->bias != 0 ? BIASED_CYCLES : CYCLES;
     if (square->leading) {
         square->leading = false; /* not a whole one */
     } else if (square->state == (uint8_t)SQUARE_MEASURES) {
         square->cycles++;
-        if (square->cycles >= settling(square) + cycles) {
+        if (square->cycles >= square->enough) {
             square->state = (uint8_t)SQUARE_DONE;
         }
     } else if (pm_min(square->top, square->low) >= square->wanted) {
         square->state = (uint8_t)SQUARE_MEASURES;
+        square->bias = -square->bias;
         commissioning_clear_sums(&drive->identify.work);
     } else {
         square->voltage += square->voltage / 12;
@@ -106,7 +103,7 @@ static void flip(square_t *square)
     square->up = !square->up;
 }
 
-void square_step(drive_t *drive, pm_ab_t v_past)
+static void move(drive_t *drive, pm_ab_t v_past)
 {
     commissioning_t *self = &drive->identify.work;
     square_t *square = &self->of.square;
@@ -115,10 +112,13 @@ void square_step(drive_t *drive, pm_ab_t v_past)
         square->state = (uint8_t)(pm_abs(i) < square->wanted / 8 ? SQUARE_SEEKS : SQUARE_WAITS);
         return;
     }
-    square->top = pm_max(square->top, i);
-    square->low = pm_max(square->low, -i);
-    if (square->state == (uint8_t)SQUARE_MEASURES && square->cycles >= settling(square)) {
-        take(drive, v_past);
+    if (square->state == (uint8_t)SQUARE_SEEKS) {
+        square->top = pm_max(square->top, i);
+        square->low = pm_max(square->low, -i);
+    } else if (square->cycles >= square->settled && square->state == (uint8_t)SQUARE_MEASURES) {
+        take(self, drive->i_ab, drive->i_abc, v_past);
+    } else {
+        /* waves as they will be */
     }
     if (square->count >= square->half) {
         flip(square);
@@ -130,4 +130,12 @@ void square_step(drive_t *drive, pm_ab_t v_past)
     const pm_q_t v = square->state < (uint8_t)SQUARE_DONE ? square->voltage : 0;
     pm_q_t *axis = square->on_q ? &self->v.beta : &self->v.alpha;
     *axis = square->up ? v : -v;
+}
+
+void square_step(drive_t *drive, pm_ab_t v_past)
+{
+    square_t *square = &drive->identify.work.of.square;
+    move(drive, v_past);
+    square->last = drive->i_ab;
+    square->i_last = drive->i_abc;
 }

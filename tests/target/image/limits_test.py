@@ -43,6 +43,10 @@ class Analysis(unittest.TestCase):
         self.assertEqual(names & {"top", "middle", "leaf", "other", "apart", "table"},
                          {"top", "middle", "leaf", "other", "table"})
 
+    def test_reached_without(self):
+        names = {item.name for item in self.image(CALLS).reachable(["top"], ["middle"])}
+        self.assertEqual(names & {"top", "middle", "leaf", "other", "table"}, {"top", "other"})
+
     def test_deepest(self):
         image = self.image(CALLS)
         size, chain = limits.deepest(image, image.function("top"), {}, False)

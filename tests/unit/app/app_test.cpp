@@ -271,6 +271,22 @@ TEST(App, SlowThatHasNotEndedIsAnOverrun)
     EXPECT_EQ(x.fault(), DRIVE_FAULT_OVERRUN);
 }
 
+// On a processor whose flash is busy, control comes again before the slow interrupt has got anywhere.
+TEST(App, SlowRestsWhileFlashIsWritten)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_ms(10);
+    x.loop.hal.while_storing = app_control;
+    x.loop.hal.temperature_dC = 612;
+    EXPECT_EQ(x.sdo({0x23, 0x10, 0x10, 1, 's', 'a', 'v', 'e'}), 0U);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    x.run_ms(2);
+    EXPECT_EQ(x.loop.app.slow.temperature_dC, 612);
+    EXPECT_LE(x.loop.app.slow_at - x.loop.app.periods, x.loop.app.slow_divider);
+}
+
 // The converters hang, so control does not come: the monitor opens the bridge and lets the dog bite.
 TEST(App, MonitorOpensTheBridgeWhenControlCeases)
 {

@@ -319,6 +319,23 @@ TEST(Tpdo, StoredMappingsComeBack)
     EXPECT_EQ(x.take(0x289).size(), 1U);
 }
 
+TEST(Mapping, IsShownAsItWasWritten)
+{
+    Bench x;
+    x.nmt(1);
+    const std::vector<uint32_t> objects = {0x60410010, 0x60610008};
+    ASSERT_EQ(map(x, 0x1800, objects), 0U);
+    EXPECT_EQ(x.value(0x1A00, 0), 2U);
+    EXPECT_EQ(x.value(0x1A00, 1), objects[0]);
+    EXPECT_EQ(x.value(0x1A00, 2), objects[1]);
+    EXPECT_EQ(node_stored(&x.node, entry(0x1A00, 2)), int32_t(objects[1]));
+    EXPECT_EQ(x.set(0x1800, 1, x.value(0x1800, 1) | 0x80000000), 0U);
+    EXPECT_EQ(x.set(0x1A00, 0, 0), 0U);
+    EXPECT_EQ(x.set(0x1A00, 2, 0), 0U);
+    EXPECT_EQ(x.value(0x1A00, 2), 0U);
+    EXPECT_EQ(x.value(0x1A00, 1), objects[0]);
+}
+
 // A stored mapping of another version that no longer holds switches its object off and does no harm.
 TEST(Tpdo, AStoredMappingThatIsWrongIsOff)
 {

@@ -219,7 +219,9 @@ TEST(Trace, LevelIsInTheUnitOfTheSignal)
     EXPECT_EQ(x.get(OD_LIVE_TRACE_SCALE_1), 20000);
     EXPECT_EQ(x.get(OD_LIVE_TRACE_SCALE_8), 0);
     const std::pair<int32_t, int32_t> levels[] = {
-        {10000, 16384}, {-10000, -16384}, {30000, 32768}, {-30000, -32769}};
+        {10000, 16384},   {-10000, -16384}, {30000, 32768},   {-30000, -32769},   {19999, 32766},
+        {-19999, -32766}, {20000, 32768},   {-20000, -32768}, {20001, 32768},     {0, 0},
+        {1, 1},           {-1, -1},         {-20001, -32769}, {INT32_MAX, 32768}, {INT32_MIN, -32769}};
     for (const auto &pair : levels) {
         x.put(OD_LIVE_TRACE_LEVEL, pair.first);
         x.put(OD_LIVE_TRACE_TRIGGER, 1);

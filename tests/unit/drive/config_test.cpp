@@ -193,11 +193,8 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
         {"flux psi_m", c.position.observer.active_flux.model.psi_m, 28, psi / Pb},
         {"flux t_s", c.position.observer.active_flux.model.t_s, 32, T * W},
         {"flux g", c.position.observer.active_flux.g, 32, 0.5 * T * W},
-        {"flux k_adapt", c.position.observer.active_flux.k_adapt, 32, 0.01},
         {"flux k_seed", c.position.observer.active_flux.k_seed, 32, 300 * T},
         {"flux k_R", c.position.observer.active_flux.resistance.k, 26, 300 / 8.0 / (W * i_r * i_r)},
-        {"flux R_min", c.position.observer.active_flux.resistance.min, 28, 0.5 * R / Z},
-        {"flux R_max", c.position.observer.active_flux.resistance.max, 28, 2 * R / Z},
         {"flux omega_R", c.position.observer.active_flux.resistance.omega, 28, 10.5 * P / W},
         {"omega_low", c.position.omega_low, 28, 21 * P / W},
         {"omega_high", c.position.omega_high, 28, 40 * P / W},
@@ -253,8 +250,34 @@ TEST(Config, EmfObserversAreMadeFromTheSameMachine)
         EXPECT_NEAR(e.speed_lag, std::ldexp(1.8 / (2 * kPi * 25 * 1e-3), 26), 16);
         EXPECT_NEAR(e.omega_min, std::ldexp(10.5 * 3 / W, 28), 1);
         EXPECT_NEAR(e.omega_tied, std::ldexp(300 / W, 28), 1);
-        EXPECT_NEAR(e.resistance.k, std::ldexp(1 / (8 * 0.4 * 0.4), 26), 16);
+        EXPECT_NEAR(e.resistance.k, std::ldexp(1 / (64 * 0.4 * 0.4), 26), 16);
     }
+}
+
+// L_q = L_q_rated where maximum torque per ampere is at rated current, and psi_q / i_q of the given L_qd
+// beside it.
+TEST(Config, CrossCouplingIsThatOfTheTwoPointsGiven)
+{
+    const double i_r = 0.4, half = 0.2, Lb = 450.0 / 540 / 10, h = 0.236 / (2 * 32e-3) / 10;
+    const double i_mtpa = h - std::hypot(h, i_r);
+    for (const double mtpa : {1, 0}) {
+        const auto params = changed({{DRIVE_PARAM_L_qd_weak, -5.49e-3},
+                                     {DRIVE_PARAM_L_qd_strong, -7.87e-3},
+                                     {DRIVE_PARAM_mtpa, mtpa}});
+        const observer_model_t &m = configure(params).position.observer.active_flux.model;
+        const auto apparent_H = [&](double i_d) {
+            return std::ldexp(observer_L_q(&m, {static_cast<pm_q_t>(std::ldexp(i_d, 28)), PM_Q(0.4)}), -28) *
+                   Lb;
+        };
+        EXPECT_NEAR(apparent_H(mtpa != 0 ? i_mtpa : 0), 70.835e-3, 1e-8);
+        EXPECT_NEAR(i_r * (apparent_H(-half) - apparent_H(0)), 5.49e-3 * half, 1e-8);
+        EXPECT_NEAR(i_r * (apparent_H(half) - apparent_H(0)), -7.87e-3 * half, 1e-8);
+    }
+    const observer_model_t off =
+        configure(changed({{DRIVE_PARAM_L_qd_weak, -5.49e-3}, {DRIVE_PARAM_saturation_comp, 0}}))
+            .position.observer.active_flux.model;
+    EXPECT_EQ(off.L_qd, 0);
+    EXPECT_EQ(off.L_qd2, 0);
 }
 
 TEST(Config, AnObserverForRoundMachinesRefusesSaliency)

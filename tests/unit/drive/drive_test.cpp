@@ -104,6 +104,30 @@ TEST(Drive, GoesThroughItsStates)
     EXPECT_EQ(drive_status(&x.loop.app.drive)->fault, DRIVE_FAULT_NONE);
 }
 
+// Off at once, from a turning rotor.
+TEST(Drive, WhatIsNotKnownWithTheBridgeOffIsZero)
+{
+    Closed x;
+    x.run_ms(20);
+    x.command(true, 30);
+    x.run_ms(800);
+    const drive_status_t *status = drive_status(&x.loop.app.drive);
+    EXPECT_GT(status->omega, 0);
+    EXPECT_GT(status->quality, 0);
+    drive_trip(&x.loop.app.drive, DRIVE_FAULT_REMOTE_LOST);
+    x.run_ms(3);
+    EXPECT_NEAR(x.truth().omega_mech_rad_s, 30, 3);
+    EXPECT_EQ(status->i.d, 0);
+    EXPECT_EQ(status->i.q, 0);
+    EXPECT_EQ(status->i_ref.d, 0);
+    EXPECT_EQ(status->i_ref.q, 0);
+    EXPECT_EQ(status->omega, 0);
+    EXPECT_EQ(status->omega_ref, 0);
+    EXPECT_EQ(status->theta, 0U);
+    EXPECT_EQ(status->quality, 0);
+    EXPECT_NE(drive_fault_record(&x.loop.app.drive)->omega, 0); // of the moment, as it was
+}
+
 TEST(Drive, EnableTakenBackStopsTheStart)
 {
     for (const int after_ms : {50, 108, 130, 150}) { // while calibrating, in the pulses, settling
@@ -182,6 +206,32 @@ TEST(Drive, SpeedReferenceIsHeldToItsLimit)
     EXPECT_NEAR(real(drive_status(&x.loop.app.drive)->omega_ref) * 540 / 3, 150, 0.1);
     EXPECT_NE(drive_status(&x.loop.app.drive)->limits & DRIVE_LIMIT_SPEED, 0U);
     EXPECT_EQ(drive_status(&x.loop.app.drive)->fault, DRIVE_FAULT_NONE);
+}
+
+// Per-unit references are made once, and anew with other bases.
+TEST(Drive, ReferencesFollowCommandAndBases)
+{
+    direct::Drive x;
+    x.command.speed_mrad_s = 54000;
+    x.command.current_mA = 2000;
+    x.enable(false);
+    x.run_ms(1);
+    const pm_q_t omega = x.d.omega_target;
+    EXPECT_NEAR(static_cast<double>(omega) / PM_ONE, 54.0 * 3 / 540, 1e-6);
+    EXPECT_NEAR(static_cast<double>(x.d.i_target) / PM_ONE, 0.2, 1e-6);
+    x.command.current_mA = 1000;
+    x.enable(false);
+    x.run_ms(1);
+    EXPECT_EQ(x.d.omega_target, omega);
+    EXPECT_NEAR(static_cast<double>(x.d.i_target) / PM_ONE, 0.1, 1e-6);
+
+    drive_params_t p = direct::params();
+    p.speed_trip *= 2;
+    drive_config_t other = {};
+    ASSERT_TRUE(drive_configure(&other, &p).ok);
+    drive_reconfigure(&x.d, &other);
+    x.run_ms(1);
+    EXPECT_NEAR(x.d.omega_target, omega / 2, 2);
 }
 
 TEST(Drive, EstimateIsTheRotor)

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <random>
+#include <vector>
 
 #include "samples.h"
 
@@ -187,6 +189,24 @@ TEST(MathNum, FromFixedAndBack)
             int32_t back = 0;
             EXPECT_TRUE(pm_num_to_fixed(pm_num_from_fixed(x, frac_bits), frac_bits, &back));
             EXPECT_EQ(back, x);
+        }
+    }
+}
+
+TEST(MathNum, QuotientIsThatOfC)
+{
+    std::mt19937_64 random(7);
+    std::vector<int64_t> nums = {0, 1, -1, INT64_MAX, INT64_MIN, INT64_MIN + 1, INT64_C(1) << 32};
+    for (int k = 0; k < 2000; ++k) {
+        nums.push_back(static_cast<int64_t>(random()) >> (k % 60));
+    }
+    for (const int64_t num : nums) {
+        for (const int32_t den : corners()) {
+            if (den == 0) {
+                EXPECT_EQ(pm_quotient(num, den), 0);
+            } else if (den != -1 || num != INT64_MIN) {
+                ASSERT_EQ(pm_quotient(num, den), num / den) << num << " / " << den;
+            }
         }
     }
 }

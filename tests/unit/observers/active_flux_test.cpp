@@ -400,8 +400,6 @@ TEST(ActiveFlux, ResistanceIsFoundWhileInjectionLeads)
                 Fixture f = ipm_linear();
                 const pm_q_t truth = f.config.model.R;
                 f.config.model.R = static_cast<pm_q_t>(truth * factor); // nominal, with its limits
-                f.config.resistance.min = f.config.model.R / 2;
-                f.config.resistance.max = f.config.model.R * 2;
                 Tied tied(f, omega, i);
                 tied.run(0.3);
                 EXPECT_NEAR(real(tied.state.R), real(truth), kAdapted * real(truth)) << factor << omega << i;
@@ -450,7 +448,7 @@ TEST(ActiveFlux, ResistanceStaysWithinItsLimits)
         f.machine.R_ohm *= factor;
         Tied tied(f, 0, {0, 4});
         tied.run(0.5);
-        EXPECT_EQ(tied.state.R, factor < 1 ? f.config.resistance.min : f.config.resistance.max);
+        EXPECT_EQ(tied.state.R, factor < 1 ? f.config.model.R / 2 : 2 * f.config.model.R);
     }
 }
 

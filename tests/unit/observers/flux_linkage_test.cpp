@@ -22,6 +22,9 @@ constexpr double kIdeal_deg = 0.2;
 constexpr double kResidual_deg = 0.1;
 // Rounding of one period in flux, 2^-27, gathered over some tens of periods, relative to 0.3 of flux.
 constexpr double kRounding = 2e-6;
+// METHODS.md 3.2.2: what an offset of 1 % of the converter's range may leave as a constant in the flux; its
+// formulas.
+constexpr double kOffset_A = 0.1, kConstant = 0.02, kDrift = 0.05;
 // A change of the low-pass loses 2^-25 of the flux.
 constexpr double kTransformed = 1e-5;
 
@@ -104,6 +107,69 @@ TEST(FluxLinkage, ForgetsAWrongFirstValue)
         } else {
             EXPECT_GT(left_deg, 10);
         }
+    }
+}
+
+// What does not turn in the flux of an observer that leads at the true position, with an offset of the
+// current, over the last whole turns of so many seconds at rated speed; Wb.
+double constant_Wb(const observer_config_t &c, double seconds)
+{
+    const double rated = 400 * bench::kPi / 30 * 5 / kBase.omega_rad_s;
+    Rotation rotation(kMachine, kBase, rated, {0, 2});
+    obs_in_t in = rotation.seen(0, rotation.omega_rad_s);
+    observer_t state;
+    observer_reset(&state, &c, &in);
+    const int turn = static_cast<int>(std::lround(2 * bench::kPi / rotation.omega_rad_s / kBase.period_s));
+    const int end = static_cast<int>(seconds / kBase.period_s);
+    Complex sum = 0;
+    for (int k = 0; k < end; ++k) {
+        rotation.advance();
+        in = rotation.seen(rotation.theta_rad, rotation.omega_rad_s, 0, kOffset_A);
+        obs_out_t out;
+        observer_step(&state, &c, &in, &out);
+        if (k % 10 == 9) {
+            observer_slow(&state, &c, &in, &out, PM_ONE);
+        }
+        if (k >= end - turn) {
+            const Complex seen = bench::complex(out.vector) * std::polar(1.0, rotation.theta_rad);
+            sum += seen + kMachine.L_q0_H / kBase.inductance_H() * bench::complex(in.i);
+        }
+    }
+    return std::abs(sum) / turn * kBase.psi_Wb();
+}
+
+observer_config_t fed_back(double g)
+{
+    observer_config_t c = {};
+    c.id = OBSERVER_active_flux;
+    c.active_flux = bench::flux_config(kMachine, kBase, g);
+    return c;
+}
+
+// METHODS.md 3.2.2 (e): 60 s with 1 % of offset; the low-pass leaves R I / w_c, its factor sqrt(1 + g^2) of
+// that.
+TEST(FluxLinkage, AnOffsetLeavesAConstantAndNoDrift)
+{
+    const double g = 0.5, w_c = g * 400 * bench::kPi / 30 * 5;
+    const double left_Wb = constant_Wb(config(g), 60);
+    EXPECT_LT(left_Wb, kConstant * kMachine.psi_m_Wb);
+    const double expected_Wb = kMachine.R_ohm * kOffset_A / w_c * std::sqrt(1 + g * g);
+    EXPECT_NEAR(left_Wb, expected_Wb, kDrift * expected_Wb);
+    EXPECT_LT(constant_Wb(fed_back(g), 60), kConstant * kMachine.psi_m_Wb);
+}
+
+// The twin: a pure integrator drifts by R I t.
+TEST(FluxLinkage, APureIntegratorDriftsWithAnOffset)
+{
+    observer_config_t integrator = config();
+    integrator.flux_linkage.flux.g = 0;
+    integrator.flux_linkage.g = 0;
+    for (const observer_config_t &c : {integrator, fed_back(0)}) {
+        for (const double seconds : {0.5, 2.0}) {
+            const double drift_Wb = kMachine.R_ohm * kOffset_A * seconds;
+            EXPECT_NEAR(constant_Wb(c, seconds), drift_Wb, kDrift * drift_Wb) << c.id << ' ' << seconds;
+        }
+        EXPECT_GT(constant_Wb(c, 60), kMachine.psi_m_Wb) << c.id;
     }
 }
 

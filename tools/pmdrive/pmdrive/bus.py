@@ -34,8 +34,9 @@ def open_network(spec, bitrate=500000):
     try:
         network.connect(**arguments(spec, bitrate))
     except (can.CanError, OSError, ValueError, ImportError) as error:
-        raise BusError(f"cannot open {spec}: {error}",
-                       f"is the adapter plugged in and the interface up (`ip link`)? It may be: {KINDS}") from None
+        do = ("does `pmsim node` or another server listen there? It takes one client at a time" if spec.startswith("socketcand")
+              else f"is the adapter plugged in and the interface up (`ip link`)? It may be: {KINDS}")
+        raise BusError(f"cannot open {spec}: {error}", do) from None
     return network
 
 

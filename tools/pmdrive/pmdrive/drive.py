@@ -1,4 +1,5 @@
 """One drive on the bus: its values, what it keeps, its faults. Motion is in motion.py, the oscilloscope in trace.py."""
+import random
 import time
 
 import can
@@ -7,11 +8,13 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from . import dictionary, names
 from .entry import Entry
-from .errors import BusError, FaultError, NoAnswer, NotDone, Refused, UsageError
+from .errors import BusError, Disturbed, FaultError, NoAnswer, NotDone, Refused, UsageError
 
 SAVE = int.from_bytes(b"save", "little")
 LOAD = int.from_bytes(b"load", "little")
 TOGETHER = 0x06040043  # abort code of the check of all parameters together
+STORE_S = 5.0  # most that flash takes
+TRIES = 10  # where another client of the drive is answered in between
 GROUPS = ("all", "communication", "application", "machine")
 # Statusword: (mask, value): state of CiA 402
 STATES = (
@@ -19,6 +22,10 @@ STATES = (
     (0x6F, 0x23, "switched on"), (0x6F, 0x27, "operation enabled"), (0x6F, 0x07, "quick stop active"),
     (0x4F, 0x0F, "fault reaction active"), (0x4F, 0x08, "fault"),
 )
+
+
+def _lost(error):
+    return BusError(f"cannot send: {error}", "is the interface still there? Nobody acknowledges where cable, bit rate or power are wrong")
 
 
 def state_of(statusword):
@@ -53,19 +60,33 @@ class Drive:
         self.close()
 
     def close(self):
-        self.network.disconnect()
+        try:
+            self.network.disconnect()
+        except OSError:  # the interface went before
+            pass
 
     # --- single values ----------------------------------------------------------------------------------------
 
     def _call(self, label, index, sub, function, *arguments):
+        for left in reversed(range(TRIES)):
+            try:
+                return function(index, sub, *arguments)
+            except SdoAbortedError as error:
+                raise Refused(label, error.code, index, sub) from None
+            except SdoCommunicationError as error:
+                silent = "No SDO response" in str(error)
+                if silent or not left:  # else the answer was to another client of the drive
+                    raise NoAnswer(self.node_id, label) if silent else Disturbed(label) from None
+                time.sleep(random.uniform(0.0, 0.01))  # out of the other's step
+            except (can.CanError, OSError) as error:
+                raise _lost(error) from None
+        raise AssertionError("the last try returns or raises")
+
+    def send(self, cob_id, data):
         try:
-            return function(index, sub, *arguments)
-        except SdoAbortedError as error:
-            raise Refused(label, error.code, index, sub) from None
-        except SdoCommunicationError:
-            raise NoAnswer(self.node_id, label) from None
-        except can.CanError as error:
-            raise BusError(f"cannot send: {error}", "nobody acknowledges: check cable, bit rate and power") from None
+            self.network.send_message(cob_id, data)
+        except (can.CanError, OSError) as error:
+            raise _lost(error) from None
 
     def upload(self, index, sub, label=""):
         return self._call(label or f"{index:04X}h:{sub:02X}", index, sub, self.node.sdo.upload)
@@ -164,11 +185,16 @@ class Drive:
         if group not in GROUPS:
             raise UsageError(f"`{group}` is none of the groups", ", ".join(GROUPS))
         name = {0x1010: "store", 0x1011: "restore"}[index]
-        self.download(index, GROUPS.index(group) + 1, signature.to_bytes(4, "little"), f"{name}.{group}")
+        sdo = self.node.sdo
+        usual, sdo.RESPONSE_TIMEOUT = sdo.RESPONSE_TIMEOUT, STORE_S
+        try:
+            self.download(index, GROUPS.index(group) + 1, signature.to_bytes(4, "little"), f"{name}.{group}")
+        finally:
+            sdo.RESPONSE_TIMEOUT = usual
 
     def reset(self, communication=False, seconds=3.0):
         """Restart of the drive, or of its communication alone; returns when it answers again."""
-        self.network.send_message(0, bytes([130 if communication else 129, self.node_id]))
+        self.send(0, bytes([130 if communication else 129, self.node_id]))
         time.sleep(0.05)
         self.await_answer(seconds)
 

@@ -115,9 +115,16 @@ class Entry:
             return raw if isinstance(raw, str) else f"{len(raw)} bytes"
         if raw in self.values:
             return f"{raw} ({self.values[raw]})"
+        if "bit 0 " in self.help:
+            return f"0x{raw:X} ({', '.join(self.flags(raw)) or 'none'})"
         if not self.unit:
             return f"0x{raw:X}" if self.type == "u32" and raw > 0xFFFF or self.name.endswith("word") else str(raw)
         return f"{self.plain(raw)}{'' if self.unit == '1' else ' ' + self.unit}"
+
+    def flags(self, raw):
+        """Of bits that the help text names: `bit 0 this, 1 that`."""
+        named = re.findall(r"(\d+) ([^,]+)", self.help[self.help.index("bit 0 "):])
+        return [word for bit, word in named if raw >> int(bit) & 1]
 
     def plain(self, raw):
         """The number alone, exact; of angles, six digits."""

@@ -17,7 +17,7 @@ ABORTS = {
     0x06040041: ("object cannot be mapped to process data", "choose one marked t or r in docs/object-dictionary.md"),
     0x06040042: ("mapped objects are longer than the message", "map fewer: eight bytes at most"),
     0x06040043: ("does not go with other values of the device",
-                 "change those that belong together in one go, with `pmdrive load`"),
+                 "change those that belong together in one `pmdrive set`, or with `pmdrive load`"),
     0x06040047: ("internal incompatibility in the device", "report it with the output of `pmdrive info`"),
     0x06060000: ("hardware error in the device", "the flash could not be written: try again, then replace the board"),
     0x06070010: ("length does not match", "the firmware is of another version than this tool"),
@@ -83,6 +83,14 @@ class NoAnswer(PmdriveError):
         what = f" to {label}" if label else ""
         super().__init__(f"node {node_id} does not answer{what}",
                          "is it powered, and has it this node id? `pmdrive scan` looks for all; check bit rate and cable")
+
+
+class Disturbed(PmdriveError):
+    """Answers come, but to what others have asked."""
+
+    def __init__(self, label):
+        super().__init__(f"{label}: the answers that come are to somebody else's questions",
+                         "another program talks to this node: end it, or use `pmdrive shell` for both")
 
 
 class BusError(PmdriveError):

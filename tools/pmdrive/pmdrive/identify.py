@@ -30,7 +30,8 @@ WHAT_TO_DO = {
     4: "free the shaft, take its load off, or allow more current: --current",
     5: "it was stopped, or a fault came: `pmdrive faults`",
 }
-ROUND = 0.03  # less saliency than that is none
+ROUND = 0.03      # less saliency than that is none,
+SATURATED = 0.02  # and then less saturation
 LONGEST_S = 60.0
 
 
@@ -83,7 +84,8 @@ def _inductances(x):
     if x["L_q"] - x["L_d"] < ROUND * x["L_q"]:
         x["L_q_rated"] *= (x["L_d"] + x["L_q"]) / 2 / x["L_q"]
         x["L_d"] = x["L_q"] = x["L_dh_rated"] = (x["L_d"] + x["L_q"]) / 2
-        x["L_q_rated"] = min(x["L_q_rated"], x["L_q"])
+        if x["L_q_rated"] > (1 - SATURATED) * x["L_q"]:
+            x["L_q_rated"] = x["L_q"]
         x["L_qh_rated"] = 4 * x["L_q_rated"] - 3 * x["L_q"]
         x["L_dqh_rated"] = x["cross_half"] = 0.0
     x["L_qh_rated"] = max(x["L_qh_rated"], 0.3 * x["L_q_rated"])

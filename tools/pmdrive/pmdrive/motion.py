@@ -58,7 +58,7 @@ class Motion:
         self.check_fault()
         drive.write("target_torque", self.torque)
         drive.write("target_current", self.current)
-        drive.network.send_message(0, bytes([1, drive.node_id]))  # NMT: start
+        drive.send(0, bytes([1, drive.node_id]))  # NMT: start
         return cob_id & 0x7FF
 
     def start(self, seconds=10.0):
@@ -112,7 +112,7 @@ class Motion:
         finally:
             self.task.stop()
             self.task = None
-            self.drive.network.send_message(0, bytes([128, self.drive.node_id]))  # NMT: pre-operational
+            self.drive.send(0, bytes([128, self.drive.node_id]))  # NMT: pre-operational
 
 
 def switch_off(drive):

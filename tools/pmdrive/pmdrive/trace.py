@@ -114,7 +114,7 @@ def record(drive: Drive, seconds=10.0, progress=None):
             progress(names.find("trace.state").values.get(state, str(state)))
         if time.monotonic() > end:
             drive.write("trace.command", OFF)
-            raise NotDone(f"nothing was recorded in {seconds:g} s: {names.find('trace.state').text(state)}",
+            raise NotDone(f"nothing was recorded in {seconds:g} s: {names.find('trace.state').values.get(state, state)}",
                           "check level and edge of the trigger, or record without one")
         time.sleep(0.02)
 
