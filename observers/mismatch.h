@@ -7,7 +7,7 @@
  * swings on the q-axis (row 29) or on the d-axis (row 30) shows what is left, in the angle that the source
  * sees, theta + eps', whatever the loop makes of it:
  *   g = Re(X / I);  X, I: amplitudes of that angle and of the measured current (row 31)
- *   k -= (g - g_mech) / 4 for each window of whole periods (row 32)
+ *   k -= (g - g_mech) / (4 + n/4) for the n-th window of whole periods (row 32)
  *   g_mech,q = -1.5 P^2 [psi_m + (L_d - L_q) i_d] / (J w^2),  g_mech,d = -1.5 P^2 (L_d - L_q) i_q / (J w^2)
  * g_mech is how the rotor really swings. With the measured current in the place of its reference, whatever
  * the current control and the speed control make of the injection is in both amplitudes
@@ -21,9 +21,10 @@
  *
  * After MISMATCH_WINDOWS windows the injection rests for a minute, or until i_q has changed as above. K_d is
  * kept as K_d omega. Flux observers integrate an error of R: beside omega, w must be small; at |omega| < 2 w
- * nothing is injected on the d-axis. Only while the observer alone leads.
+ * nothing is injected on the d-axis. Only while the observer leads without the carrier of another source.
+ * Which observers show what: docs/methods_notes.md.
  *
- * Each control period: 46 instructions. At 1 kHz 20 when off, at most 170 otherwise. Range: |k| <= 1 per
+ * Each control period: 49 instructions and a call. At 1 kHz 30 when off, at most 161 otherwise. Range: |k| <= 1 per
  * base current. Tests: tests/unit/observers/mismatch_test.cpp, tests/scenario/mismatch_injection.yaml. */
 #ifndef OBSERVERS_MISMATCH_H
 #define OBSERVERS_MISMATCH_H
