@@ -7,24 +7,25 @@
 #ifdef PM_OBSERVERS_FEW
 
 /* Left out like the optional observers; config_mismatch.c refuses it. */
-pm_q_t mismatch_step(mismatch_t *self, const mismatch_config_t *config, const mismatch_in_t *in,
-                     pm_q_t weight, pm_q_t eps)
+pm_q_t mismatch_step(const mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
+                     const mismatch_in_t *in, pm_q_t weight, pm_q_t eps)
 {
     (void)self;
+    (void)window;
     (void)config;
     (void)in;
     (void)weight;
     return eps;
 }
 
-void mismatch_slow(mismatch_t *self, const mismatch_config_t *config, const observer_model_t *model,
-                   const mismatch_in_t *in, bool leads)
+void mismatch_slow(mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
+                   const observer_model_t *model, const mismatch_in_t *in)
 {
     (void)self;
+    (void)window;
     (void)config;
     (void)model;
     (void)in;
-    (void)leads;
 }
 
 #else
@@ -38,18 +39,20 @@ void mismatch_slow(mismatch_t *self, const mismatch_config_t *config, const obse
 /* Steps of rest. */
 #define REST   60000U
 
-pm_q_t mismatch_step(mismatch_t *self, const mismatch_config_t *config, const mismatch_in_t *in,
-                     pm_q_t weight, pm_q_t eps)
+pm_q_t mismatch_step(const mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
+                     const mismatch_in_t *in, pm_q_t weight, pm_q_t eps)
 {
     const pm_q_t left = eps + pm_mul(weight, mismatch_eps(self, in->i));
-    const pm_angle_t seen = in->pll->theta + (pm_angle_t)pm_rad_to_angle(left);
-    self->theta += (pm_angle_t)pm_omega_to_angle(self->omega, in->k_theta);
-    self->x += (pm_angle_t)(pm_angle_diff(seen, self->theta) / 16);
-    self->i += (config->id == (uint8_t)MISMATCH_Q_AXIS ? in->i.q : in->i.d) / 16;
+    if (window != NULL) {
+        const pm_angle_t seen = in->pll->theta + (pm_angle_t)pm_rad_to_angle(left);
+        window->theta += (pm_angle_t)pm_omega_to_angle(window->omega, in->k_theta);
+        window->x += (pm_angle_t)(pm_angle_diff(seen, window->theta) / 16);
+        window->i += (config->id == (uint8_t)MISMATCH_Q_AXIS ? in->i.q : in->i.d) / 16;
+    }
     return left;
 }
 
-static void begin_window(mismatch_t *self, pm_angle_t x)
+static void begin_window(mismatch_window_t *self, pm_angle_t x)
 {
     self->count = 0;
     self->theta += x;
@@ -76,26 +79,26 @@ static pm_q_t rotor(const mismatch_config_t *config, const observer_model_t *mod
     return -pm_shl(pm_sat(pm_mulh(flux, config->swing), 19), 12);
 }
 
-static void learn(mismatch_t *self, const mismatch_config_t *config, const observer_model_t *model,
-                  const mismatch_in_t *in)
+static void learn(mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
+                  const observer_model_t *model, const mismatch_in_t *in)
 {
-    const pm_ab_t current = lifted(self->current);
+    const pm_ab_t current = lifted(window->current);
     const pm_q_t square = real_product(current, current);
     if (square < pm_mul(config->i, config->i) / 4) {
         return;
     }
-    const pm_q_t g = pm_div(real_product(lifted(self->angle), current), square);
-    const pm_q_t change = (rotor(config, model, in->i) - g) / (4 + (int32_t)(self->windows / 4U));
+    const pm_q_t g = pm_div(real_product(lifted(window->angle), current), square);
+    const pm_q_t change = (rotor(config, model, in->i) - g) / (4 + (int32_t)(window->windows / 4U));
     if (config->id == (uint8_t)MISMATCH_Q_AXIS) {
         self->k.q = pm_sat(self->k.q + change, PM_Q_BITS);
     } else {
         self->k_omega = pm_mul(pm_sat(self->k.d + change, PM_Q_BITS), in->pll->omega);
     }
-    self->windows++;
+    window->windows++;
 }
 
 /* A step of the window; x: angle beyond that of constant speed. */
-static void collect(mismatch_t *self, const mismatch_config_t *config, pm_angle_t x, pm_q_t i)
+static void collect(mismatch_window_t *self, const mismatch_config_t *config, pm_angle_t x, pm_q_t i)
 {
     const uint32_t step = UINT32_MAX / config->samples;
     const pm_dir_t dir = pm_dir(step * self->count + step / 2U);
@@ -127,7 +130,7 @@ static bool turns(const mismatch_config_t *config, const mismatch_in_t *in)
            pm_abs(pm_omega_to_angle(in->pll->omega, in->k_theta)) / 4 > two;
 }
 
-static void begin_again(mismatch_t *self, const mismatch_config_t *config, pm_angle_t x)
+static void begin_again(mismatch_window_t *self, const mismatch_config_t *config, pm_angle_t x)
 {
     begin_window(self, x);
     self->windows = 0;
@@ -135,37 +138,44 @@ static void begin_again(mismatch_t *self, const mismatch_config_t *config, pm_an
     self->id = config->id;
 }
 
-void mismatch_slow(mismatch_t *self, const mismatch_config_t *config, const observer_model_t *model,
-                   const mismatch_in_t *in, bool leads)
+static void listen(mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
+                   const observer_model_t *model, const mismatch_in_t *in)
+{
+    (void)pm_lp1(&window->omega, in->pll->omega, K_MEAN);
+    (void)pm_lp1(&window->i_q, in->i.q, K_MEAN);
+    const pm_angle_t x = (pm_angle_t)mean((int32_t)window->x, config);
+    const pm_q_t i = mean(window->i, config);
+    window->x = 0;
+    window->i = 0;
+    const bool other = window->id != config->id || pm_abs(window->i_q - window->i_record) > config->i;
+    if (other || window->count > REST || !turns(config, in)) {
+        begin_again(window, config, x);
+    } else if (window->windows >= MISMATCH_WINDOWS) {
+        window->count++;
+    } else if (pm_abs((int32_t)x) > AWAY) {
+        begin_window(window, x);
+    } else {
+        collect(window, config, x, i);
+        if (window->count == (MISMATCH_PERIODS + 1U) * config->samples) {
+            learn(self, window, config, model, in);
+            begin_window(window, x);
+        }
+    }
+}
+
+void mismatch_slow(mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
+                   const observer_model_t *model, const mismatch_in_t *in)
 {
     const pm_q_t omega = in->pll->omega;
-    (void)pm_lp1(&self->omega, omega, K_MEAN);
-    (void)pm_lp1(&self->i_q, in->i.q, K_MEAN);
-    self->injected = 0;
-    if (config->id == (uint8_t)MISMATCH_OFF) {
-        self->k = (pm_dq_t){0, 0};
-        self->k_omega = 0;
-        return;
-    }
-    const pm_angle_t x = (pm_angle_t)mean((int32_t)self->x, config);
-    const pm_q_t i = mean(self->i, config);
-    self->x = 0;
-    self->i = 0;
     const pm_q_t k_d = pm_sat(pm_div(self->k_omega, pm_max(pm_abs(omega), LEAST)), PM_Q_BITS);
     self->k.d = omega < 0 ? -k_d : k_d;
-    const bool other = self->id != config->id || pm_abs(self->i_q - self->i_record) > config->i;
-    if (!leads || other || self->count > REST || !turns(config, in)) {
-        begin_again(self, config, x);
-    } else if (self->windows >= MISMATCH_WINDOWS) {
-        self->count++;
-    } else if (pm_abs((int32_t)x) > AWAY) {
-        begin_window(self, x);
-    } else {
-        collect(self, config, x, i);
-        if (self->count == (MISMATCH_PERIODS + 1U) * config->samples) {
-            learn(self, config, model, in);
-            begin_window(self, x);
-        }
+    if (window != NULL) {
+        window->injected = 0;
+    }
+    if (config->id == (uint8_t)MISMATCH_OFF) {
+        *self = (mismatch_t){.k_omega = 0};
+    } else if (window != NULL) {
+        listen(self, window, config, model, in);
     }
 }
 

@@ -7,7 +7,7 @@
  * swings on the q-axis (row 29) or on the d-axis (row 30) shows what is left, in the angle that the source
  * sees, theta + eps', whatever the loop makes of it:
  *   g = Re(X / I);  X, I: amplitudes of that angle and of the measured current (row 31)
- *   k -= (g - g_mech) / 4 for each window of whole periods (row 32)
+ *   k -= (g - g_mech) / (4 + n/4) for the n-th window of whole periods (row 32)
  *   g_mech,q = -1.5 P^2 [psi_m + (L_d - L_q) i_d] / (J w^2),  g_mech,d = -1.5 P^2 (L_d - L_q) i_q / (J w^2)
  * g_mech is how the rotor really swings. With the measured current in the place of its reference, whatever
  * the current control and the speed control make of the injection is in both amplitudes
@@ -21,12 +21,16 @@
  *
  * After MISMATCH_WINDOWS windows the injection rests for a minute, or until i_q has changed as above. K_d is
  * kept as K_d omega. Flux observers integrate an error of R: beside omega, w must be small; at |omega| < 2 w
- * nothing is injected on the d-axis. Only while the observer alone leads.
+ * nothing is injected on the d-axis. Only while the observer leads without the carrier of another source.
+ * Which observers show what: docs/methods_notes.md.
  *
- * Each control period: 46 instructions. At 1 kHz 20 when off, at most 170 otherwise. Range: |k| <= 1 per
- * base current. Tests: tests/unit/observers/mismatch_test.cpp, tests/scenario/mismatch_injection.yaml. */
+ * Each control period: 49 instructions and a call. At 1 kHz 30 when off, at most 161 otherwise. Range: |k| <=
+ * 1 per base current. Tests: tests/unit/observers/mismatch_test.cpp, tests/scenario/mismatch_injection.yaml.
+ */
 #ifndef OBSERVERS_MISMATCH_H
 #define OBSERVERS_MISMATCH_H
+
+#include <stddef.h>
 
 #include "firmware/math/pll.h"
 #include "observers/model.h"
@@ -44,9 +48,14 @@ typedef struct {
     int32_t swing;    /* 1.5 P^2 / (J w^2): rad per base flux and base current, Q20 */
 } mismatch_config_t;
 
+/* What is known. */
 typedef struct {
-    pm_dq_t k;        /* k_d, k_q: rad per base current */
-    pm_q_t k_omega;   /* k_d omega */
+    pm_dq_t k;      /* k_d, k_q: rad per base current */
+    pm_q_t k_omega; /* k_d omega */
+} mismatch_t;
+
+/* The injection and what is seen of it; all zero before the first step. */
+typedef struct {
     pm_angle_t theta; /* of a rotor of constant speed, ... */
     pm_q_t omega;     /* which is the mean of the loop's */
     pm_angle_t x; /* what is seen beyond it, and the current: sums of a step's control periods, a sixteenth */
@@ -59,7 +68,7 @@ typedef struct {
     uint16_t count;  /* steps in the window */
     uint8_t windows;
     uint8_t id; /* for which it learns */
-} mismatch_t;
+} mismatch_window_t;
 
 typedef struct {
     const pm_pll_t *pll; /* of the step: before its correction */
@@ -73,12 +82,13 @@ static inline pm_q_t mismatch_eps(const mismatch_t *self, pm_dq_t i)
     return pm_shl(pm_mulh2(self->k.d, i.d, self->k.q, i.q), 32 - PM_Q_BITS);
 }
 
-/* Every control period, before the loop: eps corrected in the observer's share. */
-pm_q_t mismatch_step(mismatch_t *self, const mismatch_config_t *config, const mismatch_in_t *in,
-                     pm_q_t weight, pm_q_t eps);
+/* Every control period, before the loop: eps corrected in the observer's share. window: NULL while another
+ * source has a share. */
+pm_q_t mismatch_step(const mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
+                     const mismatch_in_t *in, pm_q_t weight, pm_q_t eps);
 
-/* At 1 kHz; `leads`: the position is the observer's alone. */
-void mismatch_slow(mismatch_t *self, const mismatch_config_t *config, const observer_model_t *model,
-                   const mismatch_in_t *in, bool leads);
+/* At 1 kHz. */
+void mismatch_slow(mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
+                   const observer_model_t *model, const mismatch_in_t *in);
 
 #endif

@@ -218,6 +218,9 @@ static inline void control(drive_t *drive, const position_out_t *frame, drive_ou
 /* In the frame of the step that follows. */
 PM_RARE static void collect_speed(drive_t *drive, pm_ab_t v)
 {
+    if (drive->config.speed_estimate.id == (uint8_t)SPEED_LOOP) {
+        return;
+    }
     pm_pll_t pll = drive->position.pll;
     pm_pll_predict(&pll, &drive->position.gains);
     speed_collect(&drive->speed_estimate, pm_park(v, pm_dir(pll.theta)).q);

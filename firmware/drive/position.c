@@ -24,7 +24,14 @@ PM_RARE void position_reset(position_t *self, const position_config_t *config, p
     const pm_dir_t dir = pm_dir(theta);
     const obs_in_t in = {.i = i, .dir = dir, .i_dq = pm_park(i, dir)};
     observer_reset(&self->observer, &config->observer, &in);
-    pulsating_square_reset(&self->square, &config->square, i);
+    if (self->inject) {
+        pulsating_square_reset(&self->square, &config->square, i);
+    }
+}
+
+static mismatch_window_t *window_of(position_t *self)
+{
+    return self->inject ? NULL : &self->window;
 }
 
 /* What few drives use: one question in the period instead of one for each. */
@@ -36,7 +43,7 @@ PM_RARE static pm_q_t special_eps(position_t *self, const position_config_t *con
     }
     if (config->mismatch.id != (uint8_t)MISMATCH_OFF) {
         const mismatch_in_t at = {.pll = &self->pll, .k_theta = self->gains.k_theta, .i = i};
-        eps = mismatch_step(&self->mismatch, &config->mismatch, &at, self->weight, eps);
+        eps = mismatch_step(&self->mismatch, window_of(self), &config->mismatch, &at, self->weight, eps);
     }
     return loop_eps(&self->loop, &config->loop, &self->pll, &self->gains, eps);
 }
@@ -106,6 +113,7 @@ static void set_weight(position_t *self, const position_config_t *config, pm_ab_
         pulsating_square_reset(&self->square, &config->square, i);
     } else if (self->inject && speed > config->omega_high + config->omega_high / 8) {
         self->inject = false;
+        self->window = (mismatch_window_t){.count = 0};
     }
 }
 
@@ -123,7 +131,7 @@ static pm_q_t magnitude_after(pm_q_t *filter, pm_q_t x)
  * filtered before. Whichever leads, both must agree. */
 static void set_quality(position_t *self, const position_config_t *config, const obs_out_t *seen, pm_dq_t i)
 {
-    const pm_q_t square_eps = magnitude_after(&self->square_eps, self->square.eps);
+    const pm_q_t square_eps = self->inject ? magnitude_after(&self->square_eps, self->square.eps) : 0;
     /* also while the observer is tied: an EMF that the position does not explain */
     pm_q_t eps = magnitude_after(&self->observer_eps, seen->eps + mismatch_eps(&self->mismatch, i));
     pm_q_t misfit = self->weight > 0 ? pm_abs(seen->misfit) : 0;
@@ -143,14 +151,16 @@ PM_RARE void position_slow(position_t *self, const position_config_t *config, pm
     const obs_in_t in = {.omega = self->pll.omega, .i = i, .i_dq = i_dq};
     const obs_out_t seen = observer_last(&self->observer, &config->observer);
     set_weight(self, config, i);
-    pulsating_square_slow(&self->square, &config->square, &in);
+    if (self->inject) {
+        pulsating_square_slow(&self->square, &config->square, &in);
+    }
     self->gains.kp_turn = between(config->pll_low.kp_turn, config->pll_high.kp_turn, self->weight);
     self->gains.ki = between(config->pll_low.ki, config->pll_high.ki, self->weight);
     loop_slow(&self->loop, &config->loop, self->weight);
     second_harmonic_slow(&self->second_harmonic, &config->second_harmonic, self->pll.omega, self->weight);
     const mismatch_in_t at = {.pll = &self->pll, .k_theta = self->gains.k_theta, .i = i_dq};
     const observer_model_t *model = &config->observer.active_flux.model; /* the first of each observer's */
-    mismatch_slow(&self->mismatch, &config->mismatch, model, &at, self->weight == PM_ONE);
+    mismatch_slow(&self->mismatch, window_of(self), &config->mismatch, model, &at);
     observer_slow(&self->observer, &config->observer, &in, &seen, self->weight);
     set_quality(self, config, &seen, i_dq);
 }

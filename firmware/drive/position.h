@@ -37,8 +37,11 @@ typedef struct {
     second_harmonic_t second_harmonic;
     mismatch_t mismatch;
     observer_t observer;
-    pulsating_square_t square;
-    bool inject;                     /* carrier on */
+    bool inject; /* carrier on */
+    union {
+        pulsating_square_t square; /* with the carrier ... */
+        mismatch_window_t window;  /* ... and without */
+    };
     pm_q_t omega_mean;               /* filtered for the weight */
     pm_q_t observer_eps, square_eps; /* without noise, for the quality */
     pm_q_t eps_mean;
@@ -68,6 +71,12 @@ void position_change_observer(position_t *self, const position_config_t *config,
 /* While the rotor follows a given vector (align, open-loop start): the loop is opened, the position is
  * `imposed` and goes on with its speed, and the observer is tied to it. Up to the next position_slow(). */
 void position_lead(position_t *self, const position_config_t *config, const pm_pll_t *imposed);
+
+/* To be added to the current reference, on the axis of config->mismatch. */
+static inline pm_q_t position_injected(const position_t *self)
+{
+    return self->inject ? 0 : self->window.injected;
+}
 
 /* At 1 kHz, with the current of the last step and the same in its frame: weight, carrier, loop gains,
  * quality. */

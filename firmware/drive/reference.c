@@ -85,7 +85,7 @@ void reference_vector(drive_t *drive)
     }
     drive->status.limits |= limited ? DRIVE_LIMIT_CURRENT : 0U;
     drive->i_ref = (pm_dq_t){.d = flux_current(drive, i_q), .q = i_q};
-    const pm_q_t injected = drive->position.mismatch.injected;
+    const pm_q_t injected = position_injected(&drive->position);
     if (c->position.mismatch.id == (uint8_t)MISMATCH_D_AXIS) {
         drive->i_ref.d += injected;
     } else {

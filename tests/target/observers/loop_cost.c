@@ -22,15 +22,16 @@ COST(pm_q_t, second_harmonic, second_harmonic_t *self, const second_harmonic_con
     return second_harmonic_step(self, c, *dir, eps);
 }
 
-COST(pm_q_t, mismatch, mismatch_t *self, const mismatch_config_t *c, const mismatch_in_t *in, pm_q_t eps)
+COST(pm_q_t, mismatch, mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *c,
+     const mismatch_in_t *in, pm_q_t eps)
 {
-    return mismatch_step(self, c, in, PM_ONE, eps);
+    return mismatch_step(self, window, c, in, PM_ONE, eps);
 }
 
-COST(void, mismatch_slow, mismatch_t *self, const mismatch_config_t *c, const observer_model_t *model,
-     const mismatch_in_t *in)
+COST(void, mismatch_slow, mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *c,
+     const observer_model_t *model, const mismatch_in_t *in)
 {
-    mismatch_slow(self, c, model, in, true);
+    mismatch_slow(self, window, c, model, in);
 }
 
 COST(pm_q_t, speed, speed_t *self, const speed_config_t *c, const speed_in_t *in)
@@ -65,12 +66,13 @@ int main(void)
         }
     }
     static mismatch_t mismatch;
+    static mismatch_window_t window;
     const mismatch_config_t wrong = {.id = MISMATCH_Q_AXIS, .periods = 10, .samples = 10, .i = PM_Q(0.04)};
     const observer_model_t model = {.L_d = PM_Q(0.22), .L_q = PM_Q(0.25), .psi_m = PM_Q(0.58)};
     for (uint32_t k = 0; k < 200; k++) { /* at the end of windows too */
-        const mismatch_in_t in = {.pll = &pll, .k_theta = PM_Q(0.55), .i = {0, mismatch.injected}};
-        sink = cost_mismatch(&mismatch, &wrong, &in, 0);
-        cost_mismatch_slow(&mismatch, &wrong, &model, &in);
+        const mismatch_in_t in = {.pll = &pll, .k_theta = PM_Q(0.55), .i = {0, window.injected}};
+        sink = cost_mismatch(&mismatch, &window, &wrong, &in, 0);
+        cost_mismatch_slow(&mismatch, &window, &wrong, &model, &in);
     }
     static speed_t speed;
     const speed_config_t c = {.id = SPEED_COMBINED,

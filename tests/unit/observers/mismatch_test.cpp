@@ -132,10 +132,11 @@ class Drive
     void settle()
     {
         state = {};
-        state.id = config.id;
-        state.omega = fixed(omega / kBase_rad_s, 28);
-        state.i_q = state.i_record = fixed(load.imag() / kBase_A, 28);
-        state.theta = turns(bench::wrapped(theta_));
+        window = {};
+        window.id = config.id;
+        window.omega = fixed(omega / kBase_rad_s, 28);
+        window.i_q = window.i_record = fixed(load.imag() / kBase_A, 28);
+        window.theta = turns(bench::wrapped(theta_));
     }
     void speed(double to)
     {
@@ -160,6 +161,7 @@ class Drive
     mismatch_config_t config;
     observer_model_t model = model_of();
     mismatch_t state = {};
+    mismatch_window_t window = {};
     double d_resistance = 0, d_inductance = 0; // machine minus parameter
     Complex load = {-2, kLoad_A};
     double omega = 209, steady = 209, friction = 3;
@@ -174,7 +176,7 @@ class Drive
     void period()
     {
         const bool q = config.id == MISMATCH_Q_AXIS;
-        const double injected = real(state.injected) * kBase_A;
+        const double injected = real(window.injected) * kBase_A;
         largest = std::max(largest, std::abs(injected));
         current_ += (1 - std::exp(-2 * kPi * 500 * kPeriod_s)) * (arrives * injected - current_);
         const Complex i = load + (q ? kJ : Complex(1)) * current_;
@@ -192,15 +194,15 @@ class Drive
         const pm_dq_t measured = {fixed(i.real() / kBase_A, 28), fixed(i.imag() / kBase_A, 28)};
         pll_ = {turns(bench::wrapped(hat_)), fixed(hat_omega_ / kBase_rad_s, 28)};
         const mismatch_in_t in = {&pll_, gains_.k_theta, measured};
-        const double eps =
-            real(mismatch_step(&state, &config, &in, PM_ONE, fixed(bench::wrapped(seen - hat_), 28)));
+        const double eps = real(mismatch_step(&state, leads ? &window : nullptr, &config, &in, PM_ONE,
+                                              fixed(bench::wrapped(seen - hat_), 28)));
         if (reference != nullptr) {
-            reference->period(hat_ + eps, bench::rad(state.theta), i);
+            reference->period(hat_ + eps, bench::rad(window.theta), i);
         }
         hat_ += 1.8 * kW_n * kPeriod_s * eps;
         hat_omega_ += kW_n * kW_n * kPeriod_s * eps;
         if (++count_ % kPeriods == 0) {
-            mismatch_slow(&state, &config, &model, &in, leads);
+            mismatch_slow(&state, leads ? &window : nullptr, &config, &model, &in);
             if (reference != nullptr) {
                 reference->slow();
             }
@@ -286,7 +288,7 @@ TEST(Mismatch, AmplitudeOfAToneInNoise)
         drive.noise = 0.3 * kDegree;
         drive.run(0.5 + 0.01 * draw); // other noise
         drive.settle();
-        while (drive.state.windows == 0) {
+        while (drive.window.windows == 0) {
             drive.run(1e-3);
         }
         const double amplitude = 4 * -drive.k().imag() * kInjected_A;
@@ -397,14 +399,15 @@ TEST(Mismatch, LargestInputsSaturate)
         observer_model_t model = model_of();
         model.psi_m = INT32_MAX;
         mismatch_t state = {};
+        mismatch_window_t window = {};
         for (int n = 0; n < 20000; ++n) {
             const pm_pll_t pll = {0, INT32_MAX};
-            const pm_q_t i = state.injected; // arrives
+            const pm_q_t i = window.injected; // arrives
             const mismatch_in_t in = {&pll, 0, {i, i}};
             for (int k = 0; k < kPeriods; ++k) {
-                mismatch_step(&state, &c, &in, PM_ONE, n % 3 == 0 ? PM_ONE / 12 : -PM_ONE / 12);
+                mismatch_step(&state, &window, &c, &in, PM_ONE, n % 3 == 0 ? PM_ONE / 12 : -PM_ONE / 12);
             }
-            mismatch_slow(&state, &c, &model, &in, true);
+            mismatch_slow(&state, &window, &c, &model, &in);
             ASSERT_LE(std::abs(real(state.k.d)), 1.0) << id;
             ASSERT_LE(std::abs(real(state.k.q)), 1.0) << id;
         }
