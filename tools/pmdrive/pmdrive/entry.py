@@ -166,8 +166,8 @@ class Entry:
                 number = Decimal(match[1])
             except InvalidOperation:
                 raise ValueRefused(self, f"`{text}` is not a number") from None
-        if not -LONGEST < number.adjusted() < LONGEST:  # digits that nobody means, but which would take for ever
-            raise ValueRefused(self, f"`{text}` is beyond all numbers that it may be")
+        if number.adjusted() > LONGEST:  # more digits would take for ever
+            number = Decimal(1).scaleb(LONGEST).copy_sign(number)
         number = self._convert(number, match[2] or "")
         exact = number / self.scale
         raw = int(exact.to_integral_value(ROUND_HALF_EVEN))
