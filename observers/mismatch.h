@@ -24,8 +24,9 @@
  * nothing is injected on the d-axis. Only while the observer leads without the carrier of another source.
  * Which observers show what: docs/methods_notes.md.
  *
- * Each control period: 49 instructions and a call. At 1 kHz 30 when off, at most 161 otherwise. Range: |k| <= 1 per
- * base current. Tests: tests/unit/observers/mismatch_test.cpp, tests/scenario/mismatch_injection.yaml. */
+ * Each control period: 49 instructions and a call. At 1 kHz 30 when off, at most 161 otherwise. Range: |k| <=
+ * 1 per base current. Tests: tests/unit/observers/mismatch_test.cpp, tests/scenario/mismatch_injection.yaml.
+ */
 #ifndef OBSERVERS_MISMATCH_H
 #define OBSERVERS_MISMATCH_H
 
