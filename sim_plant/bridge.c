@@ -1,6 +1,7 @@
 #include "sim_plant/bridge.h"
 
 #include <math.h>
+#include <string.h>
 
 /* Margins against rounding: what counts as no current, and how far beyond a diode's threshold a floating
  * terminal must be, so that a diode never stops and starts for the same instant. */
@@ -77,19 +78,23 @@ static void sum_rail(bridge_t *b, const winding_t *w)
 {
     unsigned upper = legs_of(b, UPPER);
     const double *first = w->side[0][upper & 7u], *second = w->side[1][upper >> 3];
+    double rail[OF_ALIKE];
     for (int a = 0; a < OF_ALIKE; a++) {
-        b->rail[a] = first[a] + second[a];
+        rail[a] = first[a] + second[a];
     }
+    memcpy(b->rail, rail, sizeof rail);
 }
 
 static void sum_diodes(bridge_t *b, const winding_t *w)
 {
     unsigned high = legs_of(b, BY_HIGH_DIODE), low = legs_of(b, BY_LOW_DIODE);
+    const double *high_1[] = {w->side[0][high & 7u], w->side[1][high >> 3]};
+    const double *low_1[] = {w->side[0][low & 7u], w->side[1][low >> 3]};
+    double diode_V[OF_ALIKE];
     for (int a = 0; a < OF_ALIKE; a++) {
-        double first = w->side[0][high & 7u][a] - w->side[0][low & 7u][a];
-        double second = w->side[1][high >> 3][a] - w->side[1][low >> 3][a];
-        b->diode_V[a] = b->v_diode_V * (first + second);
+        diode_V[a] = b->v_diode_V * (high_1[0][a] - low_1[0][a] + (high_1[1][a] - low_1[1][a]));
     }
+    memcpy(b->diode_V, diode_V, sizeof diode_V);
 }
 
 static void sum_sources(bridge_t *b, const winding_t *w)

@@ -123,7 +123,11 @@ void machine_set(machine_t *machine, const plant_config_t *config, double windin
 
 void machine_evaluate(const machine_t *m, const machine_state_t *s, machine_point_t *p)
 {
-    machine_evaluate_n(m, s, machine_shape(m), true, p);
+    if (m->winding.active == 2) {
+        machine_evaluate_n(m, s, (shape_t){2, 1, 3}, true, p);
+    } else {
+        machine_evaluate_n(m, s, machine_shape(m), true, p);
+    }
 }
 
 /* Of a plain machine: the core's, in stationary coordinates. */

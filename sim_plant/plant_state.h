@@ -11,7 +11,8 @@
 
 struct plant {
     plant_config_t config; /* machine and sensor as the scenario sets them, */
-    plant_machine_t known; /* and the machine as the circuit knows it */
+    plant_machine_t known; /* and the machine as the circuit knows it, */
+    plant_sensor_t sound;  /* and the sensor as it was when it made sense */
     circuit_t circuit;
     gates_t gates;
     noise_t noise;

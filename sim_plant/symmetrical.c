@@ -15,8 +15,10 @@
 
 #include <math.h>
 
-/* Of d, where all is smooth: about what the embedded solution of a Runge-Kutta pair of this order misses. */
-#define PART 0.125
+/* Of d, where all is smooth: about what the embedded solution of a Runge-Kutta pair of this order misses.
+ * With swinging terminals: what remains of a third derivative that is not known. */
+#define PART       0.125
+#define SWING_PART (1.0 / 3.0)
 
 INLINE double error_norm(const circuit_t *c, const rates_t *miss, shape_t shape, bool swings)
 {
@@ -98,7 +100,7 @@ INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape
     rates_t end, miss;
     tied_t tied;
     double turn = h * (s->omega_e + 0.5 * h * (s->omega_e_s + h / 3.0 * s->omega_e_s2));
-    double part = swings ? 1.0 : PART;
+    double part = swings ? SWING_PART : PART;
     bool steady = s->steady;
     for (int p = 0; p < pairs(shape); p++) {
         tied.switch_V[p] = s->tied.switch_V[p];
@@ -172,7 +174,7 @@ INLINE double swing_s(const circuit_t *c, const start_t *s, double h)
         bend = larger(bend, fabs(s->bend.leg_V_s[k]));
     }
     double square = c->machine.gamma_leg_1_H * c->bridge.inv_c_leg_1_F; /* of the angular frequency */
-    double error = bend * square * h * h * h * h * (c->inv_v_scale_1_V * c->inv_tolerance / 24.0);
+    double error = SWING_PART / 24.0 * bend * square * h * h * h * h * c->inv_v_scale_1_V * c->inv_tolerance;
     return error > 0.5 ? h * sqrt(sqrt(0.5 / error)) : h;
 }
 

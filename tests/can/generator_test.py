@@ -13,7 +13,7 @@ from random import Random
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
-from dictionary import generate, reader  # noqa: E402
+from dictionary import generate, model, reader  # noqa: E402
 from dictionary.source import SourceError  # noqa: E402
 
 GOOD = (ROOT / generate.SOURCE).read_text(encoding="utf-8")
@@ -333,8 +333,16 @@ class Made(unittest.TestCase):
 
     def test_slots_are_dense(self):
         for lives in ("node", "parameter", "live"):
-            slots = [entry.slot for entry in self.dictionary.of(lives)]
+            entries = self.dictionary.of(lives)
+            last = [e for e in entries if model.is_mapping(e)]
+            slots = [entry.slot for entry in [e for e in entries if e not in last] + last]
             self.assertEqual(slots, list(range(len(slots))), lives)
+
+    def test_places_of_pdos_are_behind_the_words_pdo_by_pdo(self):
+        first = int(re.search(r"OD_NODE_WORDS = (\d+),", self.files["firmware/can/dictionary_slots.h"])[1])
+        places = [(index, sub) for index in (*range(0x1600, 0x1604), *range(0x1A00, 0x1A04)) for sub in range(1, 9)]
+        found = {(e.index, e.sub): e.slot for e in self.dictionary.of("node") if model.is_mapping(e)}
+        self.assertEqual(found, {place: first + n for n, place in enumerate(places)})
 
     def test_parameters_are_in_the_order_of_their_slots(self):
         names = re.findall(r"^PM_PARAM\((\w+),", self.files["firmware/drive/parameters.def"], re.M)

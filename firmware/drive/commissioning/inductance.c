@@ -101,12 +101,23 @@ static pm_q_t cross(const drive_t *drive)
     return pm_mul_sat(slope, commissioning_current(drive));
 }
 
+/* The amplitude was found with positive i_d; with the negative one there is less saturation, so less current.
+ */
+static pm_q_t at_test_current(const drive_t *drive, pm_q_t L)
+{
+    const commissioning_t *self = &drive->identify.work;
+    const pm_q_t L_q = drive->commissioning_report.result.L_q;
+    const pm_q_t peak = pm_half((int32_t)self->of.square.half * commissioning_mean(self, SUM_CHANGE));
+    const pm_q_t short_of = pm_min(pm_div(commissioning_current(drive), peak), PM_Q(1.25));
+    return L_q + pm_mul(L - L_q, pm_mul(short_of, short_of));
+}
+
 static void conclude(drive_t *drive, bool on_q, bool rated, pm_q_t L)
 {
     commissioning_t *self = &drive->identify.work;
     commissioning_result_t *r = &drive->commissioning_report.result;
     if (rated) {
-        r->L_q_rated = L;
+        r->L_q_rated = at_test_current(drive, L);
         r->L_dq_rated = self->of.square.bias != 0 ? cross(drive) : 0;
     } else if (on_q) {
         r->L_q = L;

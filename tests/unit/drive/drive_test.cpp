@@ -231,7 +231,7 @@ TEST(Drive, ReferencesFollowCommandAndBases)
     ASSERT_TRUE(drive_configure(&other, &p).ok);
     drive_reconfigure(&x.d, &other);
     x.run_ms(1);
-    EXPECT_NEAR(x.d.omega_target, omega / 2, 2);
+    EXPECT_NEAR(2 * x.d.omega_target, omega, 4);
 }
 
 TEST(Drive, EstimateIsTheRotor)

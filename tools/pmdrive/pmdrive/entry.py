@@ -8,6 +8,7 @@ from typing import Optional
 from .errors import ValueRefused
 
 # type: (struct format, bits, least, most)
+LONGEST = 40  # decimal exponent of a number that is looked at
 NUMBERS = {
     "i8": ("<b", 8, -(2**7), 2**7 - 1),
     "i16": ("<h", 16, -(2**15), 2**15 - 1),
@@ -101,6 +102,7 @@ class Entry:
             raise ValueRefused(self, f"{self.text(raw)} is below the least, {self.text(self.least)}")
         if self.most is not None and raw > self.most:
             raise ValueRefused(self, f"{self.text(raw)} is above the most, {self.text(self.most)}")
+        self.encode(raw)
 
     def physical(self, raw):
         return Decimal(raw) * self.scale
@@ -164,6 +166,8 @@ class Entry:
                 number = Decimal(match[1])
             except InvalidOperation:
                 raise ValueRefused(self, f"`{text}` is not a number") from None
+        if not -LONGEST < number.adjusted() < LONGEST:  # digits that nobody means, but which would take for ever
+            raise ValueRefused(self, f"`{text}` is beyond all numbers that it may be")
         number = self._convert(number, match[2] or "")
         exact = number / self.scale
         raw = int(exact.to_integral_value(ROUND_HALF_EVEN))

@@ -12,6 +12,7 @@ from .errors import NotDone, UsageError
 SIGNALS = 8
 OFF, ARM, NOW = 0, 1, 2
 COMPLETE = 4
+SHEET_MEMORY = 64 << 20  # bytes, that unpacking a data sheet may take
 EDGES = {"rising": 0, "falling": 1, "both": 2}
 
 
@@ -156,4 +157,7 @@ def data_sheet(drive: Drive):
     data = drive.read("stored_eds")
     if drive.read("stored_eds_format") != dictionary.EDS_FORMAT:
         raise NotDone("the data sheet in the device has a format that this tool does not know", "update this tool")
-    return lzma.decompress(data, format=lzma.FORMAT_ALONE).decode("ascii")
+    try:
+        return lzma.decompress(data, format=lzma.FORMAT_ALONE, memlimit=SHEET_MEMORY).decode("ascii")
+    except (lzma.LZMAError, UnicodeDecodeError) as error:
+        raise NotDone(f"the data sheet in the device cannot be read: {error}", "flash the board again") from None
