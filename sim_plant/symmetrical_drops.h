@@ -13,10 +13,11 @@
  * parts less. Where the turn begins or ends within the step d says less than it should. */
 #define TURNING   0.5
 #define KINK      4.0
-#define ZONE_EDGE 0.01  /* a step that ends so close to where a turn begins or ends counts as there; */
-#define ZONE_PAST 0.003 /* it aims this far behind an end, so as not to leave a sliver; and beyond this, as  \
-                         */
-#define ZONE_FAR 4.0    /* far as the currents' rates say, a drop is constant. Units of the zone */
+/* In units of the zone: a step that ends within EDGE of where a turn begins or ends counts as there; it aims
+ * PAST behind an end, so as not to leave a sliver; beyond FAR of the currents' rates a drop is constant. */
+#define ZONE_EDGE 0.01
+#define ZONE_PAST 0.003
+#define ZONE_FAR  4.0
 
 /* What d says of a step over which drops have moved. */
 INLINE double drop_part(const tied_t *from, const tied_t *to, shape_t shape, double part)
