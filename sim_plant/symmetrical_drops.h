@@ -11,8 +11,8 @@
 
 /* While the drop of a closed switch turns over, it is a cubic of the time: of a whole turn d says half, of
  * parts less. Where the turn begins or ends within the step d says less than it should. */
-#define TURNING   0.5
-#define KINK      4.0
+#define TURNING 0.5
+#define KINK    4.0
 /* In units of the zone: a step that ends within EDGE of where a turn begins or ends counts as there; it aims
  * PAST behind an end, so as not to leave a sliver; beyond FAR of the currents' rates a drop is constant. */
 #define ZONE_EDGE 0.01
