@@ -92,8 +92,8 @@ void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, c
         self->R = observer_resistance(&config->resistance, &config->model, self->R, in->omega, lack);
     } else {
         self->k_seed = 0;
-        set_reference(
-            self, observer_amplitude(&config->model, in->i_dq, self->psi_ref, self->psi_ref - out->vector.d));
+        set_reference(self, observer_amplitude(&config->model, in->i_dq, self->psi_ref,
+                                               pm_sub_sat(self->psi_ref, out->vector.d)));
     }
     set_operating_point(self, config, in);
 }
