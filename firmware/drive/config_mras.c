@@ -6,7 +6,6 @@
  * current, and by 0.2 rad at least. */
 static void make_mras(maker_t *m, mras_config_t *c)
 {
-    make_model(m, &c->model);
     const pm_num_t L = pm_num_div(si(m, DRIVE_PARAM_L_d), m->inductance);
     const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
     (void)fixed(m, pm_num_div(L, step), 24, DRIVE_PARAM_L_d);
@@ -23,15 +22,18 @@ static void make_mras(maker_t *m, mras_config_t *c)
 
 void make_mras_current(maker_t *m, mras_current_config_t *c)
 {
+    make_model(m, &c->model);
     make_mras(m, c);
 }
 
 void make_mras_voltage(maker_t *m, mras_voltage_config_t *c)
 {
+    make_model(m, &c->model);
     make_mras(m, c);
 }
 
 void make_mras_simple(maker_t *m, mras_simple_config_t *c)
 {
+    make_model(m, &c->model);
     make_mras(m, c);
 }

@@ -63,7 +63,7 @@ static void finish_calibration(drive_t *drive)
 /* The rotor stands at theta: injection takes over. */
 static void begin_injection(drive_t *drive, pm_angle_t theta)
 {
-    position_reset(&drive->position, &drive->config.position, theta, drive->i_ab);
+    position_reset(&drive->position, &drive->config.position, theta, drive->i_ab, true);
     current_control_reset(&drive->current, (pm_dq_t){0, 0});
     reference_reset(drive, 0);
     drive->stage = STAGE_VECTOR;

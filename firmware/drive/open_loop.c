@@ -20,7 +20,7 @@ void open_loop_start(drive_t *drive)
     drive->omega_open = 0;
     drive->emf_open = 0;
     drive->i_open = 0;
-    position_reset(&drive->position, &drive->config.position, 0, drive->i_ab);
+    position_reset(&drive->position, &drive->config.position, 0, drive->i_ab, false);
     current_control_reset(&drive->current, (pm_dq_t){0, 0});
 }
 
@@ -51,6 +51,7 @@ static void hand_over(drive_t *drive)
     current_control_reset(&drive->current, (pm_dq_t){.d = u.alpha, .q = u.beta});
     reference_reset(drive, i.beta);
     drive->i_ref.d = i.alpha;
+    drive->position.carrier = drive->config.injection; /* at lower speeds */
     drive->stage = STAGE_VECTOR;
 }
 

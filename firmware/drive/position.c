@@ -14,12 +14,15 @@
 /* The weight follows the speed through 5 ms, so that noise of the speed does not move it. */
 #define K_SPEED PM_FRAC(0.2)
 
-PM_RARE void position_reset(position_t *self, const position_config_t *config, pm_angle_t theta, pm_ab_t i)
+PM_RARE void position_reset(position_t *self, const position_config_t *config, pm_angle_t theta, pm_ab_t i,
+                            bool carrier)
 {
+    const bool inject = carrier && config->injection;
     *self = (position_t){.pll.theta = theta,
-                         .weight = config->injection ? 0 : PM_ONE,
-                         .inject = config->injection,
-                         .gains = config->injection ? config->pll_low : config->pll_high,
+                         .weight = inject ? 0 : PM_ONE,
+                         .carrier = inject,
+                         .inject = inject,
+                         .gains = inject ? config->pll_low : config->pll_high,
                          .quality = PM_ONE};
     const pm_dir_t dir = pm_dir(theta);
     const obs_in_t in = {.i = i, .dir = dir, .i_dq = pm_park(i, dir)};
@@ -100,7 +103,7 @@ PM_RARE void position_lead(position_t *self, const position_config_t *config, co
 static void set_weight(position_t *self, const position_config_t *config, pm_ab_t i)
 {
     const pm_q_t speed = pm_abs(pm_lp1(&self->omega_mean, self->pll.omega, K_SPEED));
-    if (!config->injection) {
+    if (!self->carrier) {
         self->weight = PM_ONE;
         return;
     }

@@ -37,7 +37,8 @@ typedef struct {
     second_harmonic_t second_harmonic;
     mismatch_t mismatch;
     observer_t observer;
-    bool inject; /* carrier on */
+    bool carrier; /* may be injected; else the observer leads at all speeds */
+    bool inject;  /* carrier on */
     union {
         pulsating_square_t square; /* with the carrier ... */
         mismatch_window_t window;  /* ... and without */
@@ -50,8 +51,10 @@ typedef struct {
     pm_q_t quality;
 } position_t;
 
-/* Starts at standstill with the rotor at theta. */
-void position_reset(position_t *self, const position_config_t *config, pm_angle_t theta, pm_ab_t i);
+/* Starts at standstill with the rotor at theta; `carrier`: one will be injected, if the configuration says
+ * so. */
+void position_reset(position_t *self, const position_config_t *config, pm_angle_t theta, pm_ab_t i,
+                    bool carrier);
 
 typedef struct {
     pm_dir_t dir; /* direction of the present position */

@@ -55,7 +55,7 @@ position_config_t config(bool injection = true)
 position_t started(const position_config_t &c)
 {
     position_t self;
-    position_reset(&self, &c, 0, {0, 0});
+    position_reset(&self, &c, 0, {0, 0}, true);
     return self;
 }
 
@@ -117,7 +117,7 @@ TEST(Position, ResetStandsAtTheAngleGiven)
 {
     const position_config_t c = config();
     position_t self;
-    position_reset(&self, &c, PM_TURN(0.3), {0, 0});
+    position_reset(&self, &c, PM_TURN(0.3), {0, 0}, true);
     EXPECT_EQ(self.pll.theta, PM_TURN(0.3));
     EXPECT_EQ(self.pll.omega, 0);
     EXPECT_EQ(self.weight, 0);
@@ -131,7 +131,7 @@ class Running
   public:
     explicit Running(double omega) : rotation(bench::kIpmLinear, bench::kIpmBase, omega, {0, 3})
     {
-        position_reset(&self, &c_, 0, {0, 0});
+        position_reset(&self, &c_, 0, {0, 0}, true);
         self.pll.omega = fixed(omega, 28);
         self.omega_mean = self.pll.omega;
         self.inject = false;
