@@ -276,7 +276,6 @@ speed control, below 30 % speed 10 and 3 Hz (SPM-400: 15 and 4); the observer al
 and what is not known of the dead time weigh least there. Its model contains no speed, which the position loop would feed back, and
 it costs the least. An EMF observer answers a load step with less error; take it where the speed stays above 20 %. The Kalman filter
 of full order is as good at low speed and better in a load step, at six times the instructions, but a wrong psi_m moves its angle.
-SPM-400 with twice the noise is lost in the open-loop start, where the observer takes over an oscillating rotor.
 """
 
 

@@ -15,14 +15,14 @@ static pm_q_t quotient(maker_t *m, pm_q_t x, pm_q_t y, drive_param_id_t blame)
 static void make_saturation(maker_t *m, observer_model_t *c)
 {
     const pm_q_t i_rated = per_unit(m, DRIVE_PARAM_i_rated, m->base.i);
-    const pm_q_t square = pm_mul(i_rated, i_rated);
+    const pm_q_t i_squared = pm_mul(i_rated, i_rated);
     const pm_q_t weak = per_unit(m, DRIVE_PARAM_L_qd_weak, m->inductance);
     const pm_q_t strong = per_unit(m, DRIVE_PARAM_L_qd_strong, m->inductance);
     c->L_qd = quotient(m, pm_half(weak) + pm_half(strong), i_rated, DRIVE_PARAM_L_qd_weak);
-    c->L_qd2 = quotient(m, pm_sub_sat(strong, weak), square, DRIVE_PARAM_L_qd_strong);
+    c->L_qd2 = quotient(m, pm_sub_sat(strong, weak), i_squared, DRIVE_PARAM_L_qd_strong);
     const pm_q_t rated = per_unit(m, DRIVE_PARAM_L_q_rated, m->inductance);
     const pm_dq_t i = {.d = mtpa_i_d(&m->mtpa, i_rated), .q = 0};
-    c->L_q2 = quotient(m, pm_sub_sat(rated, observer_L_q(c, i)), square, DRIVE_PARAM_L_q_rated);
+    c->L_q2 = quotient(m, pm_sub_sat(rated, observer_L_q(c, i)), i_squared, DRIVE_PARAM_L_q_rated);
 }
 
 void make_model(maker_t *m, observer_model_t *c)
@@ -33,7 +33,9 @@ void make_model(maker_t *m, observer_model_t *c)
     c->L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);
     /* observers hold it in Q29 */
     (void)fixed(m, pm_num_div(si(m, DRIVE_PARAM_L_q), m->inductance), Q_BITS + 1, DRIVE_PARAM_L_q);
-    c->L_q2 = c->L_qd = c->L_qd2 = 0;
+    c->L_q2 = 0;
+    c->L_qd = 0;
+    c->L_qd2 = 0;
     if (m->params->saturation_comp != 0) {
         make_saturation(m, c);
     }
