@@ -18,10 +18,8 @@ static void make_base(maker_t *m)
 }
 
 /* A rotor swings about the current vector like a pendulum, w^2 = 3/2 p^2 psi i / J. The vector yields by k
- * times what the rotor's speed has above a low-pass at SWING_CORNER w, so that J need not be known well:
- * damping ratio k / (2 SWING_CORNER). */
-#define SWING_CORNER 3
-
+ * times what the rotor's speed has above a low-pass, so that J need not be known well at 3 w, else as quick
+ * as steps of 1 kHz allow: damping ratio k w / (2 corner). */
 static void make_damping(maker_t *m, open_loop_config_t *c)
 {
     const pm_num_t psi = si(m, DRIVE_PARAM_psi_m);
@@ -29,9 +27,10 @@ static void make_damping(maker_t *m, open_loop_config_t *c)
         mul3(pm_num_mul(pm_num_ratio(3, 2), square(pole_pairs(m))), psi, si(m, DRIVE_PARAM_i_open_loop));
     const pm_num_t swing = pm_num_sqrt(pm_num_div(stiffness, si(m, DRIVE_PARAM_J)));
     const pm_num_t emf = pm_num_div(pm_num_mul(swing, psi), m->base.v);
-    const pm_num_t corner = mul3(pm_num(SWING_CORNER), swing, m->t_slow);
-    const pm_num_t k = pm_num_mul(pm_num(2 * SWING_CORNER), si(m, DRIVE_PARAM_open_loop_damping));
-    c->k_swing = fixed(m, least(corner, pm_num_ratio(2, 5)), FRAC_BITS, DRIVE_PARAM_J);
+    const pm_num_t turn = pm_num_mul(swing, m->t_slow);
+    const pm_num_t corner = least(pm_num_mul(pm_num(3), turn), pm_num_ratio(2, 5));
+    const pm_num_t k = mul3(pm_num(2), si(m, DRIVE_PARAM_open_loop_damping), pm_num_div(corner, turn));
+    c->k_swing = fixed(m, corner, FRAC_BITS, DRIVE_PARAM_J);
     c->v_swing = fixed(m, least(emf, pm_num(1)), Q_BITS, DRIVE_PARAM_J);
     c->per_swing = fixed(m, pm_num_mul(k, pm_num_div(m->base.psi, psi)), SMALL_BITS, DRIVE_PARAM_psi_m);
 }

@@ -93,6 +93,7 @@ TEST(Protection, RecordHasTheValuesOfTheMoment)
     x.in.i_leg[2] = current_code(-0.45);
     x.in.v_dc = voltage_code(333);
     x.step();
+    const pm_angle_t theta = x.d.position.pll.theta;
     // what comes later changes nothing
     x.in.i_leg[0] = current_code(0);
     x.in.v_dc = voltage_code(420);
@@ -106,7 +107,8 @@ TEST(Protection, RecordHasTheValuesOfTheMoment)
     EXPECT_NEAR(real(r->v_dc) * 450, 333, 0.01);
     EXPECT_EQ(r->temperature_dC, 456);
     EXPECT_EQ(r->period, before + 11);
-    EXPECT_EQ(r->theta, x.d.position.pll.theta);
+    EXPECT_EQ(r->theta, theta);
+    EXPECT_NE(r->theta, 0U);
 }
 
 TEST(Protection, TheFirstFaultStays)
