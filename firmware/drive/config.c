@@ -25,14 +25,14 @@ static void make_damping(maker_t *m, open_loop_config_t *c)
     const pm_num_t psi = si(m, DRIVE_PARAM_psi_m);
     const pm_num_t stiffness =
         mul3(pm_num_mul(pm_num_ratio(3, 2), square(pole_pairs(m))), psi, si(m, DRIVE_PARAM_i_open_loop));
-    const pm_num_t swing = pm_num_sqrt(pm_num_div(stiffness, si(m, DRIVE_PARAM_J)));
-    const pm_num_t emf = pm_num_div(pm_num_mul(swing, psi), m->base.v);
-    const pm_num_t turn = pm_num_mul(swing, m->t_slow);
-    const pm_num_t corner = least(pm_num_mul(pm_num(3), turn), pm_num_ratio(2, 5));
-    const pm_num_t k = mul3(pm_num(2), si(m, DRIVE_PARAM_open_loop_damping), pm_num_div(corner, turn));
-    c->k_swing = fixed(m, corner, FRAC_BITS, DRIVE_PARAM_J);
-    c->v_swing = fixed(m, least(emf, pm_num(1)), Q_BITS, DRIVE_PARAM_J);
-    c->per_swing = fixed(m, pm_num_mul(k, pm_num_div(m->base.psi, psi)), SMALL_BITS, DRIVE_PARAM_psi_m);
+    const pm_num_t turn = pm_num_mul(pm_num_sqrt(pm_num_div(stiffness, si(m, DRIVE_PARAM_J))), m->t_slow);
+    const pm_num_t corners = least(pm_num_mul(pm_num(6), turn), pm_num_ratio(4, 5)); /* twice it */
+    const pm_num_t emf = pm_num_mul(turn, psi);                                      /* in a step */
+    const pm_num_t k = mul3(si(m, DRIVE_PARAM_open_loop_damping), corners, m->base.psi);
+    c->k_swing = fixed(m, corners, FRAC_BITS - 1, DRIVE_PARAM_J);
+    c->v_swing =
+        fixed(m, least(pm_num_div(emf, pm_num_mul(m->t_slow, m->base.v)), pm_num(1)), Q_BITS, DRIVE_PARAM_J);
+    c->per_swing = fixed(m, pm_num_div(k, emf), SMALL_BITS, DRIVE_PARAM_psi_m);
 }
 
 static void make_open_loop(maker_t *m, open_loop_config_t *c)

@@ -1,3 +1,4 @@
+#include "firmware/math/compiler.h"
 #include "hal/stm32g431/internal.h"
 #include "hal/stm32g431/ntc.h"
 #include "hal/stm32g431/registers/analog.h"
@@ -42,7 +43,7 @@ static void start_amplifier(opamp_t *opamp)
                  reg_field(OPAMP_CSR_PGA_GAIN, OPAMP_GAIN_16_BIAS_VINM0);
 }
 
-void measure_start(void)
+PM_RARE void measure_start(void)
 {
     start_amplifier(&OPAMP1);
     start_amplifier(&OPAMP2);
