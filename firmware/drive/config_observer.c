@@ -6,7 +6,7 @@ static pm_q_t quotient(maker_t *m, pm_q_t x, pm_q_t y, drive_param_id_t blame)
 {
     const pm_q_t q = pm_div(x, y);
     if (pm_abs(q) > PM_Q(7.9)) {
-        refuse(m, blame, "does not fit the fixed-point format with these bases");
+        refuse(m, blame, "beyond the fixed-point range with these bases");
     }
     return q;
 }

@@ -62,7 +62,7 @@ static void make_second_harmonic(maker_t *m, second_harmonic_config_t *c)
         .t_s = fixed(m, step, FRAC_BITS, DRIVE_PARAM_f_pwm),
     };
     if (c->id != SECOND_HARMONIC_STAYS && m->params->position_observer == (int32_t)LOOP_ARCTANGENT) {
-        refuse(m, DRIVE_PARAM_second_harmonic, "has nothing to learn from behind the arctangent");
+        refuse(m, DRIVE_PARAM_second_harmonic, "learns nothing behind the arctangent");
     }
 }
 

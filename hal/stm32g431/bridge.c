@@ -1,4 +1,3 @@
-#include "firmware/math/compiler.h"
 #include "hal/stm32g431/internal.h"
 #include "hal/stm32g431/processor.h"
 #include "hal/stm32g431/registers/analog.h"
@@ -76,7 +75,7 @@ static void configure_comparators(uint32_t level)
     clock_delay(20U);
 }
 
-PM_RARE hal_status_t bridge_start(hal_t *hal, const hal_config_t *config)
+hal_status_t bridge_start(hal_t *hal, const hal_config_t *config)
 {
     hal_status_t status = HAL_OK;
     uint32_t dead_time = 0;

@@ -1,4 +1,3 @@
-#include "firmware/math/compiler.h"
 #include "hal/stm32g431/internal.h"
 #include "hal/stm32g431/ntc.h"
 #include "hal/stm32g431/registers/analog.h"
@@ -43,7 +42,7 @@ static void start_amplifier(opamp_t *opamp)
                  reg_field(OPAMP_CSR_PGA_GAIN, OPAMP_GAIN_16_BIAS_VINM0);
 }
 
-PM_RARE void measure_start(void)
+void measure_start(void)
 {
     start_amplifier(&OPAMP1);
     start_amplifier(&OPAMP2);
