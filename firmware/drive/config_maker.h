@@ -33,7 +33,7 @@ static inline void refuse(maker_t *m, drive_param_id_t id, const char *reason)
 
 static inline pm_num_t si(const maker_t *m, drive_param_id_t id)
 {
-    return pm_num_dec(drive_param_get(m->params, id), drive_param_table[id].exp10);
+    return pm_num_dec(drive_param_get(m->params, id), drive_param_exp10[id]);
 }
 
 static inline int32_t fixed(maker_t *m, pm_num_t x, int bits, drive_param_id_t blame)

@@ -261,8 +261,9 @@ PM_RARE void drive_prepare(drive_t *drive)
     const bool imposed = open || drive->stage == STAGE_IDENTIFY;
     const pm_q_t omega = imposed ? drive->omega_open : drive->position.pll.omega;
     const int32_t turn = pm_omega_to_angle(omega, c->k_theta);
-    /* at low speed the observer would drift on an imposed angle */
-    drive->led = open && pm_abs(drive->omega_ramp) < c->position.omega_low;
+    /* On an imposed angle an observer drifts at low speed, and on the way up it slips. */
+    const pm_q_t lead_to = open_loop_ramps(drive) ? c->position.omega_high : c->position.omega_low;
+    drive->led = open && pm_abs(drive->omega_ramp) < lead_to;
     if (drive->led) {
         const pm_pll_t along = {.theta = drive->theta_open, .omega = omega};
         position_lead(&drive->position, &c->position, &along);

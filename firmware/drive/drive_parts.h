@@ -44,6 +44,7 @@ void reference_reset(drive_t *drive, pm_q_t i_q);
 void open_loop_start(drive_t *drive);
 void open_loop_slow(drive_t *drive);
 void open_loop_resume(drive_t *drive);
+bool open_loop_ramps(const drive_t *drive); /* the imposed speed is not what is wanted yet */
 
 /* commissioning/commissioning.c: identification. Started after the calibration, with the bridge still off. */
 void commissioning_start(drive_t *drive);

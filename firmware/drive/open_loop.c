@@ -72,6 +72,11 @@ static pm_q_t wanted_speed(const drive_t *drive)
     return pm_clamp(drive->omega_target, -drive->config.omega_max, drive->config.omega_max);
 }
 
+bool open_loop_ramps(const drive_t *drive)
+{
+    return drive->omega_ramp != wanted_speed(drive);
+}
+
 /* A rotor on a vector of constant current swings undamped. Across the vector, where there is no current, the
  * voltage is the EMF of the rotor's speed: the vector falls behind a rotor that is too fast and runs ahead of
  * one that is too slow. */

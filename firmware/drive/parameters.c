@@ -3,7 +3,13 @@
 #include <string.h>
 
 const drive_param_info_t drive_param_table[DRIVE_PARAM_COUNT] = {
-#define PM_PARAM(name, unit, exp10, min, def, max, help) {#name, exp10, min, def, max},
+#define PM_PARAM(name, unit, exp10, min, def, max, help) {#name, min, def, max},
+#include "firmware/drive/parameters.def"
+#undef PM_PARAM
+};
+
+const int8_t drive_param_exp10[DRIVE_PARAM_COUNT] = {
+#define PM_PARAM(name, unit, exp10, min, def, max, help) exp10,
 #include "firmware/drive/parameters.def"
 #undef PM_PARAM
 };

@@ -24,11 +24,11 @@ typedef enum {
 
 typedef struct {
     const char *name;
-    int32_t exp10;
     int32_t min, def, max;
 } drive_param_info_t;
 
 extern const drive_param_info_t drive_param_table[DRIVE_PARAM_COUNT];
+extern const int8_t drive_param_exp10[DRIVE_PARAM_COUNT]; /* a value is its integer times 10^exp10 */
 
 /* What people read; the firmware does without it. */
 typedef struct {

@@ -6,7 +6,7 @@ from .model import TYPES
 MANDATORY = (0x1000, 0x1001, 0x1018)
 ACCESS = {"live": "rw", "off": "rw", "read": "ro", "write": "wo", "const": "const"}
 # What every reader of .lzma files can do without more memory than it needs: 64 KiB of window.
-FILTERS = [{"id": lzma.FILTER_LZMA1, "preset": 9 | lzma.PRESET_EXTREME, "dict_size": 65536, "lc": 3, "lp": 0, "pb": 0}]
+FILTERS = [{"id": lzma.FILTER_LZMA1, "preset": 9 | lzma.PRESET_EXTREME, "dict_size": 65536, "lc": 2, "lp": 0, "pb": 0}]
 
 
 def lists(dictionary):

@@ -84,7 +84,7 @@ struct Noise {
 
 int32_t parameter(drive_param_id_t id, double value)
 {
-    return static_cast<int32_t>(std::lround(value * std::pow(10, -drive_param_table[id].exp10)));
+    return static_cast<int32_t>(std::lround(value * std::pow(10, -drive_param_exp10[id])));
 }
 
 bool configure(const Record &r, int observer, const Noise &noise, drive_config_t *config)

@@ -36,7 +36,7 @@ std::optional<drive_param_id_t> find_parameter(const std::string &name)
 // Division for negative exponents: 10^n is exact, 10^-n is not, and bounds are compared with literals.
 double parameter_si(drive_param_id_t id, int32_t raw)
 {
-    const int32_t exponent = drive_param_table[id].exp10;
+    const int32_t exponent = drive_param_exp10[id];
     const double scale = std::pow(10.0, std::abs(exponent));
     return exponent < 0 ? raw / scale : raw * scale;
 }
@@ -48,7 +48,7 @@ double parameter_si(const drive_params_t &params, drive_param_id_t id)
 
 static double in_steps(drive_param_id_t id, double si)
 {
-    const int32_t exponent = drive_param_table[id].exp10;
+    const int32_t exponent = drive_param_exp10[id];
     const double scale = std::pow(10.0, std::abs(exponent));
     return exponent < 0 ? si * scale : si / scale;
 }

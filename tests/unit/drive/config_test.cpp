@@ -74,7 +74,7 @@ drive_params_t changed(const Changes &changes)
     drive_params_t p = defaults();
     for (const auto &[id, si] : changes) {
         drive_param_set(&p, id,
-                        static_cast<int32_t>(std::lround(si / std::pow(10, drive_param_table[id].exp10))));
+                        static_cast<int32_t>(std::lround(si / std::pow(10, drive_param_exp10[id]))));
     }
     return p;
 }
