@@ -35,17 +35,17 @@ USABLE_DEG = 10  # an observer is usable where its largest error at three loads 
 
 # What must be known of the machine beside its speed range: of every observer of the list.
 NEEDS = {
+    "active_flux": "R (follows at low speed), L_q(i_q); psi_m as a centre, L_d for it",
+    "back_emf": "R (follows), L_s(i_q); psi_m as a centre",
+    "extended_emf": "R (follows), L_d, L_q(i_q); psi_m as a centre",
+    "extended_emf_ab": "R (follows), L_d, L_q(i_q); psi_m as a centre",
+    "flux_linkage": "R (follows), L_s(i_q); psi_m as a centre",
     "sliding_mode": "R, L_q(i_q); psi_m for error scale and gain, which must exceed the EMF",
     "ekf_full": "R, L_d, L_q(i_q), psi_m; noise of voltage, current and acceleration",
     "ekf_reduced": "R, L_d, L_q(i_q), psi_m; noise of the EMF and acceleration",
     "mras_current": "R, L_d, L_q(i_q), psi_m",
     "mras_voltage": "R, L_d, L_q(i_q), psi_m",
     "mras_simple": "R, L_d, L_q(i_q), psi_m",
-    "active_flux": "R (follows at low speed), L_q(i_q); psi_m as a centre, L_d for it",
-    "back_emf": "R (follows), L_s(i_q); psi_m as a centre",
-    "extended_emf": "R (follows), L_d, L_q(i_q); psi_m as a centre",
-    "extended_emf_ab": "R (follows), L_d, L_q(i_q); psi_m as a centre",
-    "flux_linkage": "R (follows), L_s(i_q); psi_m as a centre",
 }
 SEEN = "fault", "angle_error_mean_deg", "angle_error_rms_deg", "angle_error_max_deg"
 
@@ -242,20 +242,22 @@ def table(head, rows):
 
 def plot(machine, results, path):
     figure, axes = plt.subplots(1, 2, figsize=(11, 4.2))
-    for axis in axes:
-        axis.set_prop_cycle(plt.cycler(linestyle=["-", "--"]) * plt.cycler(color=[f"C{n}" for n in range(6)]))
     for name, r in results.items():
+        n = list(NEEDS).index(name)  # the same line in every figure
+        style = {"color": f"C{n % 6}", "linestyle": "-" if n < 6 else "--"}
         per_speed = [[r["steady"][k * len(LOADS) + n] for n in range(len(LOADS))] for k in range(len(SPEEDS))]
-        axes[0].plot([100 * s for s in SPEEDS], [worst(part) for part in per_speed], "o-", label=name, ms=4)
+        axes[0].plot([100 * s for s in SPEEDS], [worst(part) for part in per_speed], marker="o", label=name, ms=4,
+                     **style)
         spread = sorted(largest for lost, _, _, largest in r["machines"] if not lost)
-        axes[1].plot(spread, [(k + 1) / len(r["machines"]) for k in range(len(spread))], label=name)
+        axes[1].plot(spread, [(k + 1) / len(r["machines"]) for k in range(len(spread))], label=name, **style)
     axes[0].set(xscale="log", yscale="log", xlabel="speed, % of rated", ylabel="largest error, deg",
                 title=f"{machine}: worst of three loads")
     axes[1].set(xscale="log", xlabel="largest error, deg", ylabel="share of the machines", ylim=(0, 1.02),
                 title=f"{machine}: {len(next(iter(results.values()))['machines'])} machines")
     for axis in axes:
         axis.grid(True, which="both", alpha=0.3)
-    axes[0].legend(fontsize=7)
+    axes[0].set_xticks([100 * s for s in SPEEDS], [f"{100 * s:g}" for s in SPEEDS])
+    axes[0].legend(fontsize=7, handlelength=4)
     figure.tight_layout()
     figure.savefig(path, dpi=110, metadata={"Software": None})
     plt.close(figure)
@@ -281,12 +283,14 @@ HEAD = """# The observers side by side
 
 One set of scenarios over every observer of `observers/observers.def`, on the switching plant with dead time, converter and its
 noise, and the period of delay. Made by `tools/observer_report`; the same loops and limits for all: 25 Hz position loop and 5 Hz
-speed control, below 30 % speed 10 and 3 Hz (SPM-400: 15 and 4); the observer alone leads at the speed that is measured. Errors are electrical degrees.
+speed control, below 30 % speed 10 and 3 Hz (SPM-400: 15 and 4); the observer alone leads at the speed that is measured. Errors are
+electrical degrees.
 
 **The drive's default is `active_flux`.** It runs salient and round machines alike, down to the lowest speed: it integrates, so noise
 and what is not known of the dead time weigh least there. Its model contains no speed, which the position loop would feed back, and
-it costs the least. An EMF observer answers a load step with less error; take it where the speed stays above 20 %. The Kalman filter
-of full order is as good at low speed and better in a load step, at six times the instructions, but a wrong psi_m moves its angle.
+only `mras_simple` costs less. An EMF observer answers a load step with less error; take it where the speed stays above 20 %. The
+Kalman filter of full order is as good at low speed and better in a load step, at six times the instructions, but a wrong psi_m moves
+its angle, and where R and L are not known it may slip as it takes over from the open-loop start.
 """
 
 
@@ -329,8 +333,9 @@ def page(all_results, names, plots, counted, sizes, help_of, count):
         text.append(table(["observer", "load step", "reversal", "harmonics", *names], rows))
     text.append(f"The {count} machines differ from what the drive was told by up to 20 % in R, L_d, L_q, psi and dead "
                 "time, each for itself (L_d and L_q alike for observers that know one L_s), 1 % in the gain and 20 mA in the "
-                "offset of each current channel; each starts, takes half load at 60 % speed, turns round and stops. Lost: a fault, or 60 degrees of error between 1 and 2 s; with speed control of 3 Hz, "
-                "in brackets 5 Hz: with an L that is believed a fifth too large, angle and speed control excite each other.\n")
+                "offset of each current channel; each starts, takes half load at 60 % speed, turns round and stops. Lost: a "
+                "fault, or 60 degrees of error between 1 and 2 s; with speed control of 3 Hz, in brackets 5 Hz: with an L that is "
+                "believed a fifth too large, angle and speed control excite each other.\n")
     return "\n".join(text)
 
 
