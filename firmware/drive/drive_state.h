@@ -72,7 +72,7 @@ struct drive {
     pm_q_t omega_open;     /* ... that of the vector, which yields to a swinging rotor */
     pm_q_t emf_open;       /* mean EMF beside that of the ramp */
     int32_t turn_open;     /* of that speed in a period */
-    pm_q_t i_open;
+    pm_q_t i_open;         /* open loop: its current; after the hand-over: what is left of it on the d-axis */
 
     /* references in per-unit, made from the command when it is another */
     pm_q_t omega_target;

@@ -51,6 +51,7 @@ static void hand_over(drive_t *drive)
     current_control_reset(&drive->current, (pm_dq_t){.d = u.alpha, .q = u.beta});
     reference_reset(drive, i.beta);
     drive->i_ref.d = i.alpha;
+    drive->i_open = i.alpha;
     drive->position.carrier = drive->config.injection; /* at lower speeds */
     drive->stage = STAGE_VECTOR;
 }

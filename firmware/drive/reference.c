@@ -26,6 +26,7 @@ void reference_reset(drive_t *drive, pm_q_t i_q)
     speed_control_reset(&drive->speed, drive->position.pll.omega, i_q);
     drive->speed_estimate.ready = false;
     drive->field_weakening.i_d = 0;
+    drive->i_open = 0;
     drive->i_ref = (pm_dq_t){.d = 0, .q = i_q};
 }
 
@@ -84,7 +85,9 @@ void reference_vector(drive_t *drive)
         i_q = speed_control_step(&drive->speed, &c->speed, target, omega, i_min, i_max, &limited);
     }
     drive->status.limits |= limited ? DRIVE_LIMIT_CURRENT : 0U;
-    drive->i_ref = (pm_dq_t){.d = flux_current(drive, i_q), .q = i_q};
+    /* all at once it would upset an observer by as much as R and L are told wrong */
+    drive->i_open -= drive->i_open / 16;
+    drive->i_ref = (pm_dq_t){.d = flux_current(drive, i_q) + drive->i_open, .q = i_q};
     const pm_q_t injected = position_injected(&drive->position);
     if (c->position.mismatch.id == (uint8_t)MISMATCH_D_AXIS) {
         drive->i_ref.d += injected;

@@ -152,6 +152,20 @@ TEST(OpenLoop, HandOverKeepsCurrentAndVoltage)
         EXPECT_NEAR(std::abs(seeded - u), 0, kVector) << lag_deg;
         EXPECT_EQ(x.d.speed.reference, x.d.position.pll.omega);
         EXPECT_NEAR(real(x.d.speed.pi.integral, 22), real(x.d.i_ref.q), kVector);
+
+        // what is left on the d-axis fades by a sixteenth each ms, beside what the load asks for
+        double left = real(x.d.i_ref.d);
+        for (int n = 0; n < 200; ++n) {
+            reference_vector(&x.d);
+            left *= 15.0 / 16;
+            Drive plain = x;
+            plain.d.i_open = 0;
+            reference_vector(&plain.d);
+            Drive next = x;
+            reference_vector(&next.d);
+            EXPECT_NEAR(real(x.d.i_open), left, kVector) << n;
+            EXPECT_NEAR(real(next.d.i_ref.d - plain.d.i_ref.d), left * 15 / 16, kVector) << n;
+        }
     }
 }
 
