@@ -73,8 +73,7 @@ drive_params_t changed(const Changes &changes)
 {
     drive_params_t p = defaults();
     for (const auto &[id, si] : changes) {
-        drive_param_set(&p, id,
-                        static_cast<int32_t>(std::lround(si / std::pow(10, drive_param_exp10[id]))));
+        drive_param_set(&p, id, static_cast<int32_t>(std::lround(si / std::pow(10, drive_param_exp10[id]))));
     }
     return p;
 }
