@@ -290,7 +290,7 @@ electrical degrees.
 and what is not known of the dead time weigh least there. Its model contains no speed, which the position loop would feed back, and
 only `mras_simple` costs less. An EMF observer answers a load step with less error; take it where the speed stays above 20 %. The
 Kalman filter of full order is as good at low speed and better in a load step, at six times the instructions, but a wrong psi_m moves
-its angle, and where R and L are not known it may slip as it takes over from the open-loop start.
+its angle; the reduced one may slip in an open-loop start where R is told too low.
 """
 
 
