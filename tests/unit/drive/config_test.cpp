@@ -154,7 +154,7 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
     const double V = 450, I = 10, P = 3, W = 180 * P, T = 1e-4, slow = 1e-3;
     const double R = 6, L_d = 43e-3, L_q = 75e-3, psi = 0.236, i_r = 4.0 / I, J = 0.01;
     const double Z = V / I, Lb = V / W / I, Pb = V / W;
-    const double w_c = 2 * kPi * 500, w_s = 2 * kPi * 6, w_p = 2 * kPi * 25;
+    const double w_c = 2 * kPi * 500, w_s = 2 * kPi * 4, w_p = 2 * kPi * 25;
     const double inertia = J / (1.5 * P * P * psi);
     const double kp_s = w_s * inertia * W / I;
     const double flux = 70 * T;

@@ -202,7 +202,7 @@ ENTRIES = (
     Entry(0x2200, 2, "speed_max", "control", "i32", "live", "rad/s", -3, 0, 1000, 20000000, 150000, False, True, "application", "none", {}, 'largest speed reference', ""),
     Entry(0x2200, 3, "acceleration", "control", "i32", "live", "rad/s2", -3, 0, 100, 1000000000, 200000, False, True, "application", "none", {}, 'slope of the speed reference', ""),
     Entry(0x2200, 4, "current_bandwidth", "control", "i32", "live", "Hz", -3, 0, 10000, 5000000, 500000, False, True, "application", "none", {}, 'current control bandwidth', "1.3.2.2 #5"),
-    Entry(0x2200, 5, "speed_bandwidth", "control", "i32", "live", "Hz", -3, 0, 100, 200000, 6000, False, True, "application", "none", {}, 'speed control bandwidth', "1.3.2.2 #5"),
+    Entry(0x2200, 5, "speed_bandwidth", "control", "i32", "live", "Hz", -3, 0, 100, 200000, 4000, False, True, "application", "none", {}, 'speed control bandwidth', "1.3.2.2 #5"),
     Entry(0x2200, 6, "mtpa", "control", "i32", "live", "1", 0, 0, 0, 1, 1, False, True, "application", "none", {}, '1: maximum torque per ampere; 0: i_d = 0', "1.3.2.2 #5"),
     Entry(0x2200, 7, "i_d_light", "control", "i32", "live", "A", -3, 0, -100000, 100000, 200, False, True, "application", "none", {}, ('least demagnetising current on the flux observer: keeps light load out of '
  "the dead time's blind zone; < 0: magnetises"), "5.6.1.1 #57"),
