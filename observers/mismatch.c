@@ -1,12 +1,13 @@
 #include "observers/mismatch.h"
 
 #include "firmware/math/filter.h"
+#include "firmware/math/image.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
 
-#ifdef PM_OBSERVERS_FEW
+#if !PM_HAS(mismatch)
 
-/* Left out like the optional observers; config_mismatch.c refuses it. */
+/* Left out; config_mismatch.c refuses it. */
 pm_q_t mismatch_step(const mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
                      const mismatch_in_t *in, pm_q_t weight, pm_q_t eps)
 {

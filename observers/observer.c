@@ -1,36 +1,36 @@
 #include "observers/observer.h"
 
 #include "firmware/math/compiler.h"
+#include "firmware/math/image.h"
 
-/* One case for each of the list; with PM_OBSERVERS_FEW, without the optional ones. */
+/* One case for each of the list that the image has. */
 
 void observer_reset(observer_t *self, const observer_config_t *config, const obs_in_t *in)
 {
     switch (config->id) {
-#define PM_OBSERVER(name, help)                                                                              \
-    case OBSERVER_##name:                                                                                    \
-        name##_reset(&self->name, &config->name, in);                                                        \
-        break;
+#define PM_METHOD(name, help, traits, needs)                                                                 \
+    PM_IN_IMAGE(name, case OBSERVER_##name : name##_reset(&self->name, &config->name, in); break;)
 #include "observers/observers.def"
-#undef PM_OBSERVER
+#undef PM_METHOD
     case OBSERVER_COUNT:
     default:
         break;
     }
 }
 
+/* The one that observer_step() has compiled into its caller is not called here a second time. */
+#define OTHER_STEP(name)                                                                                     \
+    if (OBSERVER_##name != OBSERVER_INLINE) {                                                                \
+        name##_step(&self->name, &config->name, in, out);                                                    \
+    }
+
 PM_APART void observer_step_other(observer_t *self, const observer_config_t *config, const obs_in_t *in,
                                   obs_out_t *out)
 {
     switch (config->id) {
-#define PM_OBSERVER_DEFAULT(name, help)
-#define PM_OBSERVER(name, help)                                                                              \
-    case OBSERVER_##name:                                                                                    \
-        name##_step(&self->name, &config->name, in, out);                                                    \
-        break;
+#define PM_METHOD(name, help, traits, needs) PM_IN_IMAGE(name, case OBSERVER_##name : OTHER_STEP(name) break;)
 #include "observers/observers.def"
-#undef PM_OBSERVER
-    case OBSERVER_active_flux: /* stands in observer_step() */
+#undef PM_METHOD
     case OBSERVER_COUNT:
     default:
         *out = (obs_out_t){0};
@@ -41,11 +41,10 @@ PM_APART void observer_step_other(observer_t *self, const observer_config_t *con
 obs_out_t observer_last(const observer_t *self, const observer_config_t *config)
 {
     switch (config->id) {
-#define PM_OBSERVER(name, help)                                                                              \
-    case OBSERVER_##name:                                                                                    \
-        return name##_last(&self->name);
+#define PM_METHOD(name, help, traits, needs)                                                                 \
+    PM_IN_IMAGE(name, case OBSERVER_##name : return name##_last(&self->name);)
 #include "observers/observers.def"
-#undef PM_OBSERVER
+#undef PM_METHOD
     case OBSERVER_COUNT:
     default:
         return (obs_out_t){0};
@@ -56,12 +55,10 @@ void observer_slow(observer_t *self, const observer_config_t *config, const obs_
                    const obs_out_t *out, pm_q_t weight)
 {
     switch (config->id) {
-#define PM_OBSERVER(name, help)                                                                              \
-    case OBSERVER_##name:                                                                                    \
-        name##_slow(&self->name, &config->name, in, out, weight);                                            \
-        break;
+#define PM_METHOD(name, help, traits, needs)                                                                 \
+    PM_IN_IMAGE(name, case OBSERVER_##name : name##_slow(&self->name, &config->name, in, out, weight); break;)
 #include "observers/observers.def"
-#undef PM_OBSERVER
+#undef PM_METHOD
     case OBSERVER_COUNT:
     default:
         break;
@@ -71,12 +68,10 @@ void observer_slow(observer_t *self, const observer_config_t *config, const obs_
 void observer_tie(observer_t *self, const observer_config_t *config)
 {
     switch (config->id) {
-#define PM_OBSERVER(name, help)                                                                              \
-    case OBSERVER_##name:                                                                                    \
-        name##_tie(&self->name, &config->name);                                                              \
-        break;
+#define PM_METHOD(name, help, traits, needs)                                                                 \
+    PM_IN_IMAGE(name, case OBSERVER_##name : name##_tie(&self->name, &config->name); break;)
 #include "observers/observers.def"
-#undef PM_OBSERVER
+#undef PM_METHOD
     case OBSERVER_COUNT:
     default:
         break;

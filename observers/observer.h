@@ -33,28 +33,27 @@
 #include "observers/sliding_mode.h"
 
 typedef enum {
-#define PM_OBSERVER(name, help) OBSERVER_##name,
-#define PM_OBSERVER_OPTIONAL    PM_OBSERVER
+#define PM_METHOD(name, help, traits, needs) OBSERVER_##name,
 #include "observers/observers.def"
-#undef PM_OBSERVER
+#undef PM_METHOD
     OBSERVER_COUNT
 } observer_id_t;
+
+#define OBSERVER_INLINE OBSERVER_active_flux /* the default costs no call */
 
 typedef struct {
     observer_id_t id;
     union {
-#define PM_OBSERVER(name, help) name##_config_t name;
-#define PM_OBSERVER_OPTIONAL    PM_OBSERVER
+#define PM_METHOD(name, help, traits, needs) name##_config_t name;
 #include "observers/observers.def"
-#undef PM_OBSERVER
+#undef PM_METHOD
     };
 } observer_config_t;
 
 typedef union {
-#define PM_OBSERVER(name, help) name##_t name;
-#define PM_OBSERVER_OPTIONAL    PM_OBSERVER
+#define PM_METHOD(name, help, traits, needs) name##_t name;
 #include "observers/observers.def"
-#undef PM_OBSERVER
+#undef PM_METHOD
 } observer_t;
 
 void observer_reset(observer_t *self, const observer_config_t *config, const obs_in_t *in);
@@ -63,14 +62,14 @@ void observer_slow(observer_t *self, const observer_config_t *config, const obs_
                    const obs_out_t *out, pm_q_t weight);
 void observer_tie(observer_t *self, const observer_config_t *config);
 
-/* observer_step() of all but active_flux. */
+/* observer_step() of all but OBSERVER_INLINE. */
 void observer_step_other(observer_t *self, const observer_config_t *config, const obs_in_t *in,
                          obs_out_t *out);
 
 static inline void observer_step(observer_t *self, const observer_config_t *config, const obs_in_t *in,
                                  obs_out_t *out)
 {
-    if (__builtin_expect(config->id == OBSERVER_active_flux, 1) != 0) {
+    if (__builtin_expect(config->id == OBSERVER_INLINE, 1) != 0) {
         active_flux_step(&self->active_flux, &config->active_flux, in, out);
     } else {
         const obs_in_t given = *in; /* only this path needs it in memory */

@@ -52,7 +52,7 @@ SEEN = "fault", "angle_error_mean_deg", "angle_error_rms_deg", "angle_error_max_
 
 def observers():
     text = (ROOT / "observers/observers.def").read_text()
-    found = re.findall(r'^PM_OBSERVER(?:_[A-Z]+)?\((\w+), "(.*?)"\)', text, re.MULTILINE)
+    found = re.findall(r'^PM_METHOD\((\w+), "(.*?)",', text, re.MULTILINE)
     for name, _ in found:
         if name not in NEEDS:
             sys.exit(f"observer_report: NEEDS says nothing of {name}")

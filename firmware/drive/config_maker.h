@@ -104,10 +104,9 @@ void make_observer(maker_t *m, observer_config_t *c);
 
 /* config_observer.c, config_kalman.c */
 void make_model(maker_t *m, observer_model_t *c);
-#define PM_OBSERVER(name, help) void make_##name(maker_t *m, name##_config_t *c);
-#define PM_OBSERVER_OPTIONAL    PM_OBSERVER
+#define PM_METHOD(name, help, traits, needs) void make_##name(maker_t *m, name##_config_t *c);
 #include "observers/observers.def"
-#undef PM_OBSERVER
+#undef PM_METHOD
 
 /* config_mismatch.c */
 void make_mismatch(maker_t *m, mismatch_config_t *c);

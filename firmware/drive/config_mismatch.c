@@ -1,7 +1,8 @@
 /* Configuration of the correction of wrong parameters. */
 #include "firmware/drive/config_maker.h"
+#include "firmware/math/image.h"
 
-#ifdef PM_OBSERVERS_FEW
+#if !PM_HAS(mismatch)
 
 void make_mismatch(maker_t *m, mismatch_config_t *c)
 {

@@ -1,16 +1,15 @@
 /* The observer that the parameters name. */
 #include "firmware/drive/config_maker.h"
+#include "firmware/math/image.h"
 
 void make_observer(maker_t *m, observer_config_t *c)
 {
     c->id = (observer_id_t)m->params->observer;
     switch (c->id) {
-#define PM_OBSERVER(name, help)                                                                              \
-    case OBSERVER_##name:                                                                                    \
-        make_##name(m, &c->name);                                                                            \
-        break;
+#define PM_METHOD(name, help, traits, needs)                                                                 \
+    PM_IN_IMAGE(name, case OBSERVER_##name : make_##name(m, &c->name); break;)
 #include "observers/observers.def"
-#undef PM_OBSERVER
+#undef PM_METHOD
     case OBSERVER_COUNT:
     default: /* the range of the parameter ends before */
         refuse(m, DRIVE_PARAM_observer, "is not in this image");

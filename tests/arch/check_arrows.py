@@ -18,6 +18,7 @@ MODULES = {
     "firmware/control": "control",
     "firmware/drive": "drive",
     "firmware/params": "params",
+    "firmware/images": "images",
     "firmware/can": "can",
     "firmware/app": "app",
     "observers": "observers",
@@ -39,6 +40,7 @@ ARROWS = {
     "bldc": {"math"},
     "drive": {"control", "observers", "injection", "bldc"},
     "params": set(),
+    "images": set(),
     "can": {"params"},
     "app": {"drive", "can", "params", "hal"},
     "hal": set(),
@@ -51,7 +53,7 @@ FREE = {"tools", "tests"}  # may see everything: they put the parts together
 # A port fills and empties the drive's structs, so it sees the drive's own headers but nothing below them.
 ONE_STEP = {"hal": {"drive"}, "hal_sim": {"drive", "app"}}
 
-FIRMWARE = ("math", "control", "drive", "params", "can", "app", "observers", "injection", "bldc")
+FIRMWARE = ("math", "control", "drive", "params", "images", "can", "app", "observers", "injection", "bldc")
 SHIFTLESS = ("control", "drive", "observers", "injection", "bldc")  # the arithmetic of formats is in math
 # Headers that bring types and constants, and string.h, which a compiler may call anyway.
 FIRMWARE_SYSTEM = {"stdint.h", "stdbool.h", "stddef.h", "limits.h", "string.h", "arm_acle.h"}

@@ -74,7 +74,7 @@ inline std::vector<ObserverCase> observer_cases(const Machine &m = kIpmLinear, c
     std::vector<ObserverCase> all;
     ObserverCase c = {};
     c.omega_pu = 0.4;
-#define PM_OBSERVER(x, help)                                                                                 \
+#define PM_METHOD(x, help, traits, needs)                                                                    \
     c.name = #x;                                                                                             \
     c.config = {};                                                                                           \
     c.config.id = OBSERVER_##x;                                                                              \
@@ -82,7 +82,7 @@ inline std::vector<ObserverCase> observer_cases(const Machine &m = kIpmLinear, c
     observers::configure(c.config.x, m, b);                                                                  \
     all.push_back(c);
 #include "observers/observers.def"
-#undef PM_OBSERVER
+#undef PM_METHOD
     return all;
 }
 

@@ -17,7 +17,7 @@ typedef struct {
 static drive_config_t config;
 static bench_t bench;
 
-#define PM_OBSERVER(name, help)                                                                              \
+#define PM_METHOD(name, help, traits, needs)                                                                 \
     void period_##name(bench_t *b, const position_config_t *c);                                              \
     __attribute__((noinline, noclone)) void period_##name(bench_t *b, const position_config_t *c)            \
     {                                                                                                        \
@@ -27,19 +27,19 @@ static bench_t bench;
         pm_pll_predict(&b->pll, &c->pll_high);                                                               \
     }
 #include "observers/observers.def"
-#undef PM_OBSERVER
+#undef PM_METHOD
 
 static void period(observer_id_t id, pm_ab_t v, pm_ab_t i)
 {
     const pm_dir_t dir = pm_dir(bench.pll.theta);
     bench.in = (obs_in_t){.v = v, .i = i, .dir = dir, .omega = bench.pll.omega, .i_dq = pm_park(i, dir)};
     switch (id) {
-#define PM_OBSERVER(name, help)                                                                              \
+#define PM_METHOD(name, help, traits, needs)                                                                 \
     case OBSERVER_##name:                                                                                    \
         period_##name(&bench, &config.position);                                                             \
         break;
 #include "observers/observers.def"
-#undef PM_OBSERVER
+#undef PM_METHOD
     case OBSERVER_COUNT:
     default:
         break;
@@ -86,9 +86,9 @@ int main(void)
         const char *name;
         uint32_t state, config;
     } list[] = {
-#define PM_OBSERVER(name, help) {#name, sizeof(name##_t), sizeof(name##_config_t)},
+#define PM_METHOD(name, help, traits, needs) {#name, sizeof(name##_t), sizeof(name##_config_t)},
 #include "observers/observers.def"
-#undef PM_OBSERVER
+#undef PM_METHOD
     };
     for (int id = 0; id < (int)OBSERVER_COUNT; id++) {
         if (!configure((observer_id_t)id)) {
