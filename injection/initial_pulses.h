@@ -1,15 +1,17 @@
 /* Initial position by six voltage pulses in vector form (METHODS.md 9.2, 9.4.1, 9.4.2; rows 98, 100, 101).
  *
- * Pulses A+ A- B+ B- C+ C- of n periods at a duty, each from zero current; between them all switches are off
- * and the diodes drive the current back to zero. With i_k the current vector at the end of the pulse along
- * g_k: y = sum i_k e^{j g_k} = 6 I_2 e^{j 2 theta}     saliency: the angle, modulo 180 degrees w = sum i_k ~
- * e^{j theta}             first-order saturation: the polarity Both sums cancel offsets and gain errors of
- * the sensors to first order. Torque averages out over a pair.
+ * Pulses A+ A- B+ B- C+ C- of n periods at a duty cycle, each from zero current; between them all switches
+ * are off and the diodes drive the current back to zero. With i_k the current vector at the end of the pulse
+ * along the direction g_k:
+ *   y = sum i_k e^{j g_k} = 6 I_2 e^{j 2 theta}     saliency: the angle, modulo 180 degrees
+ *   w = sum i_k           ~ e^{j theta}             first-order saturation: the polarity
+ * Both sums cancel offsets and gain errors of the sensors to first order. The torque of a pair of pulses
+ * averages to zero.
  *
  * A one-shot procedure that owns the bridge: call initial_pulses_step() each period until it is not
- * PM_RUNNING. Fails with a reason when the current does not rise or fall in time, or the figures drown in
- * noise. Duration: 6 (2 n + 5) periods about. Tests: tests/unit/injection/initial_pulses_test.cpp,
- * tests/scenario. */
+ * PM_RUNNING. Fails with a reason when the current does not rise or fall in time, or when y or w is too small
+ * against noise (y_min, w_min). Duration: about 6 (2 n + 5) periods.
+ * Tests: tests/unit/injection/initial_pulses_test.cpp, tests/scenario. */
 #ifndef INJECTION_INITIAL_PULSES_H
 #define INJECTION_INITIAL_PULSES_H
 
@@ -21,7 +23,7 @@ typedef struct {
     uint16_t timeout;    /* periods that the decay may take */
     pm_q_t duty;         /* of the driven leg, 0 ... 1 */
     pm_q_t i_zero;       /* currents below count as zero */
-    pm_q_t y_min, w_min; /* smallest lengths that are believed */
+    pm_q_t y_min, w_min; /* least lengths of y and w that count as a result */
 } initial_pulses_config_t;
 
 typedef struct {

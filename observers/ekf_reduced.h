@@ -1,25 +1,32 @@
-/* Extended Kalman filter of reduced order: speed and angle, from the EMF (METHODS.md 12.4.4, row 143).
+/* Extended Kalman filter of reduced order: speed and angle from the EMF (METHODS.md 12.4.4, row 143).
  *
  * States: omega and delta = theta_rotor - theta, the error of the present position, as in ekf_full.h.
- * Measured is what the machine at the present position does not explain of the stator flux psi = (L_d i_d +
- * psi_m, L_q i_q), rho = psi(k-1) turned back by the frame's turn + T_s v - T_s R i - psi(k) = T_s omega
- * delta (-psi_a, eta) + (T_s omega - turn) (eta, psi_a),  eta = (L_d - L_q) i_q, the EMF of the period
- * against that of the present position, without an approximation in omega T_s. Angle and speed act on it at
- * right angles, and the angle's part alone is taken, z = (-psi_a rho_d + eta rho_q) / (T_s omega (psi_a^2 +
- * eta^2)) = sin delta with the variance r psi_m^2 / (psi_a^2 + eta^2) / omega^2 (omega per-unit, r that of
- * rho / u). The other tells the speed, but so does the turning of delta, and a wrong psi_m in a measured
- * speed would move the angle by much. (With the d-component alone the loop is unstable when a salient machine
- * generates: it moves against the angle first.) Assumed: L_d constant, L_q(i) renewed at 1 kHz, R known;
- * salient machines need no more than round ones. The noise of rho at successive samples is not independent (a
- * current enters twice, with opposite signs), which the filter does not know: r errs on the safe side.
+ * Measured is rho, the part of the flux change over a period that the machine at the present position does
+ * not explain:
+ *   psi = (L_d i_d + psi_m, L_q i_q)
+ *   eta = (L_d - L_q) i_q
+ *   rho = psi(k-1) turned back by the frame's turn + T_s v - T_s R i - psi(k)
+ *       = T_s omega delta (-psi_a, eta) + (T_s omega - turn) (eta, psi_a)
+ * the EMF of the period against that of the present position, without an approximation in omega T_s. Angle
+ * and speed act on rho at right angles. Only the part of the angle is measured:
+ *   z      = (-psi_a rho_d + eta rho_q) / (T_s omega (psi_a^2 + eta^2)) = sin delta
+ *   var(z) = r psi_m^2 / (psi_a^2 + eta^2) / omega^2        omega per-unit, r the variance of rho / u
+ * The other part shows the speed, but so does the drift of delta, and with a measured speed a wrong psi_m
+ * would move the angle considerably. (With rho_d alone the loop is unstable while a salient machine
+ * generates: its first reaction moves the angle the wrong way.)
+ * L_d is constant, L_q(i) renewed at 1 kHz, R a parameter; round and salient machines cost the same. The
+ * noise of rho at successive samples is correlated (each current enters twice, with opposite signs), which
+ * the filter does not model: r is then on the safe side.
  *
- * Covariance: firmware/math/kalman.h (Joseph, why there), F = [1 0; T_s 1], in units of 1 rad, the base speed
- * and u = psi_m T_s w_base. Below omega_min, where the angle's variance no longer fits, z fades with
- * (omega / omega_min)^2.
+ * Covariance: firmware/math/kalman.h (and why Joseph's form), in units of 1 rad, the base speed and
+ * u = psi_m T_s w_base:
+ *   F = [  1  0 ]
+ *       [ T_s 1 ]
+ * Below omega_min, where var(z) no longer holds, z fades with (omega / omega_min)^2.
  *
  * Called each period; the result belongs to k. Range: |psi| < 4, L < 4, |delta| <= 1, |omega| < 2. At weight
- * 0 delta is halved each slow step and all else starts anew. misfit: difference of the speeds, filter and
- * loop, relative to base speed, at 1 kHz. vector: active flux. Cost: 170 instructions with loop, 35 % of
+ * 0, delta is halved every slow step; omega and P start anew. misfit: |omega of the filter - omega of the
+ * loop|, relative to base speed, at 1 kHz. vector: active flux. Cost: 170 instructions with loop, 35 % of
  * ekf_full.h. Tests: tests/unit/observers/ekf_test.cpp (against Eigen in double precision), tests/scenario,
  * tests/target/observers. */
 #ifndef OBSERVERS_EKF_REDUCED_H

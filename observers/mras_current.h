@@ -1,17 +1,23 @@
 /* Model reference adaptive system, current model (METHODS.md 12.2.2, row 137).
  *
- * Each period the model starts from the measured current and predicts the next one; what it lacks is the
- * extended EMF (mras.h), of which it has an adapted value E^ on its q-axis:
- *   i_CM(k) = [(1 - r) i(k-1) + (T_s/L_d) (v - w_f (L_q - L_d) J i - (0, E^))] / (1 + r),  r = R T_s / 2
- * L_d D = i(k) - i_CM(k):  D_d = b E sin(error),  D_q = b (E^ - E cos(error)),  b = (T_s/L_d) / (1 + r) E^ -=
- * (k / b) D_q,  eps = D_d / (b E^),  misfit = 1 - E^ / (omega psi_a) psi_m enters misfit alone: the angle
- * needs R, L_d and L_q. The speed of the model, E^ / psi_a, is the EMF ratio of speed.h. Noise of a current
- * sample stands as L_d/T_s times its difference in the EMF; the loop behind, of which it is the derivative,
- * takes it away.
+ * Each period the model starts from the measured current and predicts the next one. The model has an adapted
+ * extended EMF E^ (mras.h) on its q-axis; its prediction error D shows the position error:
+ *   r       = R T_s / (2 L_d)
+ *   b       = (T_s/L_d) / (1 + r)
+ *   i_CM(k) = (1 - r)/(1 + r) i(k-1) + b (v - w_f (L_q - L_d) J i - (0, E^))
+ *   D       = i(k) - i_CM(k)
+ *   D_d     = b E sin(error)
+ *   D_q     = b (E^ - E cos(error))
+ *   E^     -= (k / b) D_q
+ *   eps     = mean of two D_d / (b E^)
+ *   misfit  = 1 - E^ / (omega psi_a)
+ * psi_m enters misfit alone: the angle needs R, L_d and L_q. The speed of the model, E^ / psi_a, is the EMF
+ * ratio of speed.h. Noise of a current sample enters the EMF times L_d/T_s and differentiated; the loop
+ * behind filters it out.
  *
- * Called each period; result belongs to k. Range: T_s/L_d < 2,
- * L_d/T_s < 128, |v| and |i| < 2; currents that miss by half the base are held there. vector: E in the
- * present frame, held at +-4. Tests: tests/unit/observers/mras_test.cpp, tests/scenario. */
+ * Called each period; the result belongs to k. Range: T_s/L_d < 2, L_d/T_s < 128, |v| and |i| < 2; D
+ * saturates at half the base current. vector: E in the present frame, clamped to +-4.
+ * Tests: tests/unit/observers/mras_test.cpp, tests/scenario. */
 #ifndef OBSERVERS_MRAS_CURRENT_H
 #define OBSERVERS_MRAS_CURRENT_H
 

@@ -1,22 +1,24 @@
-/* Any of the fundamental-model observers, chosen by the configuration. Side by side (METHODS.md 2.3.3, row
- * 17): docs/results/observers.md.
+/* Any of the fundamental-model observers, chosen by the configuration. Comparison (METHODS.md 2.3.3, row 17):
+ * docs/results/observers.md.
  *
- * Every observer of observers.def is a source (firmware/math/estimate.h) with these functions; self is its
- * state, config is const and made from model.h's machine and a few gains:
- *   x_reset(self, config, in)             seeds every member at the given position, so that no transient
- *                                         follows when that is right; also before the first step
- *   x_step(self, config, in, out)         one period; no division, no root: those belong to x_slow
- *   x_last(self)                          the result of the last step again (zero eps after x_reset)
- *   x_slow(self, config, in, out, weight) at 1 kHz, with i_dq and omega of the last step and what came out;
- *                                         weight 0: another source leads, and what the observer keeps is tied
- *                                         to the present position; above 0 it is free, PM_ONE: it leads
- *   x_tie(self, config)                   the position is imposed from outside (align, open-loop start):
- * holds on to it until the next x_slow, learning nothing A configuration may change its values at any time
- * between two steps, but not its id: then comes observer_reset() of the new one.
+ * Every observer of observers.def is a source (firmware/math/estimate.h) with these functions. self is its
+ * state; config is const and made from the machine in model.h and a few gains:
+ *   x_reset(self, config, in)              sets every member for the given position, so that no transient
+ *                                          follows if it is right; also before the first step
+ *   x_step(self, config, in, out)          one period; no division, no root: those belong to x_slow
+ *   x_last(self)                           the result of the last step again (eps = 0 after x_reset)
+ *   x_slow(self, config, in, out, weight)  at 1 kHz, with in (i_dq, omega) and out of the last step.
+ *                                          weight 0: another source leads, and the state is tied to the
+ *                                          present position; above 0 it is free; PM_ONE: it leads
+ *   x_tie(self, config)                    the position is imposed from outside (alignment, open-loop start):
+ *                                          the state stays tied to it until the next x_slow, without
+ *                                          adaptation
+ * A configuration may change its values at any time between two steps. If its id changes, observer_reset()
+ * with the new one must follow.
  *
- * Cost of the dispatch: three instructions for active_flux, which is compiled into the caller; a call for the
- * others. Tests: tests/contract/observer_contract_test.cpp runs all of the list, tests/target/observers
- * counts them. */
+ * Cost of the dispatch: three instructions for active_flux, which is inlined into the caller; a call for the
+ * others. Tests: tests/contract/observer_contract_test.cpp runs the whole list, tests/target/observers counts
+ * instructions. */
 #ifndef OBSERVERS_OBSERVER_H
 #define OBSERVERS_OBSERVER_H
 

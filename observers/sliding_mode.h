@@ -1,25 +1,39 @@
 /* Sliding-mode observer with a choice of switching functions (METHODS.md 12.3.2 and 12.3.3, rows 140, 141).
  *
- *   L_q p i^ = v - R i^ - z,  z = f(i^ - i);  e = LPF(z), made free of lag:  eps = -e_d / (omega psi_a)
- * in the stationary frame. L_q for both axes makes e the EMF of the active flux, omega psi_a on the q-axis,
- * so salient machines are meant, too; assumed is that i_d changes slowly, p i_d being read as an EMF. A round
- * machine is the case L_d = L_q. With the sum s = L_q (i^ - i) of the voltage errors the functions are
- *   sign            z = K sgn(s): the conventional observer. Slides while K > |e| on both axes; ripple of K
- *   saturation      z = slope s, at most K: a linear observer within the boundary layer, no chattering there
- *   sigmoid         z = K x (3 - x^2) / 2, x = slope s / (1.5 K): the same slope at zero, rounded corners
- *   super-twisting  z = w + 1.5 (Lambda |s|)^0.5 sgn(s),  p w = 1.1 Lambda sgn(s): what switches is
- * integrated; Lambda bounds |p e| = omega^2 psi_a; the root is 0 to 6 % too large with K = k_base + k_speed
- * |omega| psi_a: k_speed = 0 is the conventional constant gain, k_base small the adaptive one.
+ * In the stationary frame, with L_q on both axes:
+ *   L_q p i^ = v - R i^ - z
+ *   s        = L_q (i^ - i)                         sum of the voltage errors
+ *   z        = f(s)                                 switching function, below
+ *   e        = LPF(z), its lag compensated
+ *   eps      = -e_d / (omega psi_a)
+ * L_q on both axes makes e the EMF of the active flux, omega psi_a on the q-axis, so salient machines are
+ * covered; a round machine is the case L_d = L_q. Assumed: i_d changes slowly, because p i_d appears as an
+ * EMF. Switching functions:
+ *   sign            z = K sgn(s)
+ *                   the conventional observer; slides while K > |e| on both axes; ripple of K
+ *   saturation      z = slope s, |z| <= K
+ *                   a linear observer within the boundary layer, no chattering there
+ *   sigmoid         z = K x (3 - x^2) / 2,  x = slope s / (1.5 K), |x| <= 1
+ *                   the same slope at zero, rounded corners
+ *   super-twisting  z   = w + 1.5 (Lambda |s|)^0.5 sgn(s)
+ *                   p w = 1.1 Lambda sgn(s)
+ *                   the switched term is integrated; Lambda = 1.5 omega^2 psi_a bounds |p e|;
+ *                   the root is computed 0 to 6 % too large
+ * with the gain
+ *   K = k_base + k_speed |omega| psi_a
+ * k_speed = 0 is the conventional constant gain, a small k_base the adaptive one.
  *
- * z follows e within some periods, which differ by function; that and the lag of the low-pass are taken back
- * by one complex factor, exact to the second order of omega T_s. Below omega_min the error signal fades with
- * (omega / omega_min)^2, as nothing can be seen there; at weight 0, where it only watches the leading source,
- * already below omega_tie. Nothing else is tied: the EMF is found anew within milliseconds.
+ * z follows e with a delay of some periods that differs by function; it and the lag of the low-pass are
+ * compensated by one complex factor, exact to the second order of omega T_s. Below omega_min the error signal
+ * fades with (omega / omega_min)^2, because the EMF is too small there; at weight 0, where the observer only
+ * watches the leading source, below omega_tie instead. Nothing else is tied: the EMF converges within
+ * milliseconds.
  *
  * Called each period; the result belongs to k. Range: L_q < 4, |L_q i| < 2, |e| < 1, K < 1; |s| saturates at
- * 1/2. misfit: amplitude of the EMF against omega psi_a, relative. vector: EMF. Cost with loop: 126
- * instructions, sign 112, sigmoid 128, super-twisting 139. Tests: tests/unit/observers/sliding_mode_test.cpp
- * (against double precision, ripple, K too small), tests/scenario, tests/target/observers. */
+ * 1/2. misfit: amplitude of the EMF against omega psi_a, relative. vector: EMF. Cost with loop: saturation
+ * 126 instructions, sign 112, sigmoid 128, super-twisting 139.
+ * Tests: tests/unit/observers/sliding_mode_test.cpp (against double precision, ripple, K too small),
+ * tests/scenario, tests/target/observers. */
 #ifndef OBSERVERS_SLIDING_MODE_H
 #define OBSERVERS_SLIDING_MODE_H
 

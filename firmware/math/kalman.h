@@ -1,18 +1,26 @@
-/* A covariance in fixed point and its correction by a measured state, in Joseph's form (METHODS.md 12.4.1.2).
+/* A covariance in fixed point and its correction by one measured state, in Joseph's form
+ * (METHODS.md 12.4.1.2).
  *
- * P is the lower triangle by rows, Q30, in units of the caller's choice, |P| < 2. State m is measured with
- * the variance r >= 2^-20, and S = P_mm + r < 2: K_i = P_im / S,   kappa = 1 - K_m = r / S P  <- (I - K h) P
- * (I - K h)' + K r K',   written as P_ij <- P_ij - K_i P_mj - K_j W_i,       W_i = P_im - K_i S: what the
- * gain's rounding leaves P_mj <- kappa P_mj - K_j W_m,            P_mm <- kappa P_mm - (1 - kappa) W_m,  W_m
- * = kappa S - r
+ * P is the lower triangle by rows, Q30, |P| < 2, in units of the caller's choice. State m is measured with
+ * the variance r >= 2^-20; h selects it:
+ *   S     = P_mm + r                           < 2
+ *   K_i   = P_im / S
+ *   kappa = 1 - K_m = r / S
+ *   P     = (I - K h) P (I - K h)' + K r K'
+ * written element by element, i and j other than m; W is what rounding K and kappa leaves:
+ *   W_i   = P_im - K_i S
+ *   W_m   = kappa S - r
+ *   P_ij <- P_ij - K_i P_mj - K_j W_i
+ *   P_im <- kappa P_im - K_i W_m
+ *   P_mm <- kappa P_mm - (1 - kappa) W_m
  *
- * Why Joseph: the form is a sum of squares for any gain, so K may be rounded (16 bits, one division of the
- * processor) and held within +-0.5 without harm to P; the short form P - K S K' would lose its definiteness
- * with the first such step. What is left is the rounding of P itself, at most 5 LSB an element and
- * correction. As long as each prediction adds more than that to the diagonal (PM_KALMAN_LEAST for n states:
- * the norm of the error matrix is at most n times its largest element), P stays positive definite for ever. A
- * square-root form would need no such floor, but its prediction orthogonalises 2n vectors with a division
- * each, three times the cost. */
+ * Why Joseph: the form is a sum of squares for any gain, so K may be rounded (16 bits from one hardware
+ * division) and clamped to +-0.5 without harm to P. The short form P - K S K' would lose positive
+ * definiteness at the first such step. What remains is the rounding of P itself, at most 5 LSB per element
+ * and correction. As long as each prediction adds more than that to the diagonal, P stays positive definite
+ * for ever: PM_KALMAN_LEAST for n states, because the norm of the error matrix is at most n times its
+ * largest element. A square-root form would need no such floor, but its prediction orthogonalises 2n vectors
+ * with a division each, three times the cost. */
 #ifndef PM_MATH_KALMAN_H
 #define PM_MATH_KALMAN_H
 

@@ -1,24 +1,27 @@
-/* Identification: the drive measures its machine (docs/identify.md). Types; the parts are in the files
- * beside.
+/* Identification: the drive measures its machine (docs/identify.md). Types; the routines are in the files
+ * beside this one.
  *
- * Wanted beforehand: bases, timing, pole pairs and a current that the machine bears; nothing else of the
- * machine. One sequence, of which each routine takes what it needs and the rest is left out: sweep voltage
- * rises until the current flows; the vector turns the rotor onto phase A resistance four currents, regulated
- * slowly by the voltage: slope R, intercept 4/3 of a leg's lost voltage L_d, L_q   square wave of +-V along
- * each axis without mean: change of flux over change of current rotation   the current vector turns and takes
- * the rotor along: up, two currents at speed, down L_q rated  square wave on q at rated current and the i_d
- * of most torque per ampere: saturation, cross-coupling The bridge is opened at the end, by a failure, a
- * fault, or within a period of the enable's end.
+ * Needed beforehand: bases, timing, pole pairs and a current that the machine withstands; no other parameter
+ * of the machine. One sequence; steps that the selected routines do not need are left out:
+ *   sweep       voltage rises until the current flows; the vector turns the rotor onto phase A
+ *   resistance  four currents, controlled slowly through the voltage:
+ *               slope R, intercept 4/3 of the voltage lost in a leg
+ *   L_d, L_q    square wave of +-V along each axis, without mean: change of flux over change of current
+ *   rotation    the current vector turns and pulls the rotor along: up, two currents at speed, down
+ *   L_q rated   square wave on q at rated current with the i_d of most torque per ampere:
+ *               saturation, cross-coupling
+ * The bridge opens at the end, on a failure, on a fault, and within a period after enable is withdrawn.
  *
- * drive_step() and drive_slow() call these in STAGE_IDENTIFY; cost below that of injection. Tests:
- * tests/unit/drive/commissioning_test.cpp, tests/scenario/identify*.yaml. */
+ * drive_step() and drive_slow() call these in STAGE_IDENTIFY; a period costs less than one with injection.
+ * Tests: tests/unit/drive/commissioning_test.cpp, tests/scenario/identify*.yaml. */
 #ifndef DRIVE_COMMISSIONING_COMMISSIONING_H
 #define DRIVE_COMMISSIONING_COMMISSIONING_H
 
 #include "firmware/math/frames.h"
 #include "firmware/math/pi.h"
 
-/* What to identify: a sum; 0 is all. The offsets of the current sensors are measured at each start. */
+/* What to identify: a sum of these; 0 means all. The offsets of the current sensors are measured at each
+ * start. */
 enum {
     COMMISSIONING_RESISTANCE = 1,
     COMMISSIONING_INDUCTANCE = 2,
@@ -36,32 +39,32 @@ typedef enum {
 
 typedef enum {
     COMMISSIONING_NO_REASON,
-    COMMISSIONING_NO_CURRENT,  /* the current does not come with the highest voltage: a phase is open */
-    COMMISSIONING_UNEVEN,      /* the phases do not share the current as they must: a phase is open */
+    COMMISSIONING_NO_CURRENT,  /* no current even at the highest voltage: a phase is open */
+    COMMISSIONING_UNEVEN,      /* the current does not divide among the phases as it must: a phase is open */
     COMMISSIONING_IMPLAUSIBLE, /* a result that no machine has */
     COMMISSIONING_NOT_TURNING, /* the rotor did not follow the vector: locked, or the current is too small */
-    COMMISSIONING_ABORTED,     /* enable was taken away, or a fault came */
+    COMMISSIONING_ABORTED,     /* enable was withdrawn, or a fault occurred */
 } commissioning_reason_t;
 
 /* Per-unit of the drive's bases; 0: not measured yet. */
 typedef struct {
     pm_q_t R;          /* v / i */
-    pm_q_t lost;       /* v; of a leg, by dead time and drops */
+    pm_q_t lost;       /* v; voltage lost in a leg by dead time and device drops */
     pm_q_t L_d, L_q;   /* psi / i; at zero current */
     pm_q_t L_q_rated;  /* psi_q / i_q at the test current */
     pm_q_t L_dq_rated; /* incremental cross inductance there */
     pm_q_t psi_m;      /* psi */
-    pm_q_t J;          /* torque per COMMISSIONING_J_STEPS times omega mechanical in one slow step */
+    pm_q_t J;          /* torque that changes omega mechanical by 1 / COMMISSIONING_J_STEPS in a slow step */
     pm_q_t viscous;    /* torque per omega mechanical */
     pm_q_t coulomb;    /* torque */
 } commissioning_result_t;
 
 #define COMMISSIONING_J_STEPS 1024
 
-/* Incremental L_q at sixteenths of the square of the test current, 16: at all of it; an estimate. psi / i
- * falls with the square of the current, L_q + (L_q_rated - L_q) (i / i_rated)^2, its tangent three times as
- * much; but saturation is steeper than that, and psi / i was measured with the i_d that lessens it: four
- * times. */
+/* Incremental L_q at of_16/16 of the square of the test current; an estimate:
+ *   psi / i   = L_q + (L_q_rated - L_q) (i / i_rated)^2
+ *   tangent   = L_q + 3 (L_q_rated - L_q) (i / i_rated)^2      by this formula
+ * Real saturation is steeper, and psi / i was measured with an i_d that weakens it: 4 in place of 3. */
 static inline pm_q_t commissioning_tangent(const commissioning_result_t *r, int32_t of_16)
 {
     return r->L_q + (r->L_q_rated - r->L_q) / 4 * of_16;
