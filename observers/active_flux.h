@@ -1,26 +1,31 @@
 /* Active-flux observer for salient machines (METHODS.md 2.2.2, row 13), with the drift and delay remedies
  * of 3.2 (rows 21 to 23).
  *
- * psi += T_s (v - R i), i the mean of both ends of the period; psi_a = psi - L_q(i) i lies on the d-axis:
- *   eps = psi_a,q / psi_ref
+ *   psi   += T_s (v - R i),                 i: mean of both ends of the period
+ *   psi_a  = psi - L_q(i) i                 lies on the d-axis
+ *   eps    = psi_a,q / psi_ref
+ *   misfit = 1 - psi_a,d / psi_ref
  * Correction without a lag: the flux is fed back along the rotor frame,
- *   psi += T_s [k_d (psi_ref - psi_a,d), -k_q psi_a,q].
- * k_d = g |omega| holds the amplitude and so removes the drift of the integration, which appears as a ripple
- * of the amplitude; it moves no angle as long as psi_ref is the mean amplitude. k_q > 0 ties the flux to the
- * present position: a seed while injection leads, zero when this observer leads. psi_ref follows the
- * amplitude slowly within a band around psi_a of model.h, so an error of psi_m moves no angle either.
- * While the flux is tied, its distance from the current model shows an error of the resistance, k_q psi_a,q =
- * (R - R^) i_q, and R follows it; it is kept when the observer leads. An R set 50 % too high would otherwise
- * make the observer unstable under load below a third of rated speed (docs/decisions/004-resistance.md).
- * L_q(i) of model.h: a constant L_q costs IPM-1000 2.4 degrees at rated load.
+ *   psi   += T_s [k_d (psi_ref - psi_a,d), -k_q psi_a,q]
+ *   k_d    = g |omega| + k_q
+ * g |omega| holds the amplitude and so removes the drift of the integration, which appears as a ripple of
+ * the amplitude; it moves no angle as long as psi_ref is the mean amplitude. k_q > 0 ties the flux to the
+ * present position while injection leads; it is zero when this observer leads. psi_ref follows the amplitude
+ * slowly within a band around psi_a of model.h, so an error of psi_m moves no angle either.
+ * While the flux is tied, its distance from the current model shows the error of the resistance, and R is
+ * adapted to it:
+ *   k_q psi_a,q = (R - R^) i_q
+ * The adapted R is kept when the observer leads. R overestimated by 50 % would otherwise make the observer
+ * unstable under load below a third of rated speed (docs/decisions/004-resistance.md).
+ * L_q(i) is that of model.h: a constant L_q costs IPM-1000 2.4 degrees at rated load.
  *
- * What is integrated is psi + R T_s/2 i, which needs one current only: the mean of both ends then stands as
- * R T_s/2 beside L_q. L_q(i), g |omega| and R T_s are renewed at 1 kHz. Formats are chosen so that each
- * line is a chain of multiply-accumulates without a shift.
+ * The integrated quantity is psi + R T_s/2 i, which needs one current only: the mean of both ends then
+ * appears as R T_s/2 beside L_q. L_q(i), g |omega| and R T_s are renewed at 1 kHz. Formats are chosen so
+ * that each line is a chain of multiply-accumulates without a shift.
  *
- * Called each period; result belongs to k. Range: |psi| < 4, |i| < 2, L_q < 4, k_d and k_q < 1/8 per period
- * (beyond, they are held there). misfit: distance of the amplitude from psi_ref, relative. eps and misfit
- * have 19 fractional bits. Tests: tests/unit/observers/active_flux_test.cpp, tests/scenario. */
+ * Called each period; the result belongs to k. Range: |psi| < 4, |i| < 2, L_q < 4; k_d and k_q are clamped to
+ * 1/8 per period. eps and misfit have 19 fractional bits.
+ * Tests: tests/unit/observers/active_flux_test.cpp, tests/scenario. */
 #ifndef OBSERVERS_ACTIVE_FLUX_H
 #define OBSERVERS_ACTIVE_FLUX_H
 
@@ -48,7 +53,7 @@ typedef struct {
     pm_q_t R; /* adapted */
 } active_flux_t;
 
-/* Flux of the current model at the given position: no transient follows when the position is right. */
+/* Sets the flux to that of the current model at the given position: no transient follows if it is right. */
 void active_flux_reset(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in);
 void active_flux_step(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in,
                       obs_out_t *out);
@@ -58,8 +63,8 @@ obs_out_t active_flux_last(const active_flux_t *self);
 /* Ties the flux to the position until active_flux_slow() decides otherwise. */
 void active_flux_tie(active_flux_t *self, const active_flux_config_t *config);
 
-/* At 1 kHz, with what went into the last step and came out (i_dq and omega, vector): adapts psi_ref and R,
- * ties the flux to the position at weight 0. */
+/* At 1 kHz, with in (i_dq, omega) and out (vector) of the last step: adapts psi_ref and R, ties the flux to
+ * the position at weight 0. */
 void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in,
                       const obs_out_t *out, pm_q_t weight);
 

@@ -1,11 +1,13 @@
 /* Back-EMF observer for machines without saliency (METHODS.md 2.3.1, row 14).
  *
- *   E = v - R i - L_s pi - w L_s J i in the estimated frame: E_d = -E sin(error), E_q = E cos(error)
- * by the voltage equation of emf.h: w L_s J i is part of the change of a current that does not turn with the
- * frame. The EMF is turned into the frame of the middle of the period and filtered there, without a lag in
- * steady state. L_s = L_q(i).
+ * In the estimated frame, with L_s = L_q(i):
+ *   E   = v - R i - L_s p i - w L_s J i
+ *   E_d = -E sin(error)
+ *   E_q =  E cos(error)
+ * by the voltage equation of emf.h, which has w L_s J i in the change of the stationary current. The EMF is
+ * turned into the frame of the middle of the period and filtered there, without a lag in steady state.
  *
- * Called each period; result belongs to k. vector: EMF. T e is limited to a quarter of the base flux per
+ * Called each period; the result belongs to k. vector: EMF. T e is limited to a quarter of the base flux per
  * period. Tests: tests/unit/observers/emf_test.cpp, tests/scenario/spm_emf.yaml. */
 #ifndef OBSERVERS_BACK_EMF_H
 #define OBSERVERS_BACK_EMF_H
@@ -32,7 +34,7 @@ static inline obs_out_t back_emf_last(const back_emf_t *self)
 
 static inline void back_emf_tie(back_emf_t *self, const back_emf_config_t *config)
 {
-    (void)self, (void)config; /* keeps nothing that could run away */
+    (void)self, (void)config; /* no integrator that could drift */
 }
 
 #endif

@@ -1,10 +1,9 @@
-/* Stator flux of the d-q model from one sample to the next: what both Kalman filters stand on.
+/* Stator flux of the d-q model from one sample to the next: the common part of both Kalman filters.
  *
- *   lambda = (L + R T_s / 2) i   in the frame of the present position, for each axis
- *   psi(k) turned back by the frame's turn + T_s v - T_s R (i(k) + i(k+1)) / 2 = psi(k+1)
- * What is kept is psi - R T_s / 2 i in the stationary frame, so that the turn is exact and each sample needs
- * its own current only. L_q(i) and R are renewed at 1 kHz. Range: |psi| and |lambda| < 4,
- * L < 4. */
+ *   lambda   = (L + R T_s / 2) i          per axis, in the frame of the present position
+ *   psi(k+1) = psi(k) turned back by the frame's turn + T_s v - T_s R (i(k) + i(k+1)) / 2
+ * The state is psi - R T_s / 2 i in the stationary frame, so the turn is exact and each sample needs its own
+ * current only. L_q(i) and R are renewed at 1 kHz. Range: |psi| and |lambda| < 4, L < 4. */
 #ifndef OBSERVERS_DQ_FLUX_H
 #define OBSERVERS_DQ_FLUX_H
 

@@ -1,24 +1,28 @@
-/* What the three EMF observers share: the EMF from the voltage equation, its amplitude, the error signal
+/* Common part of the three EMF observers: the EMF from the voltage equation, its amplitude, the error signal
  * (METHODS.md 2.3, 3.2.3).
  *
  * Change of the magnet's flux over the period from k-1 to k, exact for a constant L:
- *   T e = T v - R T (i(k) + i(k-1))/2 - L (i(k) - i(k-1))
- * It lies on the q-axis of the middle of the period. Two periods are taken together, against what a carrier
- * of half the sampling frequency leaves; their EMF lies w T before k. With psi = E / w of the present speed
- *   eps = -E_d / (w psi_ref),   misfit = 1 - E_q / (w psi_ref).
+ *   T e    = T v - R T (i(k) + i(k-1))/2 - L (i(k) - i(k-1))
+ * It lies on the q-axis of the middle of the period. The mean of two periods is used, which cancels a carrier
+ * of half the sampling frequency; it lies w T before k. In the present frame:
+ *   eps    = -E_d / (w psi_ref)
+ *   misfit = 1 - E_q / (w psi_ref)
  * psi_ref follows the amplitude within a band around psi_a of model.h, so an error of psi_m moves no angle.
  * Below omega_min the error signal fades with the EMF instead of rising with the noise; while another source
- * leads, errors of the voltage weigh as they do in a flux that is tied to the position, and below
- * resistance.omega R follows what E_q is more than w psi_a + (L_q - L_d) p i_q. The speed that decides this
- * is the lagging one: below a limit for its own wobble, w psi_a would be too small and R grow by 5 %.
+ * leads, below omega_tied, so that voltage errors act as in a flux that is tied to the position. Then, below
+ * resistance.omega, R is adapted to the difference
+ *   E_q - w psi_a - (L_q - L_d) p i_q = (R - R^) i_q
+ * The speed compared with that limit is the lagging one: the loop's own dips below it for moments in which
+ * w psi_a is too small, and R would grow by 5 %.
  *
  * L, w T, w T (L_q - L_d), 1 / (w psi_ref) and R T are renewed at 1 kHz. Nothing is integrated, so nothing
- * drifts and nothing has to be tied.
+ * drifts and nothing needs to be tied.
  *
- * The speed in w (L_q - L_d) J i closes a second loop: eps = error - c (w^ - w), c = (L_q - L_d) i_q / (w
- * psi). While braking c < 0, and with the loop's own speed that is unstable below w_n |c w| / (2 zeta), 14 %
- * of rated speed on IPM-1000 at full load. A speed that lags by one radian of rotation is stable everywhere
- * (c w < 1); in a ramp a of the speed it costs an angle of c a / w. */
+ * The speed in w (L_q - L_d) J i closes a second loop:
+ *   eps = error - c (w^ - w),   c = (L_q - L_d) i_q / (w psi)
+ * While braking c < 0; with the loop's own speed that is unstable below w_n |c w| / (2 zeta), 14 % of rated
+ * speed on IPM-1000 at full load. With a speed that lags by one radian of rotation it is stable everywhere
+ * (c w < 1); under an acceleration a this costs an angle of c a / w. */
 #ifndef OBSERVERS_EMF_H
 #define OBSERVERS_EMF_H
 
@@ -45,7 +49,7 @@ typedef struct {
     int32_t drop;       /* R T/2, Q32 */
     int32_t inductance; /* of the change of current, Q28 */
     int32_t cross;      /* w T (L_q - L_d)/2, Q32 */
-    int32_t turn;       /* tangent of what the EMF lies behind k, Q30 */
+    int32_t turn;       /* tangent of the angle by which the EMF lies behind k, Q30 */
     int32_t inverse;    /* 1 / (w T psi_ref), Q17, sign of w */
     int32_t rate;       /* 1 / (T w_base), Q20 */
     pm_dq_t e;          /* T e, filtered, in the present frame, Q31 */
@@ -55,10 +59,10 @@ typedef struct {
     pm_q_t omega_cross; /* speed of the cross-coupling */
 } emf_t;
 
-/* What an observer makes of the machine. */
+/* The machine in the form of one observer. */
 typedef struct {
     pm_q_t L;        /* of the change of current */
-    pm_q_t saliency; /* L_q - L_d: the rest of the cross-coupling */
+    pm_q_t saliency; /* L_q - L_d: the cross-coupling that L leaves */
     pm_gain_t lag;   /* of filter and half a period, tan = lag tan(w T/2): 1 in the rotor's frame */
 } emf_machine_t;
 
@@ -71,7 +75,7 @@ void emf_slow(emf_t *self, const emf_config_t *config, const emf_machine_t *mach
               pm_q_t weight);
 obs_out_t emf_last(const emf_t *self);
 
-/* T e of the voltage equation, Q28; `sum` of the currents at both ends. Keeps the current for the next
+/* T e of the voltage equation, Q28; *sum: current at both ends, added. Stores the current for the next
  * period. */
 static inline pm_ab_t emf_change(emf_t *self, const obs_in_t *in, pm_ab_t *sum)
 {
@@ -97,7 +101,7 @@ static inline pm_ab_t emf_pair(emf_t *self, pm_ab_t change)
     return (pm_ab_t){.alpha = change.alpha + past.alpha, .beta = change.beta + past.beta};
 }
 
-/* Turns e, which lies on the q-axis of an instant before k, by how far the frame has gone on since. */
+/* Turns e from the q-axis of its own instant into the present frame. */
 static inline pm_dq_t emf_turned(const emf_t *self, pm_dq_t e)
 {
     pm_dq_t r;

@@ -2,12 +2,14 @@
  *
  *   v = (R + p L_d) i + w (L_q - L_d) J i + E_ex (-sin theta, cos theta)
  * by the voltage equation of emf.h with L_d, and L_q(i) of model.h (3.4.2, rows 26 and 27). The EMF is an
- * alternating quantity here, so the filter e += k (E - e) lags. Its steady lag at the present speed is known,
- * tan = (2 - k)/k tan(w T/2) with the half period of the sampling, and is turned back in the estimated frame,
- * where the error signal is read (3.2.3, row 23).
+ * alternating quantity here, so its filter lags:
+ *   e       += k (E - e)
+ *   tan(lag) = (2 - k)/k tan(w T/2)              together with half a sampling period
+ * The steady lag at the present speed is known and turned back in the estimated frame, where the error signal
+ * is formed (3.2.3, row 23).
  *
- * Called each period; result belongs to k. vector: extended EMF, lag removed. T e is limited to an eighth of
- * the base flux per period, the lag to 63 degrees. Tests: tests/unit/observers/emf_test.cpp,
+ * Called each period; the result belongs to k. vector: extended EMF, lag removed. T e is limited to an eighth
+ * of the base flux per period, the lag to 63 degrees. Tests: tests/unit/observers/emf_test.cpp,
  * tests/scenario/ipm_emf.yaml, ipm_emf_low.yaml, cross_coupling.yaml. */
 #ifndef OBSERVERS_EXTENDED_EMF_AB_H
 #define OBSERVERS_EXTENDED_EMF_AB_H
@@ -35,7 +37,7 @@ static inline obs_out_t extended_emf_ab_last(const extended_emf_ab_t *self)
 
 static inline void extended_emf_ab_tie(extended_emf_ab_t *self, const extended_emf_ab_config_t *config)
 {
-    (void)self, (void)config; /* keeps nothing that could run away */
+    (void)self, (void)config; /* no integrator that could drift */
 }
 
 #endif

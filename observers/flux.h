@@ -1,5 +1,5 @@
-/* What the flux observers share: the integration of the stator flux, what the current draws of it, feedback
- * in the present frame, and the result. The formats are those of active_flux_t; each function is a chain of
+/* Common part of the flux observers: integration of the stator flux, flux of the current, feedback in the
+ * present frame, and the result. Formats as in active_flux_t; each function is a chain of
  * multiply-accumulates without a shift. */
 #ifndef OBSERVERS_FLUX_H
 #define OBSERVERS_FLUX_H
@@ -7,7 +7,7 @@
 #include "firmware/math/pair.h"
 #include "observers/active_flux.h"
 
-/* psi + T_s v - R T_s i(k-1), Q26; keeps the current for the next period. */
+/* psi + T_s v - R T_s i(k-1), Q26; stores the current for the next period. */
 static inline pm_ab_t flux_integrate(active_flux_t *self, const obs_in_t *in)
 {
     pm_ab_t psi = pm_pair_ab(&self->psi);
@@ -19,8 +19,8 @@ static inline pm_ab_t flux_integrate(active_flux_t *self, const obs_in_t *in)
     return psi;
 }
 
-/* The state of the next period: psi and a feedback in the present frame, Q26 and Q27. With the position lost,
- * a voltage at standstill drives the flux up until the fault. */
+/* The state of the next period: psi (Q26) plus a feedback (Q27) in the present frame. Saturates: with the
+ * position lost, a voltage at standstill integrates up until the fault. */
 static inline void flux_keep(active_flux_t *self, pm_ab_t psi, pm_dq_t back, pm_dir_t dir)
 {
     psi.alpha = pm_mulh_add(pm_mulh_add(psi.alpha, back.d, dir.cos), back.q, dir.sin);

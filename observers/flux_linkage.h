@@ -1,16 +1,18 @@
 /* Flux-linkage observer for machines without saliency (METHODS.md 2.2.1, row 12), with the low-pass in place
  * of the integration and its lag turned back (3.2.1 to 3.2.3, rows 21 to 23).
  *
- *   psi' += T_s (v - R i) - w_c T_s psi',   w_c = g |w|
- *   psi = psi' (1 - w_c T_s / 2 - j g sgn w),   psi - L_s i lies on the d-axis: eps = (psi - L_s i)_q /
- * psi_ref Since w_c follows the speed, the factor that removes lag and loss is the same at every speed and
- * exact at constant speed. Nothing of the position is fed back: an offset of the voltage leaves dv / w_c in
- * the flux and a ripple of the position at the frequency of rotation, which active_flux.h damps alike. While
- * another source leads, the flux is not filtered but tied to the present position. The change between both,
- * and that of the sign of w, transform the state. psi_ref, R and the integration are those of active_flux.h;
- * L_s = L_q(i).
+ *   w_c   = g |w|
+ *   psi' += T_s (v - R i) - w_c T_s psi'
+ *   psi   = psi' (1 - w_c T_s / 2 - j g sgn w)
+ *   eps   = (psi - L_s i)_q / psi_ref,            psi - L_s i lies on the d-axis; L_s = L_q(i)
+ * Since w_c follows the speed, the factor that removes lag and attenuation is the same at every speed and
+ * exact at constant speed. The position is not fed back: a voltage offset dv leaves dv / w_c in the flux and
+ * a ripple of the position at the frequency of rotation, which active_flux.h damps equally. While another
+ * source leads, the flux is not filtered but tied to the present position. The state is converted at the
+ * change between both and at a change of the sign of w. psi_ref, R and the integration are those of
+ * active_flux.h.
  *
- * Called each period; result belongs to k. Ranges as active_flux.h, g <= 1. Tests:
+ * Called each period; the result belongs to k. Ranges as in active_flux.h, g <= 1. Tests:
  * tests/unit/observers/flux_linkage_test.cpp, tests/scenario/spm_flux_linkage.yaml. */
 #ifndef OBSERVERS_FLUX_LINKAGE_H
 #define OBSERVERS_FLUX_LINKAGE_H

@@ -1,25 +1,28 @@
-/* Position observers: how the error signal of a source, whichever leads, moves the position
- * (METHODS.md 2.4, rows 18 to 20).
+/* Position observers: how the error signal of the leading source moves the position (METHODS.md 2.4, rows 18
+ * to 20).
  *
- *   PLL                omega += K_2 eps; theta += T omega + K_3 eps                       firmware/math/pll.h
- *   arctangent         theta += T omega + eps; omega: that of a PLL which follows theta
- *   simplified EKF     W += K_1 eps; omega += W + K_2 eps; theta += T omega + K_3 eps
- * Arctangent: eps is the angle of the EMF or flux seen from the position, so that theta after the correction
- * is atan2 of it, whatever theta was before (a limit of +-1 rad per period apart). It has no memory: no lag,
- * and all of the noise, rms = noise / |e|. Its speed serves prediction and control, and is as quiet as the
- * PLL's: a first-order filter of the difference would answer 0.1 rad of noise with 0.1 w_n.
- * Behind an EMF at low speed its noise shakes the current control; behind a flux it holds everywhere.
- * Harmonics of EMF and current (3.3, rows 24 and 25) come at 6 k times the angle: the arctangent shows them
- * whole, the others attenuate them beyond w_n.
+ *   PLL              omega += K_2 eps;  theta += T omega + K_3 eps                  firmware/math/pll.h
+ *   arctangent       theta += T omega + eps;  omega: of a PLL that follows theta
+ *   simplified EKF   W += K_1 eps;  omega += W + K_2 eps;  theta += T omega + K_3 eps
  *
- * Simplified EKF: the constant gains that a Kalman filter with white jerk ends with, all poles at r:
- *   K_1 = r^3 T^2, K_2 = 2 r^2 T, K_3 = 2 r T
+ * Arctangent: eps is the angle of the EMF or flux seen from the position, so theta after the correction is
+ * its atan2, whatever theta was before (within the limit of +-1 rad per period). It has no memory: no lag,
+ * and all of the noise, rms = noise / |e|. Its speed is used for prediction and control and is as quiet as
+ * the PLL's: a first-order filter of the difference would turn 0.1 rad of noise into 0.1 w_n.
+ * Behind an EMF at low speed its noise disturbs the current control; behind a flux it works at all speeds.
+ * Harmonics of EMF and current (3.3, rows 24 and 25) appear at 6 k times the angle: the arctangent passes
+ * them undamped, the others attenuate them beyond w_n.
+ *
+ * Simplified EKF: the constant gains to which a Kalman filter with white jerk converges, all poles at r:
+ *   K_1 = r^3 T^2
+ *   K_2 = 2 r^2 T
+ *   K_3 = 2 r T
  * No error under a constant acceleration. Noise bandwidth 5/3 r against (4 zeta^2 + 1) / (4 zeta) w_n of the
  * PLL: equal for r = 0.707 w_n at zeta = 0.9.
  *
- * loop_eps() stands before pm_pll_correct(); a drive with the PLL does without it. The others cost a call and
- * 18 (simplified EKF) or 28 instructions. While another source has a share, the arctangent is the PLL of the
- * given gains; K_1 grows with the share. Range: |W| < 1/32 per period. Tests:
+ * loop_eps() precedes pm_pll_correct(); a drive with the PLL does without it. The others cost a call and 18
+ * (simplified EKF) or 28 instructions. While another source has a share, the arctangent is replaced by the
+ * PLL of the given gains; K_1 grows with the share. Range: |W| < 1/32 per period. Tests:
  * tests/unit/observers/loop_test.cpp, tests/scenario/position_observers.yaml. */
 #ifndef OBSERVERS_LOOP_H
 #define OBSERVERS_LOOP_H

@@ -1,32 +1,39 @@
-/* Takes the error of wrong parameters out of the position, which it learns from an injected current
+/* Correction of the position error that wrong parameters cause, learnt from an injected current
  * (METHODS.md 3.5.2, rows 29 to 32).
  *
- * A wrong L_q or R moves the angle that a source shows by K_q i_q + K_d i_d (3.5.1, row 28),
- *   K_q = -dL_q / psi_a,  K_d = dR / (omega psi_a),  d: machine minus parameter,
- * so what is known of them is added to the error signal: eps' = eps + k_q i_q + k_d i_d. A current that
- * swings on the q-axis (row 29) or on the d-axis (row 30) shows what is left, in the angle that the source
- * sees, theta + eps', whatever the loop makes of it:
- *   g = Re(X / I);  X, I: amplitudes of that angle and of the measured current (row 31)
- *   k -= (g - g_mech) / (4 + n/4) for the n-th window of whole periods (row 32)
- *   g_mech,q = -1.5 P^2 [psi_m + (L_d - L_q) i_d] / (J w^2),  g_mech,d = -1.5 P^2 (L_d - L_q) i_q / (J w^2)
- * g_mech is how the rotor really swings. With the measured current in the place of its reference, whatever
- * the current control and the speed control make of the injection is in both amplitudes
- * (docs/methods_notes.md).
+ * A wrong L_q or R moves the angle of a source (3.5.1, row 28), d: machine minus parameter:
+ *   error = K_q i_q + K_d i_d
+ *   K_q   = -dL_q / psi_a
+ *   K_d   = dR / (omega psi_a)
+ * The learnt part is added to the error signal:
+ *   eps'  = eps + k_q i_q + k_d i_d
+ * A current that oscillates at w on the q-axis (row 29) or on the d-axis (row 30) shows the remainder in the
+ * angle that the source sees, theta + eps', independent of the loop. X and I are the complex amplitudes of
+ * that angle and of the measured current:
+ *   g     = Re(X / I)                                            (row 31)
+ *   k    -= (g - g_mech) / (4 + n/4)                            for the n-th window of whole periods (row 32)
+ * g_mech is the real oscillation of the rotor:
+ *   g_mech,q = -1.5 P^2 [psi_m + (L_d - L_q) i_d] / (J w^2)
+ *   g_mech,d = -1.5 P^2 (L_d - L_q) i_q / (J w^2)
+ * The measured current takes the place of its reference, so whatever the current control and the speed
+ * control make of the injection is in both amplitudes (docs/methods_notes.md).
  *
- * Amplitudes: (X, I) = 2/n sum (x, i) (cos, sin), x against a rotor of constant speed. The current is a
- * cosine whose sign changes from window to window: so an error of the speed, an acceleration, and whatever
- * else is in the angle at w without having been injected leave nothing in the mean. A first period lets it
- * settle. A window is given up when i_q goes away from what it was by more than the injected current, when
- * the rotor is 0.1 rad from where constant speed takes it, or when less than half of the current arrives.
+ * Amplitudes, x relative to a rotor of constant speed:
+ *   (X, I) = 2/n sum (x, i) (cos, sin)
+ * The current is a cosine whose sign alternates from window to window: so an error of the speed, an
+ * acceleration, and any disturbance of the angle at w that was not injected average to zero. The first period
+ * of a window lets transients decay. A window is discarded when i_q changes by more than the injected
+ * current, when the rotor is 0.1 rad from where constant speed would have moved it, or when less than half of
+ * the current appears.
  *
- * After MISMATCH_WINDOWS windows the injection rests for a minute, or until i_q has changed as above. K_d is
- * kept as K_d omega. Flux observers integrate an error of R: beside omega, w must be small; at |omega| < 2 w
- * nothing is injected on the d-axis. Only while the observer leads without the carrier of another source.
- * Which observers show what: docs/methods_notes.md.
+ * After MISMATCH_WINDOWS windows the injection pauses for a minute, or until i_q has changed as above. K_d is
+ * stored as K_d omega. Flux observers integrate an error of R, so w must be small against omega: at
+ * |omega| < 2 w nothing is injected on the d-axis. Active only while the observer leads without the carrier
+ * of another source. Which error shows in which observer: docs/methods_notes.md.
  *
- * Each control period: 49 instructions and a call. At 1 kHz 30 when off, at most 161 otherwise. Range: |k| <=
- * 1 per base current. Tests: tests/unit/observers/mismatch_test.cpp, tests/scenario/mismatch_injection.yaml.
- */
+ * Each control period: 49 instructions and a call. At 1 kHz: 30 when off, at most 161 otherwise. Range:
+ * |k| <= 1 per base current. Tests: tests/unit/observers/mismatch_test.cpp,
+ * tests/scenario/mismatch_injection.yaml. */
 #ifndef OBSERVERS_MISMATCH_H
 #define OBSERVERS_MISMATCH_H
 
@@ -36,7 +43,7 @@
 #include "observers/model.h"
 
 #define MISMATCH_PERIODS 4U  /* of the injection in a window, after the first */
-#define MISMATCH_WINDOWS 64U /* learnt before it rests */
+#define MISMATCH_WINDOWS 64U /* learnt before the injection pauses */
 
 typedef enum { MISMATCH_OFF, MISMATCH_Q_AXIS, MISMATCH_D_AXIS, MISMATCH_COUNT } mismatch_id_t;
 
@@ -48,23 +55,23 @@ typedef struct {
     int32_t swing;    /* 1.5 P^2 / (J w^2): rad per base flux and base current, Q20 */
 } mismatch_config_t;
 
-/* What is known. */
+/* What has been learnt. */
 typedef struct {
     pm_dq_t k;      /* k_d, k_q: rad per base current */
     pm_q_t k_omega; /* k_d omega */
 } mismatch_t;
 
-/* The injection and what is seen of it; all zero before the first step. */
+/* The injection and the response to it; all zero before the first step. */
 typedef struct {
     pm_angle_t theta; /* of a rotor of constant speed, ... */
     pm_q_t omega;     /* which is the mean of the loop's */
-    pm_angle_t x; /* what is seen beyond it, and the current: sums of a step's control periods, a sixteenth */
+    pm_angle_t x;     /* angle beyond it, and current: sums over a step's control periods, /16 */
     pm_q_t i;
     pm_q_t i_q;      /* mean */
     pm_q_t i_record; /* i_q when learning began */
     pm_ab_t angle;   /* amplitudes: cosine and sine, Q27 */
     pm_ab_t current;
-    pm_q_t injected; /* for the reference of its axis */
+    pm_q_t injected; /* to be added to the current reference of its axis */
     uint16_t count;  /* steps in the window */
     uint8_t windows;
     uint8_t id; /* for which it learns */
@@ -76,7 +83,7 @@ typedef struct {
     pm_dq_t i;
 } mismatch_in_t;
 
-/* What is added to the error signal. */
+/* Correction of the error signal. */
 static inline pm_q_t mismatch_eps(const mismatch_t *self, pm_dq_t i)
 {
     return pm_shl(pm_mulh2(self->k.d, i.d, self->k.q, i.q), 32 - PM_Q_BITS);

@@ -1,16 +1,19 @@
-/* The machine as all observers know it, and what they share (METHODS.md 1.3.1.3, 2.2.2, 3.4).
+/* The machine as all observers know it, and its functions (METHODS.md 1.3.1.3, 2.2.2, 3.4).
  *
- *   L_q(i) = L_q + L_q2 i_q^2 + k i_d, k = L_qd + L_qd2 i_d: psi_q / i_q under load
- *   psi_a = psi_m + (L_d - L_q(i)) i_d + (L_qd/2 + L_qd2 i_d) i_q^2, >= psi_m/4: active flux, the part of the
- *           stator flux on the d-axis; the last term follows from that of psi_q, both having one energy.
+ *   k(i)   = L_qd + L_qd2 i_d
+ *   L_q(i) = L_q + L_q2 i_q^2 + k i_d                                        psi_q / i_q under load
+ *   psi_a  = psi_m + (L_d - L_q(i)) i_d + (L_qd/2 + L_qd2 i_d) i_q^2         >= psi_m/4
+ * psi_a is the active flux, the part of the stator flux on the d-axis; its last term follows from that of
+ * psi_q, because both derive from one energy.
  *
- * Cross-coupling: psi_q has L_qds i_d with L_qds = k i_q. Without it an observer errs by (row 26)
- *   tan = -L_qds i_d / psi_a.
- * Two identity terms remove that whatever the frame (row 27): -w L_qds i of the improved extended EMF, and
- * w k i_d J i, which each model has here by its L_q(i). They differ by w k |i|^2 along q: in what lies there,
- * not in its angle.
+ * Cross-coupling: psi_q contains L_qds i_d with L_qds = k i_q. Without it an observer errs by (row 26)
+ *   tan(error) = -L_qds i_d / psi_a
+ * Two identity terms remove that in any frame (row 27): -w L_qds i of the improved extended EMF, and
+ * w k i_d J i, which each model has here by its L_q(i). They differ by w k |i|^2 along q: in the amplitude,
+ * not in the angle.
  *
- * All for 1 kHz, not for the step. Tests: tests/unit/observers, tests/scenario/cross_coupling.yaml. */
+ * All functions are for 1 kHz, not for the step. Tests: tests/unit/observers,
+ * tests/scenario/cross_coupling.yaml. */
 #ifndef OBSERVERS_MODEL_H
 #define OBSERVERS_MODEL_H
 
@@ -26,7 +29,7 @@ typedef struct {
     pm_frac_t t_s; /* T_s w_base, Q32 */
 } observer_model_t;
 
-/* How R follows the winding while the position is known from elsewhere (docs/decisions/004-resistance.md). */
+/* Adaptation of R while the position is known from another source (docs/decisions/004-resistance.md). */
 typedef struct {
     pm_gain_t k;  /* per slow step, Q26; 0: R stays */
     pm_q_t omega; /* R follows below this speed: above, errors of psi_m outweigh it */
@@ -35,12 +38,12 @@ typedef struct {
 pm_q_t observer_active_flux(const observer_model_t *model, pm_dq_t i);
 pm_q_t observer_L_q(const observer_model_t *model, pm_dq_t i);
 
-/* The next reference of the amplitude, `lack` more than what is seen: within 100 ms, and half of psi_a around
- * it. */
+/* The next reference of the amplitude; lack: reference minus measured amplitude. Follows with 100 ms, within
+ * half of psi_a around it. */
 pm_q_t observer_amplitude(const observer_model_t *model, pm_dq_t i, pm_q_t reference, pm_q_t lack);
 
-/* The next R, from the power that the model lacks: error (of flux or voltage) along the current, times it.
- * Between half and twice the parameter. */
+/* The next R, from the power that the model lacks: error (of flux or voltage) along the current, times the
+ * current. Between half and twice the parameter. */
 pm_q_t observer_resistance(const observer_resistance_t *config, const observer_model_t *model, pm_q_t R,
                            pm_q_t omega, pm_q_t lack);
 

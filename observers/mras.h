@@ -1,25 +1,31 @@
-/* What the model reference adaptive systems share (METHODS.md 12.2, rows 137 to 139).
+/* Common part of the model reference adaptive systems (METHODS.md 12.2, rows 137 to 139).
  *
  * Reference: the machine. Adjustable: its model in the present frame, with the extended EMF (2.3.2), so that
  * round and salient machines are one case:
- *   v = (R + p L_d) i + w_f (L_q - L_d) J i + (0, E),  E = omega psi_a,  J = [0 -1; 1 0]
- * Currents are changes in the stationary frame, so a correction of the position leaves no step in them.
- * What was measured over [k-1, k) belongs to its middle: it is turned by omega T_s / 2 into the frame of k.
- * The error signal is the mean of two periods: an error of L_d leaves a carrier of half the sampling rate in
- * it, which would otherwise meet the limit of +-1, and a current sample stands in it as L_d/T_s.
+ *   v = (R + p L_d) i + w_f (L_q - L_d) J i + (0, E)
+ *   E = omega psi_a
+ *   J = [0 -1; 1 0]
+ * Changes of current are formed in the stationary frame, so a correction of the position causes no step in
+ * them. What was measured over [k-1, k) belongs to its middle: it is turned by omega T_s / 2 into the frame
+ * of k. The error signal is the mean of two periods: an error of L_d leaves a carrier of half the sampling
+ * rate in it, which would otherwise reach the limit of +-1, and noise of a current sample enters it times
+ * L_d/T_s.
  *
- * The error signal is divided by E as E / max(|E|, emf_min)^2: its sign is right in both directions and it
- * fades to nothing at standstill, where nothing is to be seen. The quotient is renewed at 1 kHz.
+ * The error signal is divided by E through the factor
+ *   E / max(|E|, emf_min)^2
+ * so its sign is right in both directions and it fades to zero at standstill, where there is no EMF. The
+ * factor is renewed at 1 kHz.
  *
- * Wrong parameters (3.5.1, row 28), d = machine minus model: the angle errs by
- *   asin[(dR i_d - omega dL_q i_q) / (omega psi_a)] to first order; L_d and psi_m move none.
- * R is the one given: what a square-wave carrier and p i_q leave on the q-axis at low speed would pass for
- * more than the resistance itself.
+ * Wrong parameters (3.5.1, row 28), d = machine minus model: the angle errs, to first order, by
+ *   asin[(dR i_d - omega dL_q i_q) / (omega psi_a)]
+ * L_d and psi_m move no angle. R is the parameter and is not adapted: at low speed, a square-wave carrier and
+ * p i_q leave more on the q-axis than the resistive drop.
  *
- * The reactive term needs the speed of the loop, which moves with the error signal. With c = (L_q - L_d) i_q
- * / E the two run away at 1 / (c - tau) unless the speed reaches the model through a lag tau > c. So w_f lags
- * by n radians of the rotor, tau = n / omega, n > (L_q - L_d) i_q / psi_a; under an acceleration a that costs
- * a tau c. */
+ * The reactive term needs the speed of the loop, which moves with the error signal. With
+ *   c = (L_q - L_d) i_q / E
+ * both diverge at the rate 1 / (c - tau) unless the speed reaches the model through a lag tau > c. So w_f
+ * lags by n radians of the rotor, tau = n / omega with n > (L_q - L_d) i_q / psi_a; under an acceleration a
+ * this costs a tau c. */
 #ifndef OBSERVERS_MRAS_H
 #define OBSERVERS_MRAS_H
 

@@ -1,18 +1,20 @@
 /* Model reference adaptive system, simplified voltage model (METHODS.md 12.2.4, row 139).
  *
- * The d-axis of the voltage model alone, with the sign and the size of the EMF from the filtered speed w_f:
- *   D_d = v_d - R i_d - L_q (p i)_d = -E sin(error),  eps = -D_d / (w_f psi_a)
- * where (p i)_d is the change of the stationary current seen along the d-axis, which holds -omega i_q: so no
- * speed enters the model. (With w_f L_q i_q instead, the loop's own correction k_p eps turns the frame that
- * the current control holds i_q in, which is a positive feedback of k_p L_q i_q / E: unstable at rated load
- * below a third of rated speed.) All is the mean of two periods. The turn of half a period is left to v_q of
- * the steady state at 1 kHz: eps gets (w_f T_s/2) (R i_q + E) / E instead of two products per period.
+ * The d-axis of the voltage model alone; sign and amplitude of the EMF come from the filtered speed w_f:
+ *   D_d = v_d - R i_d - L_q (p i)_d = -E sin(error)
+ *   eps = -mean of two D_d / (w_f psi_a)
+ * (p i)_d is the change of the stationary current along the d-axis; it contains -omega i_q, so no speed
+ * enters the model. (With w_f L_q i_q instead, the loop's own correction k_p eps turns the frame in which the
+ * current control holds i_q: a positive feedback of k_p L_q i_q / E, unstable at rated load below a third of
+ * rated speed.) The turn of half a period uses v_q of the steady state, at 1 kHz, in place of two products
+ * per period:
+ *   eps += (w_f T_s/2) (R i_q + E) / E
  *
- * What it gives up: eps is (L_d - L_q) p i_d / E wrong while i_d moves, and without the q-axis there is no
- * EMF ratio and no misfit (always 0): a lost position shows in eps alone.
+ * Price: eps is wrong by (L_d - L_q) p i_d / E while i_d changes, and without the q-axis there is no EMF
+ * ratio and no misfit (always 0): a lost position shows in eps alone.
  *
- * Called each period; result belongs to k. Range: |v| and |i| < 2, L_q / (T_s emf_min) < 2048 or it is held
- * there. vector: (D_d, w_f psi_a). Tests: tests/unit/observers/mras_test.cpp, tests/scenario. */
+ * Called each period; the result belongs to k. Range: |v| and |i| < 2; L_q / (T_s emf_min) is clamped to
+ * 2048. vector: (D_d, w_f psi_a). Tests: tests/unit/observers/mras_test.cpp, tests/scenario. */
 #ifndef OBSERVERS_MRAS_SIMPLE_H
 #define OBSERVERS_MRAS_SIMPLE_H
 

@@ -1,16 +1,20 @@
 /* Model reference adaptive system, voltage model (METHODS.md 12.2.3, row 138).
  *
- * The model turns the measured currents into the voltage that they need at its own adapted speed w^; what the
- * machine was given differs by (mras.h)
- *   v_VM = (R + p L_d) i + w_f (L_q - L_d) J i + (0, w^ psi_a)
- *   D_d = -E sin(error),  D_q = E cos(error) - w^ psi_a
- *   w^ += (k / psi_a) D_q,  eps = -mean of two D_d / (w^ psi_a),  misfit = 1 - w^ / omega
- * with p i = (i(k) - i(k-1))/T_s and i the mean of both ends. Knows psi_m, which moves no angle, only w^ and
- * the loop gain. w^ is the EMF ratio of speed.h.
+ * From the measured currents the model computes the voltage that they need at its own adapted speed w^; the
+ * voltage of the machine differs by D (mras.h):
+ *   v_VM   = (R + p L_d) i + w_f (L_q - L_d) J i + (0, w^ psi_a)
+ *   D      = v - v_VM
+ *   D_d    = -E sin(error)
+ *   D_q    =  E cos(error) - w^ psi_a
+ *   w^    += (k / psi_a) D_q
+ *   eps    = -mean of two D_d / (w^ psi_a)
+ *   misfit = 1 - w^ / omega
+ * with p i = (i(k) - i(k-1))/T_s and i the mean of both ends. psi_m moves no angle, only w^ and the loop
+ * gain. w^ is the EMF ratio of speed.h.
  *
- * Called each period; result belongs to k. Range: L_d/T_s < 128,
- * |v| and |i| < 2, psi_a > 1/128; |D| is held at 2, w^ at +-4. vector: E in the present frame. Tests:
- * tests/unit/observers/mras_test.cpp, tests/scenario. */
+ * Called each period; the result belongs to k. Range: L_d/T_s < 128, |v| and |i| < 2, psi_a > 1/128; |D| is
+ * clamped to 2, w^ to +-4. vector: E in the present frame.
+ * Tests: tests/unit/observers/mras_test.cpp, tests/scenario. */
 #ifndef OBSERVERS_MRAS_VOLTAGE_H
 #define OBSERVERS_MRAS_VOLTAGE_H
 

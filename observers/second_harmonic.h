@@ -1,26 +1,28 @@
-/* Takes the second harmonic out of the error signal, between a source and the loop
+/* Removes the second harmonic from the error signal, between a source and the loop
  * (METHODS.md 3.6.2 and 3.6.3, rows 34 and 35).
  *
- * Unlike phases put a negative sequence into EMF and flux: an error signal d at twice the rotor's angle, of
- * R_d I / (omega psi_a) for a traceless part R_d of the resistance, which the loop would follow. Its
- * estimate is subtracted and learns from what is left:
+ * Unequal phases cause a negative sequence in EMF and flux: an error signal d at twice the rotor's angle, of
+ * amplitude R_d I / (omega psi_a) for a traceless part R_d of the resistance. The loop would follow it, so
+ * its estimate d^ is subtracted and learns from the remainder eps':
  *
- *   adaptive notch   d^ = a cos 2 theta + b sin 2 theta;  (a, b) += mu eps' (cos, sin)(2 theta + phi)
- *   resonator        d^ = y;  (y, q) turned by 2 omega T, += mu eps' (cos, -sin) phi  (SOGI at 2 omega)
  *   eps' = eps - d^
+ *   adaptive notch   d^ = a cos 2 theta + b sin 2 theta
+ *                    (a, b) += mu eps' (cos, sin)(2 theta + phi)
+ *   resonator        d^ = y                                          a SOGI at 2 omega
+ *                    (y, q) += mu eps' (cos phi, -sin phi), then turned by 2 omega T
  *
- * The first is tied to the angle and keeps what it learned through changes of speed; the second knows the
- * frequency only. phi is the angle of the loop's sensitivity at 2 omega: the loop answers d - d^ with
+ * The notch is tied to the angle and keeps what it learnt through changes of speed; the resonator knows the
+ * frequency only. phi is the angle of the loop's sensitivity at 2 omega; the loop responds to d - d^ with
  *
- *   S = s^3 / (s^3 + k_p s^2 + k_i s + k_1), s = 2 j omega,
+ *   S = s^3 / (s^3 + k_p s^2 + k_i s + k_1),   s = 2 j omega
  *
- * whose angle exceeds 90 degrees below 2 omega = w_n: there phi = 0, which the literature has, drives the
- * estimate away (docs/methods_notes.md). d^ is reached with the time constant 2 T / (mu |S|).
+ * Its angle exceeds 90 degrees below 2 omega = w_n: there phi = 0, as in the literature, makes the estimate
+ * diverge (docs/methods_notes.md). d^ converges with the time constant 2 T / (mu |S|).
  *
- * S is renewed at 1 kHz. While another source leads, or 2 |omega| < w_n / 3, where |S| < 0.15, it learns
- * nothing and what it knew fades within 20 ms. A period costs 30 (resonator) or 35 (notch)
- * instructions and a call, two when it is off. Range: mu < 0.1. Tests:
- * tests/unit/observers/second_harmonic_test.cpp, tests/scenario/asymmetry.yaml. */
+ * S is renewed at 1 kHz. While another source leads, or at 2 |omega| < w_n / 3, where |S| < 0.15, learning
+ * stops and the estimate fades within 20 ms. A period costs 30 (resonator) or 35 (notch) instructions and a
+ * call, two when it is off. Range: mu < 0.1. Tests: tests/unit/observers/second_harmonic_test.cpp,
+ * tests/scenario/asymmetry.yaml. */
 #ifndef OBSERVERS_SECOND_HARMONIC_H
 #define OBSERVERS_SECOND_HARMONIC_H
 
@@ -46,12 +48,12 @@ typedef struct {
 typedef struct {
     pm_q_t a, b;                /* or y, q */
     pm_dir_t turn;              /* of 2 omega T */
-    int32_t gain_cos, gain_sin; /* mu cos phi, +-mu sin phi, Q32; 0: nothing is learnt */
+    int32_t gain_cos, gain_sin; /* mu cos phi, +-mu sin phi, Q32; 0: no learning */
 } second_harmonic_t;
 
 void second_harmonic_reset(second_harmonic_t *self);
 
-/* What is left of eps; dir: direction of the present position. */
+/* eps'; dir: direction of the present position. */
 pm_q_t second_harmonic_step(second_harmonic_t *self, const second_harmonic_config_t *config, pm_dir_t dir,
                             pm_q_t eps);
 

@@ -1,15 +1,16 @@
 /* Speed from the position and from the EMF (METHODS.md appendix A, rows 148 to 150).
  *
- *   difference   w_d = (theta(k) - theta(k-N)) / (N T): exact mean, late by N T/2
- *   EMF ratio    w_e = e_q / psi: at once, wrong by what psi_m is
- *   combined     w = w_e + LPF(w_d - w_e): the mean of the first, the speed of the second
- * or the speed of the loop, which needs none of them: then nothing is done.
+ *   difference   w_d = (theta(k) - theta(k-N)) / (N T)      exact mean, late by N T/2
+ *   EMF ratio    w_e = e_q / psi                            no delay, wrong by the error of psi_m
+ *   combined     w   = w_e + LPF(w_d - w_e)                 mean of the first, dynamics of the second
+ * SPEED_LOOP is the speed of the loop, which needs no computation.
  *
- * The difference is taken against the turn that the loop's speed stands for, so it may be more than half a
- * turn: w_d = w_loop + (theta - theta(k-N) - N T w_loop) / (N T). e_q comes from the voltage equation in the
- * present frame, w_e = (v_q - R i_q - L_q p i_q) / (psi_m + L_d i_d), and so works behind any source; v_q is
- * the mean of the millisecond over which i_q changed (two ends of it in its place are off by a tenth of 75
- * V/A on IPM-1000, and the speed control closes a loop over that); w_e is filtered.
+ * The difference is taken against the turn that the loop's speed stands for, so it may exceed half a turn:
+ *   w_d = w_loop + (theta(k) - theta(k-N) - N T w_loop) / (N T)
+ * e_q comes from the voltage equation in the present frame and so works behind any source:
+ *   w_e = (v_q - R i_q - L_q p i_q) / (psi_m + L_d i_d),    then filtered
+ * v_q is the mean over the millisecond in which i_q changed. (The mean of its two ends would be wrong by a
+ * tenth of 75 V/A on IPM-1000, and the speed control closes a loop over that.)
  *
  * Called at 1 kHz, T being that step, with values of the same period. Range: N <= SPEED_WINDOW, within which
  * the loop may be half a turn off. Tests: tests/unit/observers/speed_test.cpp. */
@@ -39,7 +40,7 @@ typedef struct {
 typedef struct {
     pm_angle_t past[SPEED_WINDOW];
     uint8_t next;
-    bool ready; /* what it remembers is of the step before */
+    bool ready; /* past[] is of the step before */
     pm_q_t i_q;
     pm_q_t v_sum; /* of v_q over the step, a sixteenth */
     pm_q_t omega_e;

@@ -95,14 +95,14 @@ static inline __attribute__((always_inline)) pm_kalman_gain_t pm_kalman_measure(
     return g;
 }
 
-/* What the measured state gains of its innovation y. */
+/* Correction of the measured state by its innovation y: K_m y = (1 - kappa) y. */
 static inline int32_t pm_kalman_gained(const pm_kalman_gain_t *g, int32_t y)
 {
     return y - pm_shl(pm_mulh(g->kappa, y), 2);
 }
 
-/* Holds the variance of state m below a half, where nothing is seen of it for long: its row and column
- * shrink, which keeps P positive definite as no cut would. */
+/* Keeps the variance of state m below a half when nothing is observed of it for long. Row and column shrink
+ * together, so P stays positive definite, which clamping the element would not guarantee. */
 static inline __attribute__((always_inline)) void pm_kalman_hold(int32_t *P, unsigned n, unsigned m)
 {
     if (P[PM_KALMAN_AT(m, m)] < INT32_C(1) << (PM_KALMAN_BITS - 1)) {
