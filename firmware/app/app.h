@@ -1,22 +1,22 @@
-/* The application: brings drive, hardware and CANopen node together. Everything that is neither motor nor
- * register.
+/* The application: connects drive, hardware and CANopen node; everything that is neither motor control nor
+ * register access.
  *
- * The bridge is on only while the drive wants it, no fault is latched, the control interrupt comes, and the
- * parameters are those that were stored: an image without stored parameters says so and stays off.
+ * The bridge is on only while the drive wants it, no fault is latched, the control interrupt runs, and the
+ * parameters are the stored ones: an image without stored parameters reports it and stays off.
  *
  *   app_boot(a, hal)   parameters from the store, hardware, drive; then interrupts run
  *   app_turn(a)        one round of the main loop, cheap when nothing has changed and no timer of the bus can
- *                      have run out; never blocks, but for a store that was asked for
- *   app_control(), app_slow(), app_monitor(): called up by the port (hal.h)
+ *                      have run out; never blocks, except for a store that was requested
+ *   app_control(), app_slow(), app_monitor()   called by the port (hal.h)
  *
- * drive_slow() runs in app_slow() between two control interrupts and is never interrupted by one: were it
- * still running when the next comes, that is the fault OVERRUN. There too the drive takes a new set of
- * parameters, whole.
+ * drive_slow() runs in app_slow() between two control interrupts and is never interrupted by one: if it is
+ * still running when the next one comes, the fault is OVERRUN. A new parameter set is applied there too, as a
+ * whole.
  *
- * Parameters are written to a shadow set, which is what is read back. A write that the drive's configuration
- * refuses is undone (0604 0043h); of what decides the meaning of the drive's state nothing changes while it
- * is on (0800 0022h). What the hardware was set up with waits for a restart. Tests: tests/unit/app,
- * tests/contract/hal. */
+ * Parameters are written to a shadow set, which is also what is read back. A write that the drive's
+ * configuration refuses is undone (0604 0043h). Parameters that decide the meaning of the drive's state
+ * cannot change while it is on (0800 0022h). Those of the hardware set-up take effect after a restart.
+ * Tests: tests/unit/app, tests/contract/hal. */
 #ifndef APP_APP_H
 #define APP_APP_H
 

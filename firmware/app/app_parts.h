@@ -1,4 +1,4 @@
-/* What the parts of the application ask of each other. */
+/* Interface between the parts of the application. */
 #ifndef APP_APP_PARTS_H
 #define APP_APP_PARTS_H
 

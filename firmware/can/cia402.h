@@ -1,14 +1,14 @@
-/* Drive profile CiA 402: from the controlword to what the drive is to do, and back to the statusword.
+/* Drive profile CiA 402: from the controlword to commands for the drive, and back to the statusword.
  *
  * Modes: profile velocity (3), profile torque (4), -1: current vector of a given amplitude that turns at the
  * target velocity, and -2: identification of the machine with that current up to that velocity. Option codes
- * as far as the drive has them: quick stop 0, 1, 5; shutdown 0, 1; disable operation 0, 1; halt 1; fault
- * reaction 0 (the bridge opens at once, always).
+ * that the drive supports: quick stop 0, 1, 5; shutdown 0, 1; disable operation 0, 1; halt 1; fault reaction
+ * 0 (the bridge opens at once, always).
  *
- * Facts about the drive come in, orders go out: cia402_step() after every frame and once per round of the
- * main loop; the order `clear_fault` holds for this step alone. A fault is left only by the rising edge of
- * bit 7 of the controlword after its cause has gone; nothing starts by itself. The mode is taken when
- * operation is enabled. Tests: tests/unit/can/cia402_test.cpp. */
+ * cia402_step() runs after every frame and once per round of the main loop; its output `clear_fault` is valid
+ * for that step alone. A fault is left only by the rising edge of bit 7 of the controlword after its cause
+ * has gone; nothing starts by itself. The mode is latched when operation is enabled.
+ * Tests: tests/unit/can/cia402_test.cpp. */
 #ifndef CAN_CIA402_H
 #define CAN_CIA402_H
 
@@ -36,9 +36,9 @@ enum {
     CIA402_MODE_TORQUE = 4,
 };
 
-/* What the drive says */
+/* State of the drive */
 typedef struct {
-    bool ready;     /* it may be switched on: parameters and hardware are as they must be */
+    bool ready;     /* it may be switched on: parameters and hardware are in order */
     bool fault;     /* latched */
     bool off;       /* the bridge is, and the drive is at rest */
     bool following; /* the targets: not while it calibrates, finds the position or stops */
@@ -47,7 +47,7 @@ typedef struct {
     int32_t velocity; /* mrad/s */
 } cia402_in_t;
 
-/* What it is told */
+/* Commands to the drive */
 typedef struct {
     bool enable;
     bool coast; /* when not enabled: the bridge opens at once; else the drive stops first */
@@ -72,7 +72,7 @@ typedef struct {
 void cia402_init(cia402_t *self);
 cia402_out_t cia402_step(cia402_t *self, const cia402_in_t *in);
 uint16_t cia402_statusword(const cia402_t *self, const cia402_in_t *in);
-bool cia402_on(const cia402_t *self); /* the drive is, or is about to be */
+bool cia402_on(const cia402_t *self); /* the drive is on, or about to be */
 
 /* Objects of the profile by slot (OD_LIVE_...). False: not one of these. */
 bool cia402_get(const cia402_t *self, uint16_t slot, int32_t *value);

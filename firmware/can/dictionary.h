@@ -1,5 +1,5 @@
 /* The object dictionary: a constant table, generated from firmware/params/parameters.yaml, sorted by index
- * and sub-index. What a value means stands there; where it lives is told by its kind and slot.
+ * and sub-index. The yaml file describes each value; kind and slot say where it is stored.
  *
  * Values are up to 32 bits wide, in integer SI decimals (parameters.yaml). Strings and domains are bytes.
  * Nothing here knows of motors: the application reads and writes by slot (node.h). */

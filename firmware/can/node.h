@@ -67,9 +67,9 @@ typedef enum {
 #define SDO_STATE        0x08000022U /* not in the present state of the device */
 #define SDO_NO_DATA      0x08000024U
 
-/* What the node asks of the application, which defines it: called directly, so that the depth of the stack
- * can be told. Numbers of 8 and 16 bits come and go as the value they mean; unsigned 32 bits as their bit
- * pattern. Ranges have been checked, and that OD_ONLY_OFF finds it off. */
+/* Functions that the application defines for the node: called directly, so that the depth of the stack can be
+ * computed. Numbers of 8 and 16 bits are passed as the value they mean; unsigned 32 bits as their bit
+ * pattern. Ranges have been checked, and for OD_ONLY_OFF that the bridge is off. */
 bool node_host_send(void *context, const node_frame_t *frame); /* false: no room */
 bool node_host_on(void *context);                              /* the bridge is on, or about to be */
 int32_t node_host_get(void *context, const od_entry_t *entry); /* OD_PARAMETER, OD_LIVE */
@@ -99,8 +99,8 @@ bool node_busy(const node_t *node); /* something waits for room to be sent */
 
 void node_bus(node_t *node, node_bus_t state);
 
-/* An error is there, or with code 0 no longer: EMCY, 1001h and 1003h follow. `info` goes into the last five
- * bytes. The same code again says nothing new. */
+/* An error is present, or with code 0 no longer: EMCY, 1001h and 1003h follow. `info` goes into the last five
+ * bytes. Repeating the same code has no effect. */
 void node_error(node_t *node, node_error_t source, uint16_t code, uint32_t info);
 
 /* Of an OD_NODE entry: from within node_host_recall(), as stored; and to be stored. Those with OD_NODE_ID are

@@ -1,4 +1,4 @@
-/* What the parts of the node ask of each other; not for users of node.h. */
+/* Interface between the parts of the node; not for users of node.h. */
 #ifndef CAN_NODE_PARTS_H
 #define CAN_NODE_PARTS_H
 

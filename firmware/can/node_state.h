@@ -1,4 +1,4 @@
-/* The node's memory. Users of node.h allocate it and read nothing but what node.h gives. */
+/* The node's memory. Users of node.h allocate it and read it only through node.h. */
 #ifndef CAN_NODE_STATE_H
 #define CAN_NODE_STATE_H
 

@@ -10,7 +10,7 @@ void current_control_reset(current_control_t *self, pm_dq_t v)
     self->q.integral = pm_widen(v.q);
 }
 
-/* The d-axis takes what it needs, the q-axis what is left. */
+/* The d-axis has priority; the q-axis gets the rest of the circle. */
 static inline pm_dq_t limited(pm_dq_t u, pm_wide_t top)
 {
     const pm_wide_t d = pm_clamp(u.d, -top, top);

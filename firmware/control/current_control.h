@@ -1,11 +1,16 @@
 /* Current control in the rotor frame (METHODS.md 1.3.2.2, row 5).
  *
- * PI per axis with kp = w_c L, ki = w_c R T_s, decoupling -w L_q i_q and w (L_d i_d + psi), a circular
- * voltage limit in which the d-axis has priority (flux before torque), and back-calculation: each integral
- * follows the limited voltage. Step response 10-90 %: 0.35/f_c with little delay, 0.16/f_c at f_c = f_pwm/20;
- * overshoot <= 10 % up to there. The limit is noticed to 2^-12 in the square of the voltage. Uses the current
- * at k; the voltage belongs to the frame at the middle of [k+1, k+2). Tests:
- * tests/unit/control/current_control_test.cpp. */
+ * PI per axis (firmware/math/pi.h) with decoupling:
+ *   kp   = w_c L
+ *   ki   = w_c R T_s
+ *   ff_d = -omega L_q i_q
+ *   ff_q =  omega (L_d i_d + psi_m)
+ * The voltage limit is circular and the d-axis has priority (flux before torque); back-calculation: each
+ * integral follows the limited voltage. The limit is detected to 2^-12 in the square of the voltage. Step
+ * response 10-90 %: 0.35/f_c with little delay, 0.16/f_c at f_c = f_pwm/20; overshoot <= 10 % up to there.
+ *
+ * Uses the current at k; the voltage belongs to the frame at the middle of [k+1, k+2).
+ * Tests: tests/unit/control/current_control_test.cpp. */
 #ifndef CONTROL_CURRENT_CONTROL_H
 #define CONTROL_CURRENT_CONTROL_H
 
@@ -21,7 +26,7 @@ typedef struct {
 
 typedef struct {
     pm_pi_t d, q;
-    bool limited; /* set when the voltage was; whoever reads it clears it */
+    bool limited; /* set while the voltage limit acts; the reader clears it */
 } current_control_t;
 
 typedef struct {
@@ -30,7 +35,7 @@ typedef struct {
     bool limited;
 } current_control_out_t;
 
-/* Integrals such that the first output is v at zero error. */
+/* Sets the integrals such that the first output is v at zero error. */
 void current_control_reset(current_control_t *self, pm_dq_t v);
 void current_control_step(current_control_t *self, const current_control_config_t *config, pm_dq_t i,
                           pm_dq_t i_ref, pm_q_t omega, pm_q_t v_max, current_control_out_t *out);

@@ -1,9 +1,9 @@
 /* Field weakening by voltage feedback (row 5).
  *
- * An integral drives i_d negative while the voltage exceeds a share of what the link allows and releases it
- * afterwards: i_fw += k (v_top - |v|), 0 >= i_fw >= -i_fw_max. The loop gain falls with speed, so the
- * configured k is for base speed: stable there means stable above. Runs at 1 kHz. Tests:
- * tests/unit/control/field_weakening_test.cpp. */
+ *   i_fw += k (v_top - |v|),   -i_fw_max <= i_fw <= 0
+ * The integral drives i_d negative while the voltage exceeds v_top, a share of what the DC link allows, and
+ * releases it afterwards. The loop gain falls with speed, so the configured k is for base speed: stable there
+ * means stable above. Runs at 1 kHz. Tests: tests/unit/control/field_weakening_test.cpp. */
 #ifndef CONTROL_FIELD_WEAKENING_H
 #define CONTROL_FIELD_WEAKENING_H
 

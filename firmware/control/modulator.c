@@ -3,7 +3,7 @@
 #include "firmware/math/compiler.h"
 #include "firmware/math/pair.h"
 
-/* Least and largest phase are +-size, or a itself when it lies beyond; c is reversed. */
+/* Smallest and largest leg are +-size, or a itself when it lies beyond; c has the opposite sign. */
 typedef struct {
     pm_abc_t leg;
     pm_q_t span; /* between the largest and the smallest */
@@ -15,8 +15,8 @@ void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t 
     self->lost = config->compensate ? pm_shl(pm_sat(lost, PM_SHARE_BITS - 2), PM_HEIGHT_BITS) : 0;
 }
 
-/* What the legs have in common is free, so they are written about that of phase A that makes b = -c: then the
- * middle of the largest and the smallest is half of what a exceeds -|b| ... |b| by. */
+/* The common part of the legs is free. Here it is that of phase A with b = -c: then the mean of the smallest
+ * and the largest leg is half of what a exceeds -|b| ... |b| by. */
 static inline centred_t centred(pm_ab_t v)
 {
     const pm_q_t a = v.alpha + pm_half(v.alpha);
@@ -35,14 +35,14 @@ static inline pm_abc_t lost_by(const modulator_config_t *config, pm_ab_t i)
     const pm_pair_t zone = pm_pair(&config->zone_alpha, &config->zone_beta);
     const int32_t a = pm_mulh(i.alpha, zone.first);
     const int32_t y = pm_mulh(i.beta, zone.second);
-    return (pm_abc_t){.a = a, .b = y - pm_half(a), .c = y + pm_half(a)}; /* c reversed */
+    return (pm_abc_t){.a = a, .b = y - pm_half(a), .c = y + pm_half(a)}; /* c has the opposite sign */
 }
 
 void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
                     pm_ab_t i_quarter, modulator_out_t *out)
 {
     const centred_t u = centred(v);
-    /* beyond the hexagon the span becomes the whole period: the vector is shortened on its own direction */
+    /* beyond the hexagon the span becomes the whole period: the vector is shortened along its own direction */
     const int32_t per_volt = pm_per_volt(pm_max(u.span, v_dc));
     out->limited = u.span > v_dc;
     if (pm_rarely(out->limited)) {

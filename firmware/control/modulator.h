@@ -2,11 +2,12 @@
  * (5.6.1.1).
  *
  * Min-max zero sequence: linear up to v_dc/sqrt(3) in every direction, to the hexagon in its corners. Beyond
- * the hexagon the vector is shortened on its own direction, so the angle is kept; the realised vector is
- * returned. Compensation adds to each leg the on-time that dead time and device drops take from it, by the
- * sign of the leg's current with a linear zone around zero: +-(T_dt/T_s + V_drop/v_dc), up to a quarter of
- * the period. The returned vector is the one without compensation, which is what the motor then sees. Legs
- * are shares of the period up to the last step, where one saturation keeps each within the timer's counts.
+ * the hexagon the vector is shortened along its own direction, so the angle is kept; the realised vector is
+ * returned. Compensation adds to each leg the on-time that dead time and device drops take from it, with the
+ * sign of the leg's current and a linear zone around zero:
+ *   +-(T_dt/T_s + V_drop/v_dc),   at most a quarter of the period
+ * The returned vector is the one without compensation, which is what the motor then receives. Legs are
+ * shares of the period up to the last step, where one saturation keeps each within the timer's counts.
  *
  * modulator_step() once per period; the output holds over the next one, so i is the current expected there.
  * One division. modulator_slow() at 1 kHz with the link voltage, and once before the first step. Range:
@@ -28,7 +29,7 @@ typedef struct {
 
 typedef struct {
     int32_t lost; /* share that dead time and drops take, Q33; held below a quarter */
-    bool limited; /* set when the vector was shortened; whoever reads it clears it */
+    bool limited; /* set when the vector was shortened; the reader clears it */
 } modulator_t;
 
 typedef struct {

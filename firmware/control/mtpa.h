@@ -1,7 +1,9 @@
 /* Maximum torque per ampere from parameters (METHODS.md 1.3.2.2, row 5).
  *
- * i_d = psi/(2 dL) - sqrt((psi/(2 dL))^2 + i_q^2), dL = L_q - L_d; i_d = 0 when dL is below a hundredth of
- * L_q (the configuration then has h = 0). Runs at 1 kHz. Tests: tests/unit/control/mtpa_test.cpp. */
+ *   h   = psi_m / (2 (L_q - L_d))
+ *   i_d = h - sqrt(h^2 + i_q^2)
+ * i_d = 0 when L_q - L_d is below a hundredth of L_q (the configuration then has h = 0). Runs at 1 kHz.
+ * Tests: tests/unit/control/mtpa_test.cpp. */
 #ifndef CONTROL_MTPA_H
 #define CONTROL_MTPA_H
 

@@ -1,8 +1,10 @@
 /* Speed control (row 5): reference ramp, PI with acceleration feed-forward, q-axis current out.
  *
- * kp = w_s J / (1.5 P^2 psi) and ki = kp w_s / 4 T in per-unit: two real poles at half the bandwidth when the
- * current loop is fast. The integral stops where the current limit holds it (back-calculation). Runs at 1
- * kHz. Tests: tests/unit/control/speed_control_test.cpp. */
+ *   kp = w_s J / (1.5 P^2 psi_m)
+ *   ki = kp w_s T / 4                        T: the step of 1 ms
+ * per-unit: two real poles at half the bandwidth w_s when the current loop is fast. While the current limit
+ * acts, the integral follows it (back-calculation). Runs at 1 kHz.
+ * Tests: tests/unit/control/speed_control_test.cpp. */
 #ifndef CONTROL_SPEED_CONTROL_H
 #define CONTROL_SPEED_CONTROL_H
 
@@ -22,7 +24,7 @@ typedef struct {
 
 void speed_control_reset(speed_control_t *self, pm_q_t omega, pm_q_t i_q);
 
-/* i_min <= result <= i_max; *limited when a bound holds it. */
+/* i_min <= result <= i_max; *limited: one of them acts. */
 pm_q_t speed_control_step(speed_control_t *self, const speed_control_config_t *config, pm_q_t target,
                           pm_q_t omega, pm_q_t i_min, pm_q_t i_max, bool *limited);
 

@@ -1,6 +1,6 @@
-/* What the parts of the configuration are made with; not for users of config.h.
+/* What the parts of the configuration have in common; not for users of config.h.
  *
- * With these few words the formulas of config*.c read as they stand in the literature. */
+ * With these helpers the formulas of config*.c read as they stand in the literature. */
 #ifndef DRIVE_CONFIG_MAKER_H
 #define DRIVE_CONFIG_MAKER_H
 

@@ -1,4 +1,4 @@
-/* What the parts of the drive ask of each other; not for users of drive.h. */
+/* Interface between the parts of the drive; not for users of drive.h. */
 #ifndef DRIVE_DRIVE_PARTS_H
 #define DRIVE_DRIVE_PARTS_H
 

@@ -1,4 +1,4 @@
-/* The drive's memory. Users of drive.h allocate it and read nothing but drive_status(). */
+/* The drive's memory. Users of drive.h allocate it and read it only through drive_status(). */
 #ifndef DRIVE_DRIVE_STATE_H
 #define DRIVE_DRIVE_STATE_H
 

@@ -2,10 +2,10 @@
  * rows 44 and 69; the loop: observers/loop.h).
  *
  *   eps = eps_injection + weight (eps_observer - eps_injection)
- * weight goes from 0 at omega_low to 1 at omega_high; the carrier is on below omega_high and off above 1.1
- * omega_high (hysteresis). The loop's bandwidth moves with the weight. This is the only place that knows both
- * sources. Quality: 1 while the sources agree with the measurement, 0 when the position is lost. Tests:
- * tests/unit/drive/position_test.cpp, tests/scenario. */
+ * weight rises from 0 at omega_low to 1 at omega_high; the carrier is on below omega_high and off above
+ * 1.1 omega_high (hysteresis). The loop's bandwidth moves with the weight. Only this module knows both
+ * sources. Quality: 1 while the sources agree with the measurement, 0 when the position is lost.
+ * Tests: tests/unit/drive/position_test.cpp, tests/scenario. */
 #ifndef DRIVE_POSITION_H
 #define DRIVE_POSITION_H
 

@@ -1,4 +1,4 @@
-/* Where a function's code goes: the control period is one straight piece, what is rare stands outside. */
+/* Placement of a function's code: the control period is one straight sequence, rare code lies outside it. */
 #ifndef PM_MATH_COMPILER_H
 #define PM_MATH_COMPILER_H
 
@@ -6,9 +6,9 @@
 
 #define PM_INLINE static inline __attribute__((always_inline))
 #define PM_RARE   __attribute__((noinline, cold))
-#define PM_APART  __attribute__((noinline)) /* called from what is rare, but not rare itself */
+#define PM_APART  __attribute__((noinline)) /* called from rare code, but not rare itself */
 
-/* A condition of the control period that is next to never true. */
+/* A condition of the control period that is almost never true. */
 static inline bool pm_rarely(bool x)
 {
     return __builtin_expect(x ? 1L : 0L, 0L) != 0L;

@@ -1,7 +1,7 @@
-/* What every position source takes and gives: fundamental-model observers and injection alike.
+/* Input and output of every position source: fundamental-model observers and injection alike.
  *
- * A source compares the measurement with the present position and says how far that position lags the rotor;
- * drive/position.c closes the loop. So a source has no angle of its own that could disagree.
+ * A source compares the measurement with the present position and reports by how much that position lags the
+ * rotor; drive/position.c closes the loop. So a source has no angle of its own that could disagree.
  * All values belong to the sample instant k. */
 #ifndef PM_MATH_ESTIMATE_H
 #define PM_MATH_ESTIMATE_H

@@ -1,13 +1,16 @@
 /* First- and second-order filters.
  *
- * pm_lp1: y += k (x - y), k = 1 - exp(-T_s w_c) in Q32 (w_c T_s < 0.69). Unity dc gain; the output stops
- *   within 2^-29 / k of the input. |x - y| < 8 is the caller's duty. 2 instructions inline beside load and
- *   store.
- * pm_biquad: y = (b0 + b1 z^-1 + b2 z^-2) / (1 + a1 z^-1 + a2 z^-2) x, transposed direct form II, for
- *   notches and second-order low-pass. Coefficients Q29, |b| < 4, |a1| < 2, |a2| < 1 (which stability asks
- *   for anyway). Input and output saturate at -4 and 4 - 2^-25. The states keep every bit and what is cut
- *   off the output is returned to the next one, so the dc gain is that of the coefficients, without a dead
- *   zone.
+ * pm_lp1, first-order low-pass:
+ *   y += k (x - y),   k = 1 - exp(-T_s w_c) in Q32 (w_c T_s < 0.69)
+ * Unity dc gain; the output stops within 2^-29 / k of the input. The caller ensures |x - y| < 8. Two
+ * instructions inline beside load and store.
+ *
+ * pm_biquad, for notches and second-order low-pass, transposed direct form II:
+ *   y = (b0 + b1 z^-1 + b2 z^-2) / (1 + a1 z^-1 + a2 z^-2) x
+ * Coefficients Q29, |b| < 4, |a1| < 2, |a2| < 1 (which stability requires anyway). Input and output saturate
+ * at -4 and 4 - 2^-25. The states keep every bit, and what rounding removes from an output is added to the
+ * next one, so the dc gain is that of the coefficients, without a dead zone.
+ *
  * Both give y of the instant of x. Cost: docs/decisions/001-signal-format.md.
  * Tests: tests/unit/math/filter_test.cpp. */
 #ifndef PM_MATH_FILTER_H

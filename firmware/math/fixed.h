@@ -45,8 +45,8 @@ typedef uint32_t pm_angle_t; /* 2^32 per turn, electrical unless said otherwise 
 #define PM_FRAC(x)        PM_SCALED(x, 4294967296.0)       /* -0.5 <= x < 0.5 */
 #define PM_TURN(x)        ((pm_angle_t)((x)*4294967296.0)) /* 0 <= x < 1 */
 
-/* Left shift of a signed value; bits that do not fit are lost. Mostly free, in the next instruction's
- * operand. */
+/* Left shift of a signed value; bits that do not fit are lost. Mostly free: the operand shift of the next
+ * instruction. */
 static inline int32_t pm_shl(int32_t x, unsigned n)
 {
     return (int32_t)((uint32_t)x << n);
@@ -71,7 +71,7 @@ static inline int32_t pm_clamp(int32_t x, int32_t lo, int32_t hi) /* lo <= hi */
 static inline int32_t pm_sat(int32_t x, unsigned n)
 {
 #if PM_HAS_DSP
-    if (__builtin_constant_p(n) != 0) { /* the compiler finds SSAT by itself only now and then */
+    if (__builtin_constant_p(n) != 0) { /* the compiler does not reliably find SSAT by itself */
         int32_t r;
         __asm__("ssat %0, %1, %2" : "=r"(r) : "i"(n + 1U), "r"(x));
         return r;
@@ -125,7 +125,7 @@ static inline int32_t pm_sub_sat(int32_t a, int32_t b)
 
 #else
 
-/* An overflow shows in the sign bits: what it should have been is the sign of a. */
+/* On overflow the sign of the sum differs from that of both operands: saturate on the side of a. */
 static inline int32_t pm_end(int32_t a)
 {
     return a < 0 ? INT32_MIN : INT32_MAX;
@@ -244,8 +244,8 @@ static inline int32_t pm_zone_sub(int32_t sum, int32_t x, int32_t height)
     return pm_mulh_sub(sum, pm_shl_sat(x, PM_ZONE_LIFT, PM_ZONE_BITS + PM_ZONE_LIFT), height);
 }
 
-/* A share of something, 0 ... 1 in Q20, with room for 2^11; what it is a share of as an integer below 2^15.
- * Beyond 0 and 1 the nearest of them is taken. */
+/* A share, 0 ... 1 in Q20 with headroom to 2^11; the whole is an integer below 2^15. Shares beyond 0 and 1
+ * are clamped. */
 #define PM_SHARE_BITS 20
 #define PM_SHARE_HALF ((int32_t)1 << (PM_SHARE_BITS - 1))
 
@@ -271,7 +271,7 @@ static inline pm_q_t pm_small_gain(int32_t small, int32_t g)
     return pm_shl(pm_sat(pm_mulh(small, g), 20), PM_Q_BITS - 20);
 }
 
-/* a - b as the shorter way round, in turns of 2^32. */
+/* a - b by the shorter way round, in turns of 2^32. */
 static inline int32_t pm_angle_diff(pm_angle_t a, pm_angle_t b)
 {
     return (int32_t)(a - b);

@@ -55,7 +55,7 @@ static inline pm_abc_t pm_clarke_inverse(pm_ab_t x)
     return r;
 }
 
-/* Half of pm_park(): where the caller's next product can carry the factor two. */
+/* Half of pm_park(), for callers whose next product can include the factor two. */
 static inline pm_dq_t pm_park_half(pm_ab_t x, pm_dir_t r)
 {
     pm_dq_t y;
@@ -80,7 +80,7 @@ static inline pm_ab_t pm_park_inverse(pm_dq_t x, pm_dir_t r)
     return y;
 }
 
-/* Half of the direction of the sum of two angles. */
+/* Direction of the sum of two angles, halved. */
 static inline pm_half_dir_t pm_dir_sum(pm_dir_t a, pm_dir_t b)
 {
     pm_half_dir_t r;

@@ -1,9 +1,10 @@
 /* Numbers with a binary exponent: per-unit configuration from SI parameters without floating point.
  *
- * value = m 2^e with |m| in [2^30, 2^31), or m = e = 0. Results are rounded to nearest: relative error of
- * an operation <= 1.25 2^-31, with |e| <= 2^20 (far beyond any quantity of a drive; not checked).
- * Not for the control path: sums and products cost about 60 instructions, quotients 350, roots up to 600.
- * Conversions report a result that does not fit instead of only clamping it.
+ *   value = m 2^e,   |m| in [2^30, 2^31), or m = e = 0
+ * Results are rounded to nearest: relative error of an operation <= 1.25 2^-31, with |e| <= 2^20 (far beyond
+ * any quantity of a drive; not checked). Not for the control path: sums and products cost about 60
+ * instructions, quotients 350, roots up to 600. Conversions report a result that does not fit instead of only
+ * clamping it.
  * Tests: tests/unit/math/num_test.cpp. */
 #ifndef PM_MATH_NUM_H
 #define PM_MATH_NUM_H

@@ -1,6 +1,6 @@
-/* Two neighbouring words by one instruction, LDRD on Cortex-M4: the compiler joins two loads only when it
- * happens to place them one after the other. `second` must directly follow `first` in the same struct; the
- * replay on the target (tests/target/drive) compares the bits. */
+/* Two neighbouring words loaded by one instruction, LDRD on Cortex-M4: the compiler merges two loads only if
+ * it happens to schedule them next to each other. `second` must directly follow `first` in the same struct;
+ * the replay on the target (tests/target/drive) compares the bits. */
 #ifndef PM_MATH_PAIR_H
 #define PM_MATH_PAIR_H
 

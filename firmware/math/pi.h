@@ -1,12 +1,13 @@
 /* Proportional-integral controller with a limit and back-calculation (METHODS.md 1.3.2.2, row 5).
  *
- *   u = kp e + integral + feed-forward;  integral += ki e + kb (u_limited - u)
+ *   u         = kp e + integral + ff                     ff: feed-forward
+ *   integral += ki e + kb (u_limited - u)
  * u and integral are wide (Q22). The caller limits u (alone or as a vector) between the two calls, so that
  * the limit may couple axes. kb = ki / kp makes the integral follow the limited output with the time
- * constant of the controller: it approaches u_limited - feed-forward, so |integral| <= |u_limited| +
- * |feed-forward|.
- * Then no sum can overflow for |e| < 8, 0 <= kp < 30, 0 <= kb <= 1, |feed-forward| < 8, |u_limited| < 8. A
- * seeded integral must lie within +-16. An error below 2^-23 / ki no longer moves the integral.
+ * constant of the controller: it approaches u_limited - ff, so |integral| <= |u_limited| + |ff|.
+ *
+ * Then no sum can overflow for |e| < 8, 0 <= kp < 30, 0 <= kb <= 1, |ff| < 8, |u_limited| < 8. An initial
+ * integral must lie within +-16. An error below 2^-23 / ki does not move the integral.
  * Call output, limit, update once per period; u belongs to the instant of e. Cost: 2 + 3 instructions
  * inline beside loads, stores and the limit. Tests: tests/unit/math/pi_test.cpp. */
 #ifndef PM_MATH_PI_H
@@ -21,7 +22,7 @@ typedef struct {
 } pm_pi_config_t;
 
 typedef struct {
-    pm_wide_t integral; /* Q22; any value within the output limits is a bumpless seed */
+    pm_wide_t integral; /* Q22; any value within the output limits is a bumpless initial value */
 } pm_pi_t;
 
 static inline pm_wide_t pm_pi_output(const pm_pi_t *self, const pm_pi_config_t *c, pm_q_t e, pm_q_t ff)
@@ -29,7 +30,7 @@ static inline pm_wide_t pm_pi_output(const pm_pi_t *self, const pm_pi_config_t *
     return pm_gain_add(self->integral, e, c->kp) + pm_widen(ff);
 }
 
-/* The second half of the update alone. */
+/* The back-calculation of the update alone. */
 static inline pm_wide_t pm_pi_following(const pm_pi_config_t *c, pm_wide_t integral, pm_wide_t excess)
 {
     return integral + pm_shl(pm_mulh(excess, c->kb), 1);

@@ -1,12 +1,16 @@
 /* Phase-locked loop on a position error (METHODS.md 2.4.2, row 19).
  *
- *   omega += ki eps; theta += omega + kp eps, eps = theta_true - theta in radians,
- *   kp = 2 zeta w_n T_s, ki = w_n^2 T_s (per-unit of the base speed).
- * Error under an acceleration a: a / w_n^2. The angle is predicted first, corrected after the measurement:
+ *   eps    = theta_true - theta                 rad
+ *   omega += ki eps
+ *   theta += omega + kp eps
+ *   kp     = 2 zeta w_n T_s
+ *   ki     = w_n^2 T_s                          per-unit of the base speed
+ * Error under an acceleration a: a / w_n^2. The angle is predicted first and corrected after the measurement:
  * pm_pll_predict() moves theta from k-1 to k; pm_pll_correct() uses eps(k).
+ *
  * Ranges: |eps| <= pi, kp < 0.5, |omega| k_theta below half a turn per step; the speed saturates at -2 and
- * 2 - 2^-28. Angle steps are rounded to 2^-30 turn, the speed to 2^-28; an error below 2^-29
- * / ki does not move the speed.
+ * 2 - 2^-28. Angle steps are rounded to 2^-30 turn, the speed to 2^-28; an error below 2^-29 / ki does not
+ * move the speed.
  * Cost: docs/decisions/001-signal-format.md. Tests: tests/unit/math/pll_test.cpp. */
 #ifndef PM_MATH_PLL_H
 #define PM_MATH_PLL_H

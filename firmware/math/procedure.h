@@ -5,9 +5,9 @@
 typedef enum {
     PM_RUNNING,
     PM_DONE,
-    PM_FAILED_TIMEOUT,  /* a current did not behave in time */
-    PM_FAILED_SALIENCY, /* no usable difference of inductance */
-    PM_FAILED_POLARITY, /* no usable saturation */
+    PM_FAILED_TIMEOUT,  /* a current did not rise or fall in time */
+    PM_FAILED_SALIENCY, /* the inductances differ too little */
+    PM_FAILED_POLARITY, /* the machine saturates too little */
 } pm_procedure_t;
 
 #endif

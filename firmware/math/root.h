@@ -1,15 +1,15 @@
 /* Square root, length and quotient of signals. No loops, no tables.
  *
- * pm_sqrt(x): x in Q28, result Q28, error <= 2^-25; x <= 0 gives 0.
- * pm_hypot(x, y): length of (x, y) in the format of its arguments; saturates. Error <= 1.1e-8 relative +
- *   0.5 LSB.
- * pm_div(num, x): num / x in Q28; saturates. Error <= 1e-8 relative + 0.5 LSB. x <= 0 is taken as the
- *   smallest positive x, so the result is the end of the range on num's side; 0 / x = 0. One 32-bit
- *   division.
- * pm_ratio(num, den): num / den in Q31 for 0 <= num <= den, den > 0; error -2^-16 ... 2^-15. One 32-bit
- *   division.
- * pm_per_volt(v): 1 / v in Q24, so that pm_mulh(x, .) gives x / v as a share (Q20); v >= 1/16, of which 16
- *   bits count; relative error <= (v + 1 / v) 2^-16. One 32-bit division.
+ *   pm_sqrt(x)          x in Q28, result Q28, error <= 2^-25; x <= 0 gives 0
+ *   pm_hypot(x, y)      length of (x, y) in the format of its arguments; saturates; error <= 1.1e-8 relative
+ *                       + 0.5 LSB
+ *   pm_div(num, x)      num / x in Q28; saturates; error <= 1e-8 relative + 0.5 LSB; x <= 0 counts as the
+ *                       smallest positive x, so the result is the end of the range on num's side; 0 / x = 0;
+ *                       one 32-bit division
+ *   pm_ratio(num, den)  num / den in Q31 for 0 <= num <= den, den > 0; error -2^-16 ... 2^-15; one 32-bit
+ *                       division
+ *   pm_per_volt(v)      1 / v in Q24, so that pm_mulh(x, .) gives x / v as a share (Q20); v >= 1/16, of which
+ *                       16 bits count; relative error <= (v + 1 / v) 2^-16; one 32-bit division
  * Cost: docs/decisions/001-signal-format.md. Tests: tests/unit/math/root_test.cpp. */
 #ifndef PM_MATH_ROOT_H
 #define PM_MATH_ROOT_H
@@ -29,8 +29,8 @@ pm_unit_t pm_ratio(pm_q_t num, pm_q_t den);
 }
 #endif
 
-/* Twice the square root of an integer, not below it and at most 6.1 % above: one step of Newton's from a
- * power of two, for those who need its shape alone. Six instructions. */
+/* Twice the square root of an integer, 0 to 6.1 % too large: one Newton step from a power of two, where a
+ * rough root is enough. Six instructions. */
 static inline int32_t pm_root_twice(int32_t x) /* x >= 0 */
 {
     const unsigned half = (32U - (unsigned)__builtin_clz((uint32_t)x | 1U)) >> 1;

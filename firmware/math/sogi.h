@@ -1,14 +1,18 @@
 /* Second-order generalised integrator: a signal and its quadrature at an adjustable frequency w.
  *
- *   y' = w (k (x - y) - q), q' = w y: at w the output y equals x and q lags it by 90 degrees.
- * Discrete form: (y, q) turned by w T_s, half of the correction K (x - y), K = k w T_s, added before and
- * half after the turn. So gain 1 and phase 0 are exactly at w T_s, at every frequency below half the
- * sampling rate, and a dc part of x does not reach y (it reaches q with gain k). The transfer function is
- *   y / x = c (z - 1) / (z^2 - (2 cos wT - c) z + 1 - c), c = K (1 + cos wT) / 2,
- * its time constant 2 T_s / c as long as K < 2 w T_s. y and q belong to the instant of the x of the same
+ *   y' = w (k (x - y) - q)
+ *   q' = w y
+ * At w the output y equals x and q lags it by 90 degrees. Discrete form: (y, q) is turned by w T_s; half of
+ * the correction K (x - y), K = k w T_s, is added before and half after the turn. So gain 1 and phase 0 are
+ * exactly at w T_s, at every frequency below half the sampling rate, and a dc part of x does not reach y (it
+ * reaches q with gain k). Transfer function:
+ *   y / x = c (z - 1) / (z^2 - (2 cos wT - c) z + 1 - c)
+ *   c     = K (1 + cos wT) / 2
+ * Its time constant is 2 T_s / c as long as K < 2 w T_s. y and q belong to the instant of the x of the same
  * step; that x acts from the next step on.
- * Errors at w: amplitude <= 2e-6 / c, phase <= 2e-6 / c rad, both from the direction of w T_s. |x - y| < 8
- * is the caller's duty; 0 < K < 0.5 keeps it stable. A zeroed state is the reset.
+ *
+ * Errors at w: amplitude <= 2e-6 / c, phase <= 2e-6 / c rad, both from the direction of w T_s. The caller
+ * ensures |x - y| < 8; 0 < K < 0.5 keeps it stable. A zeroed state is the reset.
  * Cost: docs/decisions/001-signal-format.md. Tests: tests/unit/math/sogi_test.cpp. */
 #ifndef PM_MATH_SOGI_H
 #define PM_MATH_SOGI_H

@@ -1,11 +1,15 @@
 /* Sine, cosine and arctangent.
  *
- * pm_dir(angle): cosine and sine together. The nearest of 128 table directions (c, s) is turned by the
- *   rest r of the angle: c' = c - r (s + r c / 2), s' = s + r (c - r s / 2), with r scaled so that the
- *   missing cubic term is spread evenly. Error <= 7e-7, length within 1e-7 of 1, both within +-(2^31 - 1).
- *   13 instructions inline.
+ * pm_dir(angle): cosine and sine together. The nearest of 128 table directions (c, s) is turned by the rest r
+ * of the angle:
+ *   c' = c - r (s + r c / 2)
+ *   s' = s + r (c - r s / 2)
+ * with r scaled so that the missing cubic term is spread evenly. Error <= 7e-7, length within 1e-7 of 1, both
+ * within +-(2^31 - 1). 13 instructions inline.
+ *
  * pm_atan2(y, x): angle of (x, y), any magnitude, error <= 0.0018 degree; (0, 0) gives 0. One 32-bit
- *   division and a function call: leave it out of the high-speed control period.
+ * division and a function call: too expensive for the control period at high PWM frequencies.
+ *
  * Cost: docs/decisions/001-signal-format.md. Tests: tests/unit/math/trig_test.cpp. */
 #ifndef PM_MATH_TRIG_H
 #define PM_MATH_TRIG_H

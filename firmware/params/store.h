@@ -1,17 +1,17 @@
 /* Values in two pages of flash: pairs of identifier and value, so that another firmware version takes over
- * what it knows and leaves out what it does not.
+ * the identifiers that it knows and ignores the others.
  *
  * A page is complete or void: a CRC over all of it is written last. Writing goes to the page that is not the
- * newest, so that power lost at any moment leaves the other one.
+ * newest, so that a loss of power at any moment leaves the other one.
  *
  *   page = magic, sequence, schema, count, then count pairs (id, value), then crc, ~crc
  *
- * 32-bit little-endian words; an identifier is index * 256 + sub-index of the dictionary, where none is ever
- * used twice. The schema tells whether the page is of another version: then what is known is taken all the
- * same, and the caller counts what is not.
+ * 32-bit little-endian words; an identifier is index * 256 + sub-index of the dictionary and is never reused.
+ * The schema shows whether the page is of another version: then known identifiers are still read, and the
+ * caller counts the others.
  *
- * No access to flash here: the caller moves the words (hal.h), two at a time, in order. Tests:
- * tests/unit/params. */
+ * No access to flash here: the caller moves the words (hal.h), two at a time, in order.
+ * Tests: tests/unit/params. */
 #ifndef PARAMS_STORE_H
 #define PARAMS_STORE_H
 

@@ -1,4 +1,4 @@
-/* What the parts of the identification ask of each other. */
+/* Interface between the parts of the identification. */
 #ifndef DRIVE_COMMISSIONING_COMMISSIONING_PARTS_H
 #define DRIVE_COMMISSIONING_COMMISSIONING_PARTS_H
 
@@ -13,15 +13,19 @@ void commissioning_set_gains(drive_t *drive);     /* by R and L_d */
 void commissioning_clear_sums(commissioning_t *self);
 pm_q_t commissioning_mean(const commissioning_t *self, uint32_t n); /* of sum n over what was taken */
 
-/* square.c: one period of the square wave. What is summed up, s the sign of the voltage: mean of the currents
- * at both ends of the period, s i, and their change, s di; for the other axis, x = i_q di_q, w x per T_s with
- * w = v_d - R i_d - lost, di_d x, x x. */
+/* square.c: one period of the square wave. Sums, s the sign of the voltage, w = v_d - R i_d - lost:
+ *   SUM_CURRENT   s i            i: mean of the currents at both ends of the period
+ *   SUM_CHANGE    s di           di: their difference
+ * and for the other axis, x = i_q di_q:
+ *   SUM_D_FLUX    w x            per T_s
+ *   SUM_D_CHANGE  di_d x
+ *   SUM_SQUARE    x x */
 enum { SQUARE_WAITS, SQUARE_SEEKS, SQUARE_MEASURES, SQUARE_DONE, SQUARE_FAILED };
 #define SQUARE_LONGEST 256U /* periods of half a wave */
 enum { SUM_CURRENT, SUM_CHANGE, SUM_D_FLUX, SUM_D_CHANGE, SUM_SQUARE };
 void square_step(drive_t *drive, pm_ab_t v_past);
 
-/* One millisecond of a phase each; PM_RUNNING, PM_DONE, or else the phase has failed by *reason. */
+/* Result of one millisecond of a phase. */
 typedef struct {
     bool done;
     commissioning_reason_t failed;

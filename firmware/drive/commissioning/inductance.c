@@ -1,11 +1,14 @@
-/* Inductances: flux over current of a square wave of voltage along one axis, the rotor standing on phase A.
+/* Inductances: flux over current of a square wave of voltage along one axis, with the rotor on phase A.
  *
- *   L = sum s T_s (v - R i - lost) / sum s (i_k - i_k-1), s the sign of v: from -i to i and back, without
- * mean The torque of a wave on q has no mean either, and a half wave is too short to turn the rotor. Half
- * waves get longer until 0.4 v_dc drives the current wanted; the shortest makes R and lost voltage matter
- * least. A small wave gives L at zero current, one at the test current, with the i_d of most torque per
- * ampere, the apparent L_q there and by psi_d = L_d i_d + k i_q^2 / 2:    k = sum (dpsi_d - L_d di_d) x / sum
- * x^2, x = i_q di_q the cross inductance k i_q. */
+ * From -i to i and back, without mean, s the sign of v:
+ *   L = sum s T_s (v - R i - lost) / sum s (i_k - i_k-1)
+ * The torque of a wave on q has no mean either, and a half wave is too short to turn the rotor. Half waves
+ * get longer until 0.4 v_dc drives the wanted current: with the shortest, R and lost voltage matter least.
+ *
+ * A small wave gives L at zero current. One at the test current, with the i_d of most torque per ampere,
+ * gives the apparent L_q there and, by psi_d = L_d i_d + k i_q^2 / 2, the cross inductance k i_q:
+ *   x = i_q di_q
+ *   k = sum (dpsi_d - L_d di_d) x / sum x^2 */
 #include "firmware/drive/commissioning/commissioning_parts.h"
 #include "firmware/math/num.h"
 #include "firmware/math/root.h"

@@ -1,8 +1,8 @@
-/* Resistance and the voltage that a leg loses (METHODS.md 5.6.1.1): current along phase A with the rotor on
- * it.
+/* Resistance and the voltage lost in a leg (METHODS.md 5.6.1.1): current along phase A with the rotor on it.
  *
- *   v = R i + 4/3 v_lost    the dead time takes the same from each leg beyond the small currents where its
- * output capacitance matters; so four currents of 100, 80, 60, 40 % give both by regression. */
+ *   v = R i + 4/3 v_lost
+ * Beyond the small currents where output capacitance matters, dead time takes the same voltage from each
+ * leg; so four currents of 100, 80, 60, 40 % give both by regression. */
 #include "firmware/drive/commissioning/commissioning_parts.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"

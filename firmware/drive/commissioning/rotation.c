@@ -1,10 +1,13 @@
-/* Magnet flux, inertia and friction: a current vector turns and takes the rotor along (METHODS.md 1.3.1.3).
+/* Magnet flux, inertia and friction: a current vector turns and pulls the rotor along (METHODS.md 1.3.1.3).
  *
- * In the vector's frame psi = (v - R i) / (j omega), and psi - L_q i is the active flux psi_m + (L_d - L_q)
- * i_d on the rotor's axis, wherever the load has turned it. Two currents give psi_m without L_d. Torque is
- * 1.5 P i (v_d - R i) / omega; speeding up and down at the same rate and speeds, its
- * half difference is J times the acceleration, and neither R nor friction are in it. Friction at two speeds
- * gives the viscous part. */
+ * In the vector's frame:
+ *   psi         = (v - R i) / (j omega)
+ *   psi - L_q i = psi_m + (L_d - L_q) i_d              active flux, on the rotor's axis
+ *   torque      = 1.5 P i (v_d - R i) / omega
+ * The active flux is on the rotor's axis wherever the load has turned it. Two currents give psi_m without
+ * L_d. J times the acceleration is half the difference of the torques while speeding up and slowing down at
+ * the same rate over the same speeds; R and friction cancel. Friction at two speeds gives the viscous
+ * part. */
 #include "firmware/drive/commissioning/commissioning_parts.h"
 #include "firmware/math/num.h"
 #include "firmware/math/root.h"
