@@ -4,7 +4,7 @@
 #include "firmware/math/trig.h"
 
 #define PULSES 6
-/* Periods of quiet before the next pulse: the current has ended and the converter shows it. */
+/* Periods with zero current before the next pulse: the current has ended and the converter shows it. */
 #define QUIET 3
 
 static const pm_angle_t axis[3] = {0, 1431655765U, 2863311531U}; /* 0, 120, 240 degrees */

@@ -26,7 +26,7 @@ static void set_reference(active_flux_t *self, pm_q_t psi)
     self->inverse = pm_div(PM_ONE / 4, psi);        /* Q28 of a quarter is Q26 */
 }
 
-/* What depends on current, speed and temperature, which change little within a millisecond. */
+/* Terms that depend on current, speed and temperature, which change little within a millisecond. */
 static void set_operating_point(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in)
 {
     const pm_q_t L_q = observer_L_q(&config->model, in->i_dq);
@@ -85,7 +85,7 @@ void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, c
                       const obs_out_t *out, pm_q_t weight)
 {
     if (weight == 0) {
-        /* tied to the position, the flux says nothing of the amplitude */
+        /* while tied to the position, the flux gives no amplitude */
         active_flux_tie(self, config);
         set_reference(self, observer_active_flux(&config->model, in->i_dq));
         const pm_q_t lack = pm_mul(out->vector.q, in->i_dq.q);

@@ -150,7 +150,7 @@ void ekf_full_slow(ekf_full_t *self, const ekf_full_config_t *config, const obs_
                    const obs_out_t *out, pm_q_t weight)
 {
     (void)out;
-    if (weight == 0) { /* a start that waits: at standstill nothing is seen, and the angle would wander */
+    if (weight == 0) { /* before a start: at standstill nothing is observable, and the angle would drift */
         move_angle(self, -(self->delta / 2));
         self->omega = in->omega;
         set_covariance(self, config);

@@ -62,7 +62,7 @@ static inline int32_t small_flux(pm_q_t rho)
     return pm_shl(pm_sat(rho, 25), 6);
 }
 
-/* z, within +-4: its noise at low speed is no reason to cut it. */
+/* z, clamped to +-4, which leaves room for its noise at low speed. */
 static inline pm_q_t angle_of(const ekf_reduced_t *self, pm_dq_t rho)
 {
     const int32_t along_d = pm_mulh(small_flux(rho.d), self->per_d);
@@ -112,7 +112,7 @@ void ekf_reduced_slow(ekf_reduced_t *self, const ekf_reduced_config_t *config, c
                       const obs_out_t *out, pm_q_t weight)
 {
     (void)out;
-    if (weight == 0) { /* a start that waits: at standstill nothing is seen, and the angle would wander */
+    if (weight == 0) { /* before a start: at standstill nothing is observable, and the angle would drift */
         self->delta /= 2;
         self->omega = in->omega;
         set_covariance(self);

@@ -15,7 +15,8 @@ static pm_q_t change_of(const emf_config_t *config, pm_q_t omega, pm_q_t psi)
     return pm_mulh(pm_small(pm_frac(omega, config->model.t_s)), psi);
 }
 
-/* Lag of filter and half a period, and the other half: (lag + 1) tan x / (1 - lag tan^2 x), Q30. */
+/* Tangent of the lag of filter and half a period, plus the other half: (lag + 1) tan x / (1 - lag tan^2 x),
+ * Q30. */
 static int32_t turn_of(pm_q_t x, pm_gain_t lag)
 {
     const pm_q_t tangent = x + pm_mul(x, pm_mul(x, x)) / 3;
@@ -31,7 +32,8 @@ static void set_point(emf_t *self, const emf_config_t *config, const emf_machine
     self->drop = pm_small(pm_frac(self->R, config->model.t_s) / 2);
     self->inductance = machine->L;
     const pm_q_t x_cross = pm_frac(self->omega_cross, config->model.t_s) / 2;
-    self->cross = pm_shl(pm_sat(pm_mul_sat(x_cross, machine->saliency), 24), 4); /* 1/16 is far beyond */
+    self->cross =
+        pm_shl(pm_sat(pm_mul_sat(x_cross, machine->saliency), 24), 4); /* real values are far below 1/16 */
     self->turn = turn_of(x, machine->lag);
     const pm_q_t speed = pm_max(pm_abs(omega), least);
     const int32_t inverse = pm_div(PM_ONE / 2048, change_of(config, speed, self->psi_ref)); /* Q17 */
@@ -47,7 +49,7 @@ void emf_reset(emf_t *self, const emf_config_t *config, const emf_machine_t *mac
     self->omega_cross = in->omega;
     set_point(self, config, machine, in->omega, config->omega_min);
     self->i = in->i;
-    /* the voltage's share of the last period, half a period back */
+    /* the voltage's part in the last period, half a period back */
     const pm_q_t e = change_of(config, in->omega, self->psi_ref);
     const pm_q_t x = pm_frac(in->omega, config->model.t_s) / 2;
     const pm_dq_t at_k = {.d = -pm_shl(pm_mulh(in->i_dq.q, self->cross), 1),
@@ -79,7 +81,7 @@ obs_out_t emf_last(const emf_t *self)
     return out;
 }
 
-/* What the EMF is more than the extended one, times the current along which it lies, if R is wrong. */
+/* Difference from the extended EMF, times the current along which it lies: the error of R. */
 static pm_q_t lacking(const emf_t *self, const emf_config_t *config, pm_q_t saliency, pm_q_t E_q,
                       const obs_in_t *in)
 {
@@ -96,7 +98,7 @@ void emf_slow(emf_t *self, const emf_config_t *config, const emf_machine_t *mach
     const obs_out_t out = emf_last(self);
     if (weight == 0) {
         self->psi_ref = observer_active_flux(&config->model, in->i_dq);
-        /* not by the loop's own speed: where it dips below the limit, E_q is more than its w psi_a */
+        /* not with the loop's own speed: where it dips below the limit, E_q exceeds its w psi_a */
         self->R = observer_resistance(&config->resistance, &config->model, self->R, self->omega_cross,
                                       lacking(self, config, machine->saliency, out.vector.q, in));
     } else {

@@ -2,7 +2,7 @@
 
 #include "firmware/math/root.h"
 
-/* w (L_q - L_d) J i taken off; `sum` of the currents at both ends. */
+/* Without w (L_q - L_d) J i; `sum`: current at both ends, added. */
 static inline pm_ab_t without_saliency(const emf_t *emf, pm_ab_t change, pm_ab_t sum)
 {
     pm_ab_t r;
@@ -19,7 +19,7 @@ void extended_emf_ab_reset(extended_emf_ab_t *self, const extended_emf_ab_config
     emf_reset(emf, config, &machine, in);
     const pm_ab_t twice = {.alpha = pm_shl(in->i.alpha, 1), .beta = pm_shl(in->i.beta, 1)};
     emf->change = without_saliency(emf, emf->change, twice);
-    /* what emf_turned() turns into the EMF of the reset: e (1 - j t) / (1 + t^2) */
+    /* the value that emf_turned() turns into the EMF of the reset: e (1 - j t) / (1 + t^2) */
     const pm_q_t t = emf->turn / 4;
     const pm_q_t shrink = pm_div(PM_ONE, PM_ONE + pm_mul(t, t));
     const pm_q_t q = pm_mul(emf->e.q, shrink);

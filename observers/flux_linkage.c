@@ -13,7 +13,7 @@ static inline pm_dq_t restored(const flux_linkage_t *self, pm_dq_t x)
     return y;
 }
 
-/* Another low-pass for the same flux: psi' (1 - leak/2 - j turn) stays. */
+/* Changes the low-pass for the same flux: psi' (1 - leak/2 - j turn) is invariant. */
 static void change(flux_linkage_t *self, int32_t leak, int32_t turn)
 {
     const pm_ab_t psi = self->flux.psi;

@@ -18,7 +18,7 @@ void loop_slow(loop_t *self, const loop_config_t *config, pm_q_t weight)
     self->id = (uint8_t)config->id;
 }
 
-/* The PLL follows theta, from which it is inner away. */
+/* The PLL follows theta; inner is its distance from theta. */
 static void arctangent(loop_t *self, pm_pll_t *pll, const pm_pll_config_t *gains, pm_q_t eps)
 {
     const pm_angle_t turn = (pm_angle_t)pm_rad_to_angle(eps);

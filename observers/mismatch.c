@@ -33,11 +33,11 @@ void mismatch_slow(mismatch_t *self, mismatch_window_t *window, const mismatch_c
 
 /* Means of speed and current: 256 ms. */
 #define K_MEAN PM_FRAC(1.0 / 256)
-/* From where constant speed takes it: 0.1 rad. */
+/* Distance from the angle of constant speed: 0.1 rad. */
 #define AWAY   ((int32_t)PM_TURN(0.0159))
-/* Of the speed, in k_d. */
+/* Least speed for k_d. */
 #define LEAST  PM_Q(1.0 / 64)
-/* Steps of rest. */
+/* Steps of the pause. */
 #define REST   60000U
 
 pm_q_t mismatch_step(const mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
@@ -61,7 +61,7 @@ static void begin_window(mismatch_window_t *self, pm_angle_t x)
     self->current = (pm_ab_t){0, 0};
 }
 
-/* Q30: what there is of the current is small. */
+/* Q30: the current is small. */
 static pm_ab_t lifted(pm_ab_t x)
 {
     return (pm_ab_t){.alpha = pm_shl_sat(x.alpha, 3, 31), .beta = pm_shl_sat(x.beta, 3, 31)};
@@ -72,7 +72,7 @@ static pm_q_t real_product(pm_ab_t a, pm_ab_t b)
     return pm_mulh2(a.alpha, b.alpha, a.beta, b.beta);
 }
 
-/* How the rotor swings, rad per base current: -swing times the flux that makes torque of it. */
+/* Oscillation of the rotor, rad per base current: -swing times the flux that makes the torque. */
 static pm_q_t rotor(const mismatch_config_t *config, const observer_model_t *model, pm_dq_t i)
 {
     const pm_q_t flux = config->id == (uint8_t)MISMATCH_Q_AXIS ? observer_active_flux(model, i)
@@ -98,7 +98,7 @@ static void learn(mismatch_t *self, mismatch_window_t *window, const mismatch_co
     window->windows++;
 }
 
-/* A step of the window; x: angle beyond that of constant speed. */
+/* A step of the window; x: angle relative to constant speed. */
 static void collect(mismatch_window_t *self, const mismatch_config_t *config, pm_angle_t x, pm_q_t i)
 {
     const uint32_t step = UINT32_MAX / config->samples;
@@ -117,13 +117,13 @@ static void collect(mismatch_window_t *self, const mismatch_config_t *config, pm
     self->count++;
 }
 
-/* Mean of the step's control periods. */
+/* Mean over the step's control periods. */
 static int32_t mean(int32_t sum, const mismatch_config_t *config)
 {
     return pm_shl(sum / (int32_t)config->periods, 4);
 }
 
-/* Two turns of the rotor in a period of the injection: enough to see k_d. */
+/* At least two turns of the rotor in a period of the injection, so that k_d is observable. */
 static bool turns(const mismatch_config_t *config, const mismatch_in_t *in)
 {
     const int32_t two = INT32_MAX / (config->samples * config->periods);

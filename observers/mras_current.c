@@ -28,7 +28,7 @@ void mras_current_tie(mras_current_t *self, const mras_current_config_t *config)
 {
     (void)config;
     self->adapt = 0;
-    self->inverse = 0; /* an imposed position says nothing of an error */
+    self->inverse = 0; /* an imposed position gives no error signal */
     self->inverse_model = 0;
 }
 
@@ -42,7 +42,7 @@ void mras_current_reset(mras_current_t *self, const mras_current_config_t *confi
 
 static inline void describe(const mras_current_t *self, pm_dq_t change, obs_out_t *out)
 {
-    /* Q24, held at +-2 and +-4 */
+    /* Q24, clamped to +-2 and +-4 */
     const int32_t e_d = pm_sat(pm_mulh(change.d, self->emf_per_change), 25);
     const int32_t e_q = pm_sat(pm_mulh(change.q, self->emf_per_change), 26);
     out->vector = (pm_dq_t){.d = pm_shl(-e_d, 4), .q = pm_sat(self->emf - pm_shl(e_q, 4), 30)};

@@ -25,13 +25,13 @@ static void set_operating_point(mras_simple_t *self, const mras_simple_config_t 
 void mras_simple_tie(mras_simple_t *self, const mras_simple_config_t *config)
 {
     (void)config;
-    self->inverse = 0; /* an imposed position says nothing of an error */
+    self->inverse = 0; /* an imposed position gives no error signal */
     self->offset = 0;
     self->resistive = 0;
     self->reactive = 0;
 }
 
-/* The period before is taken for one of the steady state. */
+/* The period before is assumed to be of the steady state. */
 void mras_simple_reset(mras_simple_t *self, const mras_simple_config_t *config, const obs_in_t *in)
 {
     *self = (mras_simple_t){.i = in->i, .omega = in->omega};

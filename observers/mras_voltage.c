@@ -14,7 +14,7 @@ static void set_operating_point(mras_voltage_t *self, const mras_voltage_config_
     self->cross = mras_cross(config, self->omega_f, in->i_dq) / 32;
     self->half = mras_half_turn(config, in->omega);
     self->psi = psi_a / 32;
-    self->adapt = pm_min(pm_div(config->k / 16, psi_a), PM_ONE); /* D_q is held at 2: no step above 2 */
+    self->adapt = pm_min(pm_div(config->k / 16, psi_a), PM_ONE); /* D_q is clamped to 2: no step above 2 */
     self->inverse = mras_inverse(config, pm_mul(self->omega, psi_a));
     self->omega_loop = in->omega;
     self->inverse_omega = mras_inverse(config, in->omega);
@@ -24,7 +24,7 @@ void mras_voltage_tie(mras_voltage_t *self, const mras_voltage_config_t *config)
 {
     (void)config;
     self->adapt = 0;
-    self->inverse = 0; /* an imposed position says nothing of an error */
+    self->inverse = 0; /* an imposed position gives no error signal */
     self->inverse_omega = 0;
 }
 

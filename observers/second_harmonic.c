@@ -3,7 +3,7 @@
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
 
-/* What is known fades with 20 ms while nothing is learnt. */
+/* Time constant, in ms, with which the estimate fades while it does not learn. */
 #define FADE 20
 
 void second_harmonic_reset(second_harmonic_t *self)
@@ -53,8 +53,10 @@ pm_q_t second_harmonic_step(second_harmonic_t *self, const second_harmonic_confi
     return resonator(self, eps);
 }
 
-/* The angle of S, that of (w^2 - k_i) + j (k_p w - k_1 / w) at w = 2 omega. In the notch it goes on with the
- * rotor, in the resonator back; either way round when the rotor turns backwards. */
+/* Learning gains from the angle of S at w = 2 omega, which is that of
+ *   (w^2 - k_i) + j (k_p w - k_1 / w)
+ * In the notch it is added in the direction of rotation, in the resonator against it; both reverse with the
+ * speed. */
 static void learn(second_harmonic_t *self, const second_harmonic_config_t *config, pm_q_t omega)
 {
     const pm_q_t w = pm_shl(pm_min(pm_abs(omega), PM_Q(1.4)), 1);

@@ -6,9 +6,9 @@
 /* Within the boundary layer s is the voltage times this many periods. */
 #define LAYER ((int32_t)(1 / SLIDING_MODE_STEP))
 
-/* Periods by which z follows the mean EMF of the period that ends at the sample. Half a period is that mean's
- * own; the boundary layer adds the delay of its pole. The switching functions react to the sign alone and
- * are ahead of their input (tests/unit/observers/sliding_mode_test.cpp). */
+/* Delay of z, in periods, behind the mean EMF of the period that ends at the sample. Half a period is due to
+ * that mean; the boundary layer adds the delay of its pole. The switching functions react to the sign alone
+ * and are ahead of their input (tests/unit/observers/sliding_mode_test.cpp). */
 static pm_q_t delay(sliding_mode_function_t function)
 {
     switch (function) {
@@ -23,8 +23,11 @@ static pm_q_t delay(sliding_mode_function_t function)
     }
 }
 
-/* z through the low-pass is e / F; F = (1 + j x b + x^2 b / 2) (1 + j x d - x^2 d^2 / 2), x = omega T_s,
- * b = 1 / k_lp - 1, d the delay. */
+/* Factor F that compensates the lag, z through the low-pass being e / F:
+ *   F = (1 + j x b + x^2 b / 2) (1 + j x d - x^2 d^2 / 2)
+ *   x = omega T_s
+ *   b = 1 / k_lp - 1
+ * d is the delay. */
 static void set_lead(sliding_mode_t *self, const sliding_mode_config_t *config, pm_q_t omega)
 {
     const pm_q_t x = pm_frac(omega, config->model.t_s);
@@ -42,7 +45,7 @@ static void set_gain(sliding_mode_t *self, const sliding_mode_config_t *config, 
     self->steepness = pm_div(config->slope, self->K + pm_half(self->K));
 }
 
-/* Lambda is half as large again as omega^2 psi_a, and at least what omega_min gives. */
+/* Lambda = 1.5 omega^2 psi_a, and at least that of omega_min. */
 static void set_twist(sliding_mode_t *self, const sliding_mode_config_t *config, pm_q_t speed, pm_q_t psi)
 {
     const pm_q_t limit = pm_max(speed, config->omega_min);
@@ -52,7 +55,7 @@ static void set_twist(sliding_mode_t *self, const sliding_mode_config_t *config,
     self->twist = pm_frac(pm_mul(Lambda, PM_Q(1.1)), config->model.t_s);
 }
 
-/* What depends on current and speed, which change little within a millisecond. */
+/* Terms that depend on current and speed, which change little within a millisecond. */
 static void set_operating_point(sliding_mode_t *self, const sliding_mode_config_t *config, pm_q_t omega,
                                 pm_dq_t i_dq, pm_q_t omega_min)
 {
@@ -75,7 +78,7 @@ static void set_operating_point(sliding_mode_t *self, const sliding_mode_config_
     set_twist(self, config, speed, psi);
 }
 
-/* As if the machine had turned at this speed and current for long. */
+/* Steady state at this speed and current. */
 void sliding_mode_reset(sliding_mode_t *self, const sliding_mode_config_t *config, const obs_in_t *in)
 {
     *self = (sliding_mode_t){0};
@@ -143,7 +146,7 @@ static inline pm_ab_t switched(sliding_mode_t *self, const sliding_mode_config_t
     return z;
 }
 
-/* L_q (i^ - i) after a period with the mean current of its ends; beyond the range of y the observer is lost
+/* L_q (i^ - i) after a period with the mean current of its ends. Beyond the range of y the position is lost
  * anyway. */
 static inline pm_q_t advance(const sliding_mode_t *self, pm_q_t *y, pm_q_t v, pm_q_t i, pm_frac_t t_s)
 {

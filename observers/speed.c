@@ -18,7 +18,7 @@ static void reset(speed_t *self, const speed_config_t *config, const speed_in_t 
     }
 }
 
-/* theta(k-N) stands where theta(k) goes. */
+/* theta(k-N) is in the place that theta(k) takes. */
 static pm_q_t of_difference(speed_t *self, const speed_config_t *config, const speed_in_t *in)
 {
     const pm_angle_t past = self->past[self->next];

@@ -17,9 +17,10 @@ static void make_base(maker_t *m)
     m->inductance = pm_num_div(b->psi, b->i);
 }
 
-/* A rotor swings about the current vector like a pendulum, w^2 = 3/2 p^2 psi i / J. The vector yields by k
- * times what the rotor's speed has above a low-pass, so that J need not be known well at 3 w, else as quick
- * as steps of 1 kHz allow: damping ratio k w / (2 corner). */
+/* A rotor swings about the current vector like a pendulum:
+ *   w^2 = 3/2 p^2 psi i / J
+ * The vector yields by k times the difference of the rotor's speed from its low-pass. The corner is 3 w, so
+ * that J need not be known well, or as fast as steps of 1 kHz allow. Damping ratio: k w / (2 corner). */
 static void make_damping(maker_t *m, open_loop_config_t *c)
 {
     const pm_num_t psi = si(m, DRIVE_PARAM_psi_m);

@@ -65,7 +65,7 @@ void make_flux_weakening(maker_t *m, field_weakening_config_t *c)
     c->i_max = per_unit(m, DRIVE_PARAM_i_fw_max, m->base.i);
 }
 
-/* h = psi_m / (2 (L_q - L_d)); none when the machine has next to no saliency. */
+/* h = psi_m / (2 (L_q - L_d)); 0 when the saliency is negligible. */
 void make_mtpa(maker_t *m, mtpa_config_t *c)
 {
     const pm_num_t dL = pm_num_sub(si(m, DRIVE_PARAM_L_q), si(m, DRIVE_PARAM_L_d));

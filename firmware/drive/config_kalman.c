@@ -1,11 +1,11 @@
 /* Configuration of the extended Kalman filters. */
 #include "firmware/drive/config_maker.h"
 
-/* What the Kalman filters take for noise, standard deviations. */
+/* Noise of the Kalman filters, standard deviations. */
 typedef struct {
     pm_num_t current; /* of a sample, A */
     pm_num_t voltage; /* of a period's mean, V */
-    pm_num_t speed;   /* electrical, rad/s, that the speed wanders in a period */
+    pm_num_t speed;   /* change of the electrical speed in a period, rad/s */
     pm_num_t angle;   /* rad, likewise */
     pm_num_t u;       /* unit of flux: EMF of base speed in a period, Wb */
 } ekf_noise_t;
@@ -23,7 +23,7 @@ static ekf_noise_t ekf_noise(const maker_t *m)
     };
 }
 
-/* (sigma / unit)^2, within what keeps the covariance in its range. */
+/* (sigma / unit)^2, clamped to what keeps the covariance in range. */
 static int32_t variance(pm_num_t sigma, pm_num_t unit, int32_t least, int32_t most)
 {
     int32_t x;

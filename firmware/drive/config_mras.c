@@ -1,8 +1,8 @@
 /* Configuration of the model-reference observers. */
 #include "firmware/drive/config_maker.h"
 
-/* The adapted quantity at 50 Hz, twice the loop; nothing is claimed below a quarter of the speed at which the
- * observer comes in. The speed in the reactive term lags by twice what stability needs at rated
+/* The adapted quantity at 50 Hz, twice the loop; the error signal fades below a quarter of the speed at which
+ * the observer takes over. The speed in the reactive term lags by twice what stability needs at rated
  * current, and by 0.2 rad at least. */
 static void make_mras(maker_t *m, mras_config_t *c)
 {

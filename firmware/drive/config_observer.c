@@ -1,4 +1,4 @@
-/* Configuration of the fundamental-model observers: what they share, flux, EMF and sliding mode. */
+/* Configuration of the fundamental-model observers: machine model, flux, EMF and sliding mode. */
 #include "firmware/drive/config_maker.h"
 #include "firmware/math/root.h"
 
@@ -43,12 +43,12 @@ void make_model(maker_t *m, observer_model_t *c)
     c->t_s = fixed(m, step, FRAC_BITS, DRIVE_PARAM_f_pwm);
 }
 
-/* What is not known is tied to the position with so many rad/s while injection leads. */
+/* Rate at which the state is tied to the position while injection leads, rad/s. */
 #define TIE pm_num(300)
 
 /* R follows in 8 ms at rated current. */
 #define FOLLOW pm_num_ratio(1, 8)
-/* In the EMF stands the loop's speed, whose wobble R must not follow: 64 ms. */
+/* The EMF contains the loop's speed, whose ripple R must not follow: 64 ms. */
 #define FOLLOW_EMF pm_num_ratio(1, 64)
 
 static void make_resistance(maker_t *m, observer_resistance_t *c, pm_num_t k)

@@ -11,7 +11,7 @@ void make_observer(maker_t *m, observer_config_t *c)
 #include "observers/observers.def"
 #undef PM_METHOD
     case OBSERVER_COUNT:
-    default: /* the range of the parameter ends before */
+    default: /* excluded by the range of the parameter */
         refuse(m, DRIVE_PARAM_observer, "is not in this image");
         break;
     }

@@ -25,7 +25,8 @@ static uint64_t magnitude(int32_t x)
     return (uint64_t)(x < 0 ? -(int64_t)x : (int64_t)x);
 }
 
-/* The upper half at once, of the lower bit by bit; den <= 2^31, so that the rest fits when it is doubled. */
+/* The upper half in one division, the lower half bit by bit; den <= 2^31, so that the doubled remainder
+ * fits. */
 static uint64_t quotient(uint64_t num, uint32_t den)
 {
     const uint32_t top = (uint32_t)(num >> 32);
@@ -56,7 +57,7 @@ pm_num_t pm_num(int32_t value)
     return make(value < 0, magnitude(value), 0);
 }
 
-/* 10^n = 5^n 2^n, and 5^12 still is exact in a mantissa, so there is one rounding only. */
+/* 10^n = 5^n 2^n, and 5^12 is still exact in a mantissa, so there is one rounding only. */
 pm_num_t pm_num_dec(int32_t value, int exponent10)
 {
     const int n = exponent10 < 0 ? -exponent10 : exponent10;

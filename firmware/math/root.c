@@ -64,10 +64,10 @@ pm_q_t pm_div(pm_q_t num, pm_q_t x)
 
 pm_unit_t pm_ratio(pm_q_t num, pm_q_t den)
 {
-    /* both to the top, so that the quotient keeps 15 bits or more */
+    /* both shifted to the top, so that the quotient keeps 15 bits or more */
     const unsigned lift = (unsigned)__builtin_clz((uint32_t)den | 1U);
     const uint32_t n = (uint32_t)num << lift; /* < 2^32, as num <= den */
     const uint32_t d = ((uint32_t)den << lift) >> 16;
-    const uint32_t q = n / d; /* <= 2^16 and a little */
+    const uint32_t q = n / d; /* slightly above 2^16 at most */
     return q >= 0x10000U ? PM_UNIT_MAX : (int32_t)(q << 15);
 }

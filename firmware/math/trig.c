@@ -25,8 +25,8 @@ pm_angle_t pm_atan2(int32_t y, int32_t x)
     if (large == 0U) {
         return 0U;
     }
-    /* Sixteen leading bits of the larger one are divisor enough, and keep the division to 32 bits. Cutting
-     * the divisor and cutting the quotient partly make up for each other. */
+    /* Sixteen leading bits of the larger one are enough for a divisor and keep the division to 32 bits.
+     * Truncating the divisor and truncating the quotient partly cancel. */
     const unsigned n = (unsigned)__builtin_clz(large);
     large <<= n;
     small <<= n;

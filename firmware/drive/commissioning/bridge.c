@@ -1,4 +1,4 @@
-/* The bridge while the machine is identified: plain voltages without compensation, whose mean is exact. */
+/* The bridge during identification: voltages without dead-time compensation, whose mean is exact. */
 #include "firmware/drive/commissioning/commissioning_parts.h"
 #include "firmware/math/compiler.h"
 #include "firmware/math/num.h"
@@ -6,7 +6,7 @@
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
 
-/* Timer counts are carried in 128ths: what a period cannot give the next one does. */
+/* Timer counts are carried in 128ths: the fraction that one period cannot output is added to the next. */
 #define PART 128U
 
 void commissioning_clear_sums(commissioning_t *self)
@@ -42,7 +42,7 @@ void commissioning_set_gains(drive_t *drive)
     drive->identify.work.pi = (pm_pi_config_t){.kp = kp, .ki = ki, .kb = pm_shl(ratio, 31 - PM_Q_BITS)};
 }
 
-/* A share of the period in Q20; what a period's counts cannot give the next ones do. */
+/* A share of the period in Q20; the fraction of a count left over goes into the next period. */
 static inline void write_leg(int32_t share, int32_t parts, int32_t *rest, uint16_t *compare)
 {
     const pm_unit_t within = pm_share_to_unit(pm_sat_positive(share, PM_SHARE_BITS));
@@ -75,7 +75,7 @@ static inline pm_wide_t axis_voltage(const drive_t *drive, pm_pi_t *pi, pm_q_t e
     return limited;
 }
 
-/* What the legs will lose, by the current wanted there: linear below an eighth of it. */
+/* Voltage that the legs will lose at the wanted current: linear below an eighth of it. */
 static inline pm_abc_t regain(pm_abc_t u, pm_half_dir_t dir, pm_q_t lost)
 {
     const pm_abc_t i = pm_clarke_inverse((pm_ab_t){.alpha = dir.cos, .beta = dir.sin}); /* Q30 */
@@ -87,9 +87,8 @@ static inline pm_abc_t regain(pm_abc_t u, pm_half_dir_t dir, pm_q_t lost)
     };
 }
 
-/* The vector turns on; its voltage acts one and a half periods later. While it stands, q is without voltage:
- * what a swinging rotor induces there drives a current through the winding's own resistance, which damps it.
- */
+/* The vector turns further; its voltage acts one and a half periods later. While it stands, q has no voltage:
+ * the EMF of a swinging rotor drives a current through the winding's own resistance, which damps it. */
 static inline pm_abc_t turn(drive_t *drive)
 {
     commissioning_t *self = &drive->identify.work;
@@ -126,7 +125,7 @@ static void hold_voltage(drive_t *drive)
     drive->status.i = (pm_dq_t){.d = drive->i_ab.alpha, .q = drive->i_ab.beta};
 }
 
-/* The voltage of the wave, and that of the d-axis beside one on q. */
+/* The voltage of the wave, and that of the d-axis during a wave on q. */
 static void wave(drive_t *drive, pm_ab_t v_past)
 {
     commissioning_t *self = &drive->identify.work;

@@ -8,7 +8,7 @@
 
 #define HOLD_MS 500U
 
-/* What others read of the position stays as it was. */
+/* The position that others read stays as it was. */
 _Static_assert(offsetof(drive_t, identify.work) + sizeof(commissioning_t) <=
                    offsetof(drive_t, position.weight),
                "fits beside the loop's speed and the quality");
@@ -46,8 +46,8 @@ static pm_q_t assumed_loss(const drive_t *drive)
     return m->drop + pm_frac(drive->status.v_dc, pm_shl(m->dead, 32 - PM_SHARE_BITS));
 }
 
-/* What the parts need that is not to be identified is taken from the last results, else from the parameters.
- */
+/* Values that a routine needs and that are not to be identified come from the last results, else from the
+ * parameters. */
 static void know(drive_t *drive)
 {
     commissioning_t *self = &drive->identify.work;
@@ -123,7 +123,7 @@ static void enter(drive_t *drive, uint8_t phase)
     }
 }
 
-/* With the vector, the rotor goes back to phase A; then it has time to come to rest. */
+/* The vector returns the rotor to phase A; then the rotor has time to come to rest. */
 static phase_result_t hold(drive_t *drive, bool full)
 {
     commissioning_t *self = &drive->identify.work;

@@ -16,7 +16,7 @@
 #define SHORTEST    2U
 #define SHARE_SMALL PM_Q(0.3)
 #define SHARE_FAR   PM_Q(0.8)
-/* Whole waves. With negative i_d the rotor stands on its edge: it must not be long. */
+/* Whole waves. With negative i_d the rotor is in unstable equilibrium: the time must be short. */
 #define SETTLE_CYCLES        3U
 #define CYCLES               24U
 #define BIASED_SETTLE_CYCLES 1U
@@ -24,8 +24,9 @@
 /* Of products, before they are divided by their number. */
 #define FINE 65536
 
-/* The i_d of most torque per ampere: h - sqrt(h^2 + i^2), h = psi_m / (2 (L_q - L_d)), but so much
- * that its leg's current has a sign; none without saliency. */
+/* The i_d of most torque per ampere, but large enough that the sign of its leg's current is certain; none
+ * without saliency:
+ *   i_d = h - sqrt(h^2 + i^2),   h = psi_m / (2 (L_q - L_d)) */
 static pm_q_t best_i_d(const drive_t *drive, pm_q_t i_q)
 {
     const commissioning_result_t *r = &drive->commissioning_report.result;
@@ -38,7 +39,7 @@ static pm_q_t best_i_d(const drive_t *drive, pm_q_t i_q)
     return pm_min(h > PM_Q(7.0) ? 0 : h - pm_hypot(h, i_q), -i_q / 8);
 }
 
-/* By the inductance at zero current: four fifths of the voltage that will be needed. */
+/* From the inductance at zero current: four fifths of the voltage that will be needed. */
 static void foresee(const drive_t *drive, square_t *square)
 {
     const pm_q_t flux = 2 * pm_mul(drive->identify.work.L_q, square->wanted);
@@ -76,14 +77,13 @@ void inductance_enter(drive_t *drive, bool on_q, bool rated)
     current_control_reset(&drive->current, (pm_dq_t){0, 0});
 }
 
-/* Products of two signals are in twice their format. */
+/* Products of two signals have twice their fractional bits. */
 static pm_q_t mean_product(const commissioning_t *self, uint32_t n)
 {
     return (pm_q_t)pm_quotient(self->sum[n] / FINE, self->taken);
 }
 
-/* Flux per T_s: what the voltage, whose amplitude is the same in all periods, leaves of R and lost voltage.
- */
+/* Flux per T_s: the voltage, whose amplitude is the same in all periods, less R i and lost voltage. */
 static pm_q_t per_unit(const drive_t *drive)
 {
     const commissioning_t *self = &drive->identify.work;
@@ -104,8 +104,7 @@ static pm_q_t cross(const drive_t *drive)
     return pm_mul_sat(slope, commissioning_current(drive));
 }
 
-/* The amplitude was found with positive i_d; with the negative one there is less saturation, so less current.
- */
+/* The amplitude was found with positive i_d; with negative i_d there is less saturation, so less current. */
 static pm_q_t at_test_current(const drive_t *drive, pm_q_t L)
 {
     const commissioning_t *self = &drive->identify.work;

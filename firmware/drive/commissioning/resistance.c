@@ -31,7 +31,7 @@ void sweep_enter(drive_t *drive)
     set_voltage(drive, 0);
 }
 
-/* A quarter turn from where the vector began, so that a rotor that stood against it has been moved. */
+/* A quarter turn from the initial vector, so that a rotor that stood opposite to it has been moved. */
 phase_result_t sweep_slow(drive_t *drive)
 {
     commissioning_t *self = &drive->identify.work;

@@ -39,7 +39,7 @@ static pm_q_t ramp_step(const commissioning_t *self)
     return pm_abs(self->of.rotation.omega) / RAMP_MS + 1;
 }
 
-/* Torque over 1.5 P i, with what R takes: power over omega. i_q is what ramps leave of it. */
+/* Torque over 1.5 P i, including the resistive loss: power over omega. i_q is the error that ramps leave. */
 static pm_q_t torque_voltage(const commissioning_t *self, pm_q_t omega)
 {
     const pm_q_t i_d = pm_max(commissioning_mean(self, I_D), 1);
@@ -67,8 +67,8 @@ static pm_q_t mean_torque(const commissioning_t *self)
     return (pm_q_t)pm_quotient(self->sum[TORQUE], self->of.rotation.count);
 }
 
-/* A rotor on a vector that turns by itself swings like a pendulum. u_d rises by u_q per radian that it falls
- * behind; the vector then waits for it: 30 rad/s per radian. */
+/* A rotor on a vector that turns at a given speed swings like a pendulum. u_d rises by u_q per radian that it
+ * falls behind; the vector then slows down: 30 rad/s per radian. */
 static void turn_on(drive_t *drive, pm_q_t target)
 {
     commissioning_t *self = &drive->identify.work;
@@ -139,7 +139,7 @@ phase_result_t rotation_full(drive_t *drive)
     return (phase_result_t){.done = true};
 }
 
-/* At a quarter of the current, where what the saliency and its saturation take is small. */
+/* At a quarter of the current, where saliency and its saturation have little effect. */
 phase_result_t rotation_less(drive_t *drive)
 {
     commissioning_t *self = &drive->identify.work;
@@ -151,7 +151,7 @@ phase_result_t rotation_less(drive_t *drive)
         return running;
     }
     const active_t active = active_flux(drive);
-    /* what the current alone makes of a rotor that stands would be half now */
+    /* with a rotor at standstill the result would be proportional to the current: half now */
     if (!active.follows || active.psi < pm_mul(self->of.rotation.psi_full, PM_Q(0.75))) {
         return stuck;
     }
@@ -166,7 +166,7 @@ static void conclude_mechanics(drive_t *drive, pm_q_t tau_down, pm_q_t i)
     const pm_q_t tau_up = self->of.rotation.tau_up;
     r->J = pm_div(pm_mul(tau_up - tau_down, i) / 2, ramp_step(self) * COMMISSIONING_J_STEPS);
 
-    /* what R takes, over the speeds of the window (mean of 1 / omega: 1.469) and at the top */
+    /* voltage across R, over the speeds of the window (mean of 1 / omega: 1.469) and at the top */
     const pm_q_t top = pm_abs(self->of.rotation.omega);
     const pm_q_t at_top = pm_div(pm_mul(self->R, i), top);
     const pm_q_t even = self->of.rotation.tau_even - at_top;

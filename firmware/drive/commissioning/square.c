@@ -1,8 +1,8 @@
-/* The square wave that measures an inductance, period by period: inductance.c. */
+/* The square wave that measures an inductance, period by period; see inductance.c. */
 #include "firmware/drive/commissioning/commissioning_parts.h"
 #include "firmware/math/compiler.h"
 
-/* -1 for each edge at which a leg's current was negative. The current moves while legs differ: the leg that
+/* -1 for each edge at which a leg's current was negative. The current changes while legs differ: the leg that
  * is up longest switches before and after that, the one that is up shortest in the middle of it. */
 PM_INLINE int32_t edges(pm_q_t from, pm_q_t to, pm_q_t u, pm_q_t edge)
 {
@@ -11,7 +11,7 @@ PM_INLINE int32_t edges(pm_q_t from, pm_q_t to, pm_q_t u, pm_q_t edge)
     return (from + before < 0 ? -1 : 0) + (to - before < 0 ? -1 : 0);
 }
 
-/* What the lost voltage is multiplied with; what the legs have in common is free. */
+/* Factors of the lost voltage; the common part of the legs does not count. */
 typedef struct {
     int32_t alpha; /* thirds */
     int32_t beta;  /* 1 / sqrt(3) */
@@ -35,7 +35,7 @@ static inline void sum_axis(commissioning_t *self, pm_q_t i, pm_q_t di, int32_t 
     self->taken++;
 }
 
-/* Of whole products sums stay below 16 i^4. */
+/* The sums of full products stay below 16 i^4. */
 static inline void sum_other(commissioning_t *self, pm_q_t v, pm_ab_t i, pm_ab_t di, int32_t negative)
 {
     const square_t *square = &self->of.square;
@@ -66,7 +66,7 @@ static inline void take(commissioning_t *self, pm_ab_t i, pm_abc_t legs, pm_ab_t
 }
 
 /* A whole wave has ended, in the middle of its rise: the current is zero, and a change of the voltage here
- * leaves no mean behind, which would turn the rotor. */
+ * leaves no mean, which would turn the rotor. */
 static void judge(drive_t *drive, square_t *square)
 {
     if (square->leading) {
@@ -95,8 +95,8 @@ static void judge(drive_t *drive, square_t *square)
     square->low = 0;
 }
 
-/* The first waves are such that the rotor has no speed when the current is at its peaks: then its mean speed
- * is zero, too. */
+/* The first waves are chosen so that the rotor's speed is zero at the peaks of the current: then its mean
+ * speed is zero, too. */
 static void flip(square_t *square)
 {
     square->count = square->leading ? (uint16_t)((uint32_t)square->half * 146U / 1000U) : 0U;
@@ -108,7 +108,7 @@ static void move(drive_t *drive, pm_ab_t v_past)
     commissioning_t *self = &drive->identify.work;
     square_t *square = &self->of.square;
     const pm_q_t i = square->on_q ? drive->i_ab.beta : drive->i_ab.alpha;
-    if (square->state == (uint8_t)SQUARE_WAITS) { /* what flowed before goes first */
+    if (square->state == (uint8_t)SQUARE_WAITS) { /* until the earlier current has decayed */
         square->state = (uint8_t)(pm_abs(i) < square->wanted / 8 ? SQUARE_SEEKS : SQUARE_WAITS);
         return;
     }
@@ -118,7 +118,7 @@ static void move(drive_t *drive, pm_ab_t v_past)
     } else if (square->cycles >= square->settled && square->state == (uint8_t)SQUARE_MEASURES) {
         take(self, drive->i_ab, drive->i_abc, v_past);
     } else {
-        /* waves as they will be */
+        /* waves in their final form */
     }
     if (square->count >= square->half) {
         flip(square);
