@@ -1,8 +1,9 @@
-/* What a port provides to the application, and what it calls up. One folder of hal/ per port, each with the
- * same files: bridge.c, measure.c, can.c, store.c, system.c, console.c and port.h with struct hal.
+/* Interface of a port: functions that it provides to the application, and functions of the application that
+ * it calls. One folder of hal/ per port, each with the same files: bridge.c, measure.c, can.c, store.c,
+ * system.c, console.c and port.h with struct hal.
  *
- * A port is thin: it moves numbers between registers and the structs of drive.h and knows nothing of motors.
- * Only the application calls it; the control code does not know that it exists. tests/contract/hal runs the
+ * A port is thin: it moves numbers between registers and the structs of drive.h and contains no motor
+ * control. Only the application calls it; the control code does not depend on it. tests/contract/hal runs the
  * same checks on any port.
  *
  * Contexts, by falling priority:
@@ -10,7 +11,8 @@
  *   monitor   an interrupt of a timer of its own, every millisecond, below control: app_monitor()
  *   slow      the lowest interrupt, at 1 kHz, pended by control: app_slow()
  *   thread    the main loop; may be interrupted by all
- * "any" is all of them and the fault handlers. No function blocks but where it says so.
+ *   any       all of these and the fault handlers
+ * Functions do not block unless stated.
  *
  * Order: hal_init(), hal_start(), then the rest. From reset until hal_bridge_arm() the bridge is off. */
 #ifndef HAL_HAL_H
@@ -22,8 +24,8 @@
 #include "firmware/drive/drive.h"
 #include "hal/can_frame.h"
 
-typedef struct hal hal_t; /* the port's own, in its port.h */
-typedef struct app app_t; /* the application's, handed back to it */
+typedef struct hal hal_t; /* defined by the port in its port.h */
+typedef struct app app_t; /* defined by the application */
 
 typedef enum {
     HAL_RESET_POWER,
@@ -33,34 +35,34 @@ typedef enum {
     HAL_RESET_OTHER,
 } hal_reset_t;
 
-/* What the application has to say about the hardware, from its parameters. */
+/* Configuration of the hardware, from the application's parameters. */
 typedef struct {
     uint16_t timer_counts; /* of half a PWM period */
-    uint16_t dead_time_ns; /* rounded up to what the timer has */
+    uint16_t dead_time_ns; /* rounded up to the resolution of the timer */
     uint16_t break_level;  /* over-current comparators: code of a leg current above mid-scale; 0: most */
     uint16_t can_kbit_s;   /* 125, 250, 500 or 1000 */
 } hal_config_t;
 
 typedef enum {
     HAL_OK,
-    HAL_TIMER_COUNTS, /* outside what the timer has */
+    HAL_TIMER_COUNTS, /* outside the timer's range */
     HAL_DEAD_TIME,
     HAL_BREAK_LEVEL,
     HAL_CAN_BIT_RATE,
     HAL_CLOCK, /* the oscillator has not started: the port runs on, but the bridge cannot be armed */
 } hal_status_t;
 
-/* Why the last run ended, kept over the reset by the fault handlers. */
+/* Why the last run ended, preserved over the reset by the fault handlers. */
 typedef struct {
-    uint32_t cause; /* exception number, 0: there are none */
+    uint32_t cause; /* exception number; 0: none recorded */
     uint32_t pc, lr;
     uint32_t status;  /* fault status register of the processor */
-    uint32_t address; /* that the faulty access went to */
+    uint32_t address; /* of the faulty access */
 } hal_last_words_t;
 
 /* --- system.c ------------------------------------------------------------------------------------------ */
 
-/* The one that a processor has; ports that make several, as sim, have none. */
+/* The port's single instance. Ports with several instances, such as sim, do not define it. */
 hal_t *hal_instance(void);
 
 /* thread, once, first: clocks, pins, peripherals; nothing runs yet. Blocks up to 20 ms. The configuration
@@ -74,15 +76,16 @@ const char *hal_board_name(const hal_t *hal);
 uint32_t hal_timer_Hz(const hal_t *hal); /* clock of the carrier: timer_counts = timer_Hz / (2 f_pwm) */
 void hal_unique_id(const hal_t *hal, uint32_t id[3]);
 hal_reset_t hal_reset_cause(const hal_t *hal);
-bool hal_take_last_words(hal_t *hal, hal_last_words_t *words); /* thread; false: none. Forgets them. */
+bool hal_take_last_words(hal_t *hal, hal_last_words_t *words); /* thread; false: none. Clears them. */
 
 uint32_t hal_time_us(const hal_t *hal); /* any; wraps */
 void hal_pend_slow(hal_t *hal);         /* control; app_slow() follows when control has returned */
 void hal_lock(hal_t *hal);              /* thread: holds all interrupts off, for at most 1 us; no nesting */
 void hal_unlock(hal_t *hal);
-void hal_idle(hal_t *hal);     /* thread: returns after the next interrupt, or at once */
-void hal_watchdog(hal_t *hal); /* monitor: not called for 20 ms, the processor is reset and the bridge off */
-void hal_reset(hal_t *hal);    /* thread: bridge off, then restart; does not return on a processor */
+void hal_idle(hal_t *hal); /* thread: returns after the next interrupt, or at once */
+void hal_watchdog(
+    hal_t *hal);            /* monitor: without a call for 20 ms the processor is reset and the bridge off */
+void hal_reset(hal_t *hal); /* thread: bridge off, then restart; does not return on a processor */
 
 /* --- bridge.c ------------------------------------------------------------------------------------------ */
 
@@ -99,10 +102,10 @@ bool hal_bridge_armed(const hal_t *hal);
 
 /* --- measure.c ----------------------------------------------------------------------------------------- */
 
-/* control, budget 40 instructions: what was sampled at the centre of the zero vector of this period. */
+/* control, budget 40 instructions: the samples at the centre of this period's zero vector. */
 void hal_measure(hal_t *hal, drive_in_t *in);
 
-/* What changes slowly; the last conversion of each. */
+/* Slow measurements; the last conversion of each. */
 typedef struct {
     int32_t temperature_dC;   /* 0.1 degC, hottest sensor */
     uint16_t dial;            /* potentiometer, left-aligned; 0 where there is none */
@@ -124,13 +127,13 @@ uint32_t hal_can_lost(const hal_t *hal); /* frames that found the receive ring f
 #define HAL_STORE_PAGES     2
 #define HAL_STORE_PAGE_SIZE 2048U
 
-/* any, also before hal_init(): the page in place. A page whose writing was cut short reads as anything, but
- * reading it does no harm. */
+/* any, also before hal_init(): the page in place. After an interrupted write its contents are undefined, but
+ * reading it is harmless. */
 const uint32_t *hal_store_page(const hal_t *hal, uint32_t page);
 
-/* thread, bridge off; these block, up to 30 ms, and stop the processor where code runs from the same flash.
- * False: refused (bridge armed, outside) or not done; the page is then neither old nor new. Offset and size
- * are multiples of 8. */
+/* thread, bridge off; these block, up to 30 ms, and stall the processor where code runs from the same flash.
+ * False: refused (bridge armed, outside) or failed; the page is then neither old nor new. Offset and size are
+ * multiples of 8. */
 bool hal_store_erase(hal_t *hal, uint32_t page);
 bool hal_store_write(hal_t *hal, uint32_t page, uint32_t offset, const uint32_t *data, uint32_t size);
 
@@ -140,7 +143,7 @@ uint32_t hal_console(hal_t *hal,
                      const char *text); /* thread; characters taken: fewer when the ring is full */
 void hal_led(hal_t *hal, bool on);
 
-/* --- called up by the port, defined by the application (firmware/app) ---------------------------------- */
+/* --- called by the port, defined by the application (firmware/app) ------------------------------------- */
 
 void app_control(app_t *app); /* control, after every current measurement */
 void app_monitor(app_t *app); /* monitor, every millisecond after hal_start() */

@@ -1,18 +1,18 @@
 /* Machine, bridge, link and rotor as one system of differential equations between two gate changes.
  *
- * State: the windings' (machine.h), rotor angle and speed, link voltage, voltages of swinging
- * terminals, second mass. Currents and torque follow from it algebraically. Integrals for the mean voltage
- * and the energy balance ride along.
+ * State: the windings' (machine.h), rotor angle and speed, link voltage, voltages of swinging terminals,
+ * second mass. Currents and torque follow from it algebraically. Integrals for the mean voltage and the
+ * energy balance are integrated with it.
  *
- * circuit_advance() takes Taylor series of third order with error control where all phases are alike and
- * every leg is tied or swings (symmetrical.c), which is most of the time. The rest (steps_general.c) is for
- * the Bogacki-Shampine 3(2) pair, or Heun's method where that is exact enough. A step is as long as the
+ * circuit_advance() uses Taylor series of third order with error control where all phases are alike and every
+ * leg is tied or swings (symmetrical.c), which is most of the time. All else (steps_general.c) is integrated
+ * by the Bogacki-Shampine 3(2) pair, or by Heun's method where that is exact enough. A step is as long as the
  * segment if the error allows it and the rotor turns by less than FRAME_TURN_MAX_RAD. Inside a segment it
  * finds the instants at which a diode stops or starts, friction sticks or breaks away, or the chopper acts,
- * to the margins stated in bridge.c, and goes on from there; it asserts that this does not turn into chatter.
+ * to the margins stated in bridge.c, and continues from there; it asserts that events do not chatter.
  *
- * The windings of floating legs are projected onto zero leg current after every step, so that the error of
- * integration does not leak into a current that cannot flow.
+ * The windings of floating legs are projected onto zero leg current after every step, so that the integration
+ * error does not accumulate in a current that cannot flow.
  *
  * Tests: circuit_test.cpp, advance_test.cpp. */
 #ifndef PLANT_CIRCUIT_H

@@ -1,10 +1,13 @@
-/* DC link: C dv/dt = (v_s(t) - v)/r_source - i_dc - i_chopper, v_s = v_source + ripple sin(2 pi ripple_Hz t)
- * (METHODS.md 0.2 E13).
+/* DC link (METHODS.md 0.2 E13):
  *
- * i_dc is what the legs draw through the upper rail. A blocking source (a rectifier) takes no current back,
- * so a braking motor lifts the link until the chopper burns the energy: on above v_chopper_on, off below
- * v_chopper_off. Without connection nothing comes from the source. C = 0: stiff, v = v_source, whatever else
- * is set. The link cannot go below zero: the diodes of the legs then bridge it. Tests: dclink_test.cpp. */
+ *   C dv/dt = (v_s(t) - v)/r_source - i_dc - i_chopper
+ *   v_s     = v_source + ripple sin(2 pi ripple_Hz t)
+ *
+ * i_dc is the current of the legs through the upper rail. A blocking source (a rectifier) takes no current
+ * back, so a braking motor raises the link voltage until the chopper burns the energy: on above v_chopper_on,
+ * off below v_chopper_off. Without connection the source supplies nothing. C = 0: stiff, v = v_source,
+ * whatever else is set. The link cannot go below zero: the diodes of the legs then bridge it.
+ * Tests: dclink_test.cpp. */
 #ifndef PLANT_DCLINK_H
 #define PLANT_DCLINK_H
 

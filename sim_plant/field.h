@@ -1,19 +1,20 @@
-/* Currents of a symmetrical machine from its flux linkages, and how they move.
+/* Currents of a symmetrical machine from its flux linkages, and their rates.
  *
  * Symmetrical (machine.h): the energy form, all phases alike, mutual inductance between two sets at most, and
  * any harmonics of the magnet. Then the linkage of a set, without the harmonics, is in rotor coordinates
  *
- *   psi_s = core_s + M i(core_of_the_other_set),   M = diag(M_d, M_q)
+ *   psi_s    = core_s + M i(core_of_the_other_set),   M = diag(M_d, M_q)
+ *   dpsi/dt  = v - R i - omega psi_x'
  *
- * and its rate is v - R i - omega psi_x', whatever the saturation: it is the state, and core and currents
- * follow from it. One set has psi = core; of two, Newton's method from a guess by the last rates gives core
- * to 1e-11 in one or two rounds. An open winding adds its zero sequence, which nothing links to the others.
+ * whatever the saturation: psi_s is the state, and core and currents follow from it. One set has psi = core;
+ * of two, Newton's method from a guess by the last rates gives core to 1e-11 in one or two rounds. An open
+ * winding adds its zero sequence, which is coupled to no other.
  *
- * Quantities of a set, alpha and beta or d and q, are one vector of two for the processor. Of a zero sequence
- * the second is nothing.
+ * Quantities of a set, alpha and beta or d and q, are one vector of two for the processor. For a zero
+ * sequence the second element is unused.
  *
  * Inline, for a caller that knows the shape of the windings. Tests: plant_test.cpp, against the general way.
- */
+ * */
 #ifndef PLANT_FIELD_H
 #define PLANT_FIELD_H
 

@@ -1,9 +1,11 @@
-/* Legs without current: the voltage that each takes so that its current stays at none (METHODS.md 0.2 E10,
+/* Legs without current: the terminal voltage that keeps each leg's current at zero (METHODS.md 0.2 E10,
  * E11).
  *
- * With di/dt = Y v + what motion and the tied legs do, the voltages of the floating legs follow from
- * axis_k . di/dt = 0 for each of them. Where nothing fixes the potential of a group (all legs of a star, both
- * ends of an open phase) its highest and lowest are taken to lie evenly between the rails.
+ *   di/dt          = Y v + (motion and tied legs)
+ *   axis_k . di/dt = 0                               for each floating leg k
+ *
+ * Where nothing fixes the potential of a group (all legs of a star, both ends of an open phase) its highest
+ * and lowest are assumed to lie evenly between the rails.
  * Cost: an elimination of at most six equations. Tests: floating_test.cpp. */
 #ifndef PLANT_FLOATING_H
 #define PLANT_FLOATING_H

@@ -1,15 +1,15 @@
 /* Timer and gate drivers: compare values in, the state of the switches out (METHODS.md 0.2 E6, E9).
  *
- * Centre-aligned carrier, period [0, T): the command of leg X is high from (1 - d0) T/2 to (1 + d1) T/2
- * with d = compare / timer_counts of each half. Compare values beyond timer_counts count as
- * timer_counts. Full duty on both sides of a period boundary joins without an edge.
+ * Centre-aligned carrier, period [0, T): the command of leg X is high from (1 - d0) T/2 to (1 + d1) T/2 with
+ *   d = compare / timer_counts               of each half, at most 1
+ * Full duty on both sides of a period boundary joins without an edge.
  *
  * A command edge opens the conducting switch turn_off_s later; the other closes dead_time_s + turn_on_s after
- * the edge. An edge before that starts it anew, so a pulse shorter than the dead time never reaches its
- * switch, as in a timer with a dead-time generator. A leg that becomes driven also waits. Which legs are
+ * the edge. An edge before that restarts the dead time, so a pulse shorter than the dead time never reaches
+ * its switch, as in a timer with a dead-time generator. A leg that becomes driven also waits. Which legs are
  * driven changes once in a period, by default at its start.
  *
- * A faulty switch stays as it is whatever its gate says. Edges closer than 1e-9 T are one event. Times are
+ * A faulty switch keeps its state whatever its gate. Edges closer than 1e-9 T are one event. Times are
  * relative to the start of the period. Tests: gates_test.cpp. */
 #ifndef PLANT_GATES_H
 #define PLANT_GATES_H

@@ -1,22 +1,29 @@
 /* The motor: one or two sets of three phases around a common rotor (METHODS.md 0.2 E1 to E5, E14, E16, E17,
- * E19;
- * row 36).
+ * E19; row 36).
  *
  * The core of each set is a flux map in rotor coordinates, either the energy form
  *
- *   i_d = psi_d/L_d0 + c psi_d |psi|^4 - i_f      i_q = psi_q/L_q0 + c psi_q |psi|^4,
+ *   i_d = psi_d/L_d0 + c psi_d |psi|^4 - i_f
+ *   i_q = psi_q/L_q0 + c psi_q |psi|^4
  *
- * the gradient of the stored energy W = 1.5 (psi_d^2/(2 L_d0) + psi_q^2/(2 L_q0) + c |psi|^6/6 - i_f psi_d),
- * so that saturation, cross-coupling and polarity belong together and no energy is made or lost; or a table
+ * which is the gradient of the stored energy
+ *
+ *   W = 1.5 (psi_d^2/(2 L_d0) + psi_q^2/(2 L_q0) + c |psi|^6/6 - i_f psi_d)
+ *
+ * so that saturation, cross-coupling and polarity belong together and energy is conserved; or a table
  * (map_table.h). i_f is the magnet's equivalent current. winding.h adds what is linear in the currents.
  *
  * State of a coordinate: core flux with the energy form, core current with a table, and the current itself
- * for a zero sequence or the fault branch. A plain machine, one star set of the energy form with
- * harmonics of the magnet at most, has dpsi_core/dt = v - R i - omega psi_x'. machine_rates() does every
- * machine; those whose phases are alike have a shorter way, field.h.
+ * for a zero sequence or the fault branch. A plain machine, one star set of the energy form with harmonics of
+ * the magnet at most, has
  *
- * E19: a shorted circuit (L_eddy, R_eddy) on each rotor axis carries L_eddy di_e/dt = dpsi_core/dt - R_eddy
- * i_e beside the core current.
+ *   dpsi_core/dt = v - R i - omega psi_x'
+ *
+ * machine_rates() covers every machine; those whose phases are alike have a shorter way, field.h.
+ *
+ * E19: a shorted circuit (L_eddy, R_eddy) on each rotor axis carries, beside the core current,
+ *
+ *   L_eddy di_e/dt = dpsi_core/dt - R_eddy i_e
  *
  * Tests: machine_test.cpp. */
 #ifndef PLANT_MACHINE_H

@@ -1,12 +1,15 @@
-/* One current axis of a flux map: the grid with a margin on either side, and what lies beyond the data.
+/* One current axis of a flux map: the grid with a margin on either side, and the range beyond the data.
  *
  * For map_table.c. The map is evaluated at s(i): i itself within the data; beyond, it levels off and reaches
- * the outer node after twice the margin. An own co-energy g(i) is added, so that the flux
+ * the outer node after twice the margin. A co-energy g(i) of its own is added, so that the flux
  *
- *   psi = s' W_i(s) + g' = s' W_i(s) + (1 - s') psi_end + L_end (i - s)
+ *   psi = s' W_i(s) + g'
+ *       = s' W_i(s) + (1 - s') psi_end + L_end (i - s)
  *
  * passes from that of the map to psi_end. With psi_end at least (below the grid: at most) every W_i of the
- * margin and L_end > 0 the sum is convex wherever W is: W_i s'' + g'' >= L_end (1 - s'). */
+ * margin and L_end > 0 the sum is convex wherever W is:
+ *
+ *   W_i s'' + g'' >= L_end (1 - s') */
 #ifndef PLANT_MAP_AXIS_H
 #define PLANT_MAP_AXIS_H
 

@@ -1,16 +1,18 @@
-/* What hangs on terminals and neutrals between the samples: dividers with their RC (METHODS.md 0.2 E12), and
+/* Circuits at terminals and neutrals between the samples: dividers with their RC (METHODS.md 0.2 E12), and
  * comparators whose edges a timer captures (E18).
  *
  * Channels: terminals 0 to PLANT_LEGS - 1, then neutrals, volts ahead of the divider. Every channel is
- * filter_s dv/dt = v_in - v, solved exactly for an input that moves linearly within the step; with
- * filter_s = 0 it is the input itself.
- * The comparator of terminal k looks at (1 + divider_error) v_k less the mean of the terminals of its set of
- * three, a virtual neutral without error. It goes high above +hysteresis_V / 2 and low below the negative of
- * that, and starts low. The instant is that of the exact response, rounded down to counts of capture_s;
- * an instant on a count but for rounding belongs to that count.
  *
- * Divider, filter and timer are those at init. Cost of three legs: about 50 ns a step, and 0.2 us an
- * edge behind a filter. Tests: probe_test.cpp. */
+ *   filter_s dv/dt = v_in - v
+ *
+ * solved exactly for an input that moves linearly within the step; with filter_s = 0 it is the input itself.
+ * The comparator of terminal k compares (1 + divider_error) v_k with the mean of the terminals of its set of
+ * three, a virtual neutral without error. It goes high above +hysteresis_V / 2 and low below the negative of
+ * that, and starts low. The instant is that of the exact response, rounded down to counts of capture_s; an
+ * instant on a count but for rounding belongs to that count.
+ *
+ * Divider, filter and timer are those at init. Cost of three legs: about 50 ns a step, and 0.2 us an edge
+ * behind a filter. Tests: probe_test.cpp. */
 #ifndef PLANT_PROBE_H
 #define PLANT_PROBE_H
 

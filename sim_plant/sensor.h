@@ -1,20 +1,21 @@
 /* Current, voltage and temperature converters (METHODS.md 0.2 E8, E12).
  *
- * Currents: code = round(((1 + gain_error) i + offset) / full scale * 2^(bits-1) + noise) + 2^(bits-1),
+ *   code = round(((1 + gain_error) i + offset) / full scale * 2^(bits-1) + noise) + 2^(bits-1)
  * clipped to the range of the converter and left-aligned to 16 bits. bits = 0: sixteen bits, the finest that
- * the answer can carry, without noise. In line:      the leg's current; always settled. Low side:     the
- * leg's current while its lower switch or diode conducts, else zero current. Single shunt: the link current
- * in i_leg[0], with gain_error[0] and offset_A[0]. Channels without a shunt read mid-scale. A shunt's
- * amplifier starts from zero current, after the lower path of its leg has closed or, with a single shunt,
- * after the last edge of any leg, and approaches the current with the time constant settle_s / 5. At settle_s
- * the remaining e^-5 (0.7 %) counts as none: from there on the reading is exact and its `settled` bit is set.
- * Where the current ends the reading is zero at once.
+ * the code can carry, without noise. Position of the current sensors:
+ *   in line       the leg's current; always settled
+ *   low side      the leg's current while its lower switch or diode conducts, else zero current
+ *   single shunt  the link current in i_leg[0], with gain_error[0] and offset_A[0]
+ * Channels without a shunt read mid-scale. A shunt's amplifier starts from zero current, after the lower path
+ * of its leg has closed or, with a single shunt, after the last edge of any leg, and approaches the current
+ * with the time constant settle_s / 5. At settle_s the remaining e^-5 (0.7 %) counts as none: from there on
+ * the reading is exact and its `settled` bit is set. Where the current ends, the reading is zero at once.
  *
  * Voltages are unipolar. The DC link has noise only; terminals and neutrals, which the caller has filtered
- * (probe.h), have the gain of their divider too. Temperature is bipolar, without noise.
+ * (probe.h), have the gain error of their divider too. Temperature is bipolar, without noise.
  *
- * The noise is Gaussian from an own generator: equal seeds give equal runs. Drawn in the order i_leg, v_dc,
- * v_leg, v_neutral; the last two only with v_leg_full_scale_V > 0, else they are free of noise.
+ * The noise is Gaussian from a generator of its own: equal seeds give equal runs. Drawn in the order i_leg,
+ * v_dc, v_leg, v_neutral; the last two only with v_leg_full_scale_V > 0, else they have no noise.
  * Tests: sensor_test.cpp. */
 #ifndef PLANT_SENSOR_H
 #define PLANT_SENSOR_H

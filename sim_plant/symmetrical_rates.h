@@ -1,8 +1,11 @@
 /* First and second derivatives of a symmetrical machine on legs that are tied or swing; for symmetrical.c.
  *
  * All follows from the currents, and these move by the tangent of the field, so that a point of the field
- * gives both in closed form: voltages of the legs, then d psi/dt = v - R i - omega psi_x', from it di/dt, and
- * from that how voltages, power and torque move. */
+ * gives both in closed form, in this order:
+ *   voltages of the legs
+ *   dpsi/dt = v - R i - omega psi_x'
+ *   di/dt
+ *   rates of voltages, power and torque */
 #ifndef PLANT_SYMMETRICAL_RATES_H
 #define PLANT_SYMMETRICAL_RATES_H
 

@@ -1,16 +1,17 @@
 /* What the windings add to the core: connection, resistance, and flux linkage that is linear in the currents
- * and periodic in the rotor angle (METHODS.md 0.2 E3, E4, E5, E16, E17; rows 1, 8, 10, 33, 70,
- * 79, 80 and 89).
+ * and periodic in the rotor angle (METHODS.md 0.2 E3, E4, E5, E16, E17; rows 1, 8, 10, 33, 70, 79, 80 and
+ * 89).
  *
  * All quantities are in coordinates: alpha, beta and zero of each set, alpha along phase A of the first set
- * for both, amplitude invariant; then the branch of a short circuit. Currents of the legs are i_leg = axis .
- * i and leg voltages act as v = (axis' v_leg) / weight, so that weight v i is power. A star connection is the
- * constraint that its zero coordinate carries no current: it is left out of the active ones, and its voltage
- * is that of the neutral. An open winding keeps it.
+ * for both, amplitude invariant; then the branch of a short circuit.
  *
- *   psi = psi_core(i) + L(theta) i + psi_x(theta)
+ *   i_leg = axis . i
+ *   v     = (axis' v_leg) / weight            so that weight v i is power
+ *   psi   = psi_core(i) + L(theta) i + psi_x(theta)
  *
- * L and psi_x are Fourier series; L is symmetric in the weighted sense. Tests: winding_test.cpp. */
+ * A star connection is the constraint that its zero coordinate carries no current: it is not among the active
+ * coordinates, and its voltage is that of the neutral. An open winding keeps it. L and psi_x are Fourier
+ * series; L is symmetric in the weighted sense. Tests: winding_test.cpp. */
 #ifndef PLANT_WINDING_H
 #define PLANT_WINDING_H
 

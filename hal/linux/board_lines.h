@@ -16,7 +16,7 @@
 
 #include "hal/linux/gpio_line.h"
 
-#define BOARD_HOLD_MS 20 /* of NRST; the processor wants 0.3 us, a supervisor on the board more */
+#define BOARD_HOLD_MS 20 /* of NRST; the processor needs 0.3 us, a supervisor on the board more */
 #define BOARD_START_MS                                                                                       \
     100 /* NRST rises (100 nF at 40 kOhm: 20 ms), BOOT0 is read, the ROM begins to listen */
 
@@ -24,12 +24,13 @@ typedef struct {
     gpio_line_t *boot0, *nrst;
 } board_lines_t;
 
-/* Takes both lines, inactive: the board runs on. False and a text when one cannot be had; then none is. */
+/* Opens both lines, inactive: the board keeps running. False and a text if one cannot be opened; then neither
+ * is. */
 bool board_lines_open(board_lines_t *lines, const char *boot0, const char *nrst, char *error,
                       size_t error_size);
 void board_lines_close(board_lines_t *lines);
 
-/* These block, 120 ms. False: a line could not be set; both are then off, as far as that goes. */
+/* These block for 120 ms. False: a line could not be set; both are then off, as far as possible. */
 bool board_lines_boot(const board_lines_t *lines); /* resets into the boot loader */
 bool board_lines_run(const board_lines_t *lines);  /* resets into the flashed image */
 

@@ -1,4 +1,4 @@
-/* What a kind of link implements; can_link.c chooses by name. */
+/* Interface of one kind of CAN link; can_link.c selects by name. */
 #ifndef HAL_LINUX_CAN_BACKEND_H
 #define HAL_LINUX_CAN_BACKEND_H
 

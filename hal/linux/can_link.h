@@ -3,11 +3,11 @@
  *   can0, vcan0 ...       SocketCAN
  *   socketcand:HOST:PORT  listens there and speaks socketcand's raw mode to one client; port 0: any free one
  *   slcan:/dev/pts/N      speaks the serial-line protocol of CAN adapters on that terminal
- *   slcan:                the same on a new pseudo-terminal, whose name can_link_where() tells
+ *   slcan:                the same on a new pseudo-terminal, whose name can_link_where() returns
  *
- * The state is that of the controller, of SocketCAN only; an interface that is removed is bus-off for good,
- * one that is down is merely silent. No function blocks. Tests: tests/unit/hal_linux, and tests/vm with real
- * buses. */
+ * The state is that of the controller, with SocketCAN only. A removed interface stays bus-off; one that is
+ * down only receives nothing. No function blocks. Tests: tests/unit/hal_linux, and tests/vm with real buses.
+ * */
 #ifndef HAL_LINUX_CAN_LINK_H
 #define HAL_LINUX_CAN_LINK_H
 
@@ -18,7 +18,7 @@
 
 typedef struct can_link can_link_t;
 
-/* NULL and a text that says what to do. */
+/* NULL and an error text that says how to solve it. */
 can_link_t *can_link_open(const char *name, char *error, size_t error_size);
 void can_link_close(can_link_t *link);
 

@@ -1,5 +1,4 @@
-/* What gpio_line.c asks of gpio_name.c and of the version of libgpiod beside it; not for users of
- * gpio_line.h. */
+/* Interface between gpio_line.c, gpio_name.c and the version of libgpiod; not for users of gpio_line.h. */
 #ifndef HAL_LINUX_GPIO_BACKEND_H
 #define HAL_LINUX_GPIO_BACKEND_H
 

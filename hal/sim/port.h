@@ -1,11 +1,10 @@
-/* Port `sim`: the hardware is the plant. As many as wanted; nothing runs by itself: sim_loop.h calls.
+/* Port `sim`: the hardware is the plant. Any number of instances; nothing runs by itself: sim_loop.h calls.
  *
- * Converter codes go from plant to application and timer counts back unchanged, so what runs here is what
- * runs on the target. Over-current comparators are the plant's (plant_set_break()): they switch the bridge
- * off at their instant, and the next measurement says so. The temperature is the plant user's to set; flash
- * is memory; frames go to two queues. Where power is lost in the midst of a double word, that reads as
- * anything; a page that was being erased is so by half.
- */
+ * Converter codes go from plant to application and timer counts back unchanged, so the code under test is
+ * that of the target. The over-current comparators are the plant's (plant_set_break()): they switch the
+ * bridge off at their instant, and the next measurement reports it. The user of the plant sets the
+ * temperature; flash is memory; frames go through two queues. If power is lost while a double word is
+ * written, it reads as random data; a page that was being erased is half erased. */
 #ifndef HAL_SIM_PORT_H
 #define HAL_SIM_PORT_H
 
@@ -28,7 +27,7 @@ struct hal {
     bool armed, configured;
     bool slow_pending;
 
-    /* for whoever holds the loop */
+    /* for the user of the loop */
     int32_t temperature_dC; /* what the sensor says */
     bool hw_fault;          /* held break input */
     bool temperature_missing;
@@ -37,12 +36,12 @@ struct hal {
     uint32_t can_lost, watchdog_fed;
     uint32_t store[HAL_STORE_PAGES][HAL_STORE_PAGE_SIZE / sizeof(uint32_t)];
     uint32_t store_bytes_left;         /* flash loses power after so many bytes; UINT32_MAX: never */
-    void (*while_storing)(app_t *app); /* what interrupts there are for each double word; NULL: none */
+    void (*while_storing)(app_t *app); /* called for each double word, in place of interrupts; NULL: none */
     char console[SIM_CONSOLE];
     bool led, reset;
 };
 
-/* Erased store, everything well; the timer's clock of the drive board. */
+/* Erased store, no faults; the timer's clock of the drive board. */
 void sim_hal_init(hal_t *hal, plant_t *plant);
 
 bool sim_queue_put(sim_queue_t *queue, const hal_can_frame_t *frame); /* false: full */

@@ -1,4 +1,4 @@
-/* Application and plant as one loop, a control period at a time: what the interrupts of a processor do. */
+/* Application and plant as one loop, one control period at a time: the interrupts of a processor in order. */
 #ifndef HAL_SIM_SIM_LOOP_H
 #define HAL_SIM_SIM_LOOP_H
 

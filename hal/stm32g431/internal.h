@@ -1,4 +1,4 @@
-/* Between the files of this port. */
+/* Interface between the files of this port. */
 #ifndef STM32G431_INTERNAL_H
 #define STM32G431_INTERNAL_H
 
@@ -12,14 +12,14 @@
 #define PORT_PRIO_IO      0x30U
 #define PORT_PRIO_SLOW    0x40U
 
-extern hal_t port_hal;                                                 /* the one there is */
+extern hal_t port_hal;                                                 /* the only instance */
 extern uint32_t port_store[HAL_STORE_PAGES][HAL_STORE_PAGE_SIZE / 4U]; /* from the link script */
 
 /* --- clock.c */
-bool clock_start(void); /* false: without the crystal. Starts the microseconds. */
+bool clock_start(void); /* false: the crystal does not start. Starts the microsecond counter. */
 uint32_t clock_us(void);
 void clock_delay(uint32_t time_us);
-/* Until the bits have that value; false when time is up. */
+/* Waits until the bits have that value; false on time-out. */
 bool clock_await(const reg_t *word, uint32_t mask, uint32_t value, uint32_t most_us);
 
 /* --- pins.c */
@@ -52,7 +52,7 @@ typedef struct {
     uint32_t magic;
     hal_last_words_t words;
 } port_grave_t;
-extern port_grave_t port_grave; /* in memory that the start-up leaves alone */
+extern port_grave_t port_grave; /* in memory that the start-up does not clear */
 void port_reset(void) __attribute__((noreturn));
 void port_fault(const uint32_t *frame, uint32_t exception);
 void port_nmi(void);

@@ -1,8 +1,8 @@
-/* Port for ST's B-G431B-ESC1 (STM32G431CB, 170 MHz): what the application has to allocate.
+/* Port for ST's B-G431B-ESC1 (STM32G431CB, 170 MHz): the state that the application allocates.
  *
- * Both halves of a carrier period are equal: compare[leg][0] serves both. New compare
- * values take effect at the centre of the zero vector, a change of the driven legs about 1 us later.
- * docs/board.md has wiring and bench checks, README.md here the registers that are used. */
+ * Both halves of a carrier period are equal: compare[leg][0] serves both. New compare values take effect at
+ * the centre of the zero vector, a change of the driven legs about 1 us later. docs/board.md has wiring and
+ * bench checks, README.md here the registers that are used. */
 #ifndef STM32G431_PORT_H
 #define STM32G431_PORT_H
 
