@@ -5,12 +5,13 @@
 
 #include "firmware/app/app_parts.h"
 
-/* The main loop is dead when a round takes longer. */
+/* The main loop counts as stalled when a round takes longer. */
 #define TURN_MS 100U
-/* A round that nothing calls for: timers of the bus count in ms. */
+/* Period of a round without any event: timers of the bus count in ms. */
 #define ROUND_US 250U
 
-/* Of i_trip, where the comparators act: the software's limit comes first unless the current is steep. */
+/* Threshold of the comparators relative to i_trip: the software limit acts first unless the current is steep.
+ * */
 #define BREAK_PERCENT 110
 
 static uint16_t break_level(const drive_params_t *params)
@@ -41,7 +42,7 @@ static uint16_t bit_rate(const hal_t *hal)
     return (uint16_t)kbit_s;
 }
 
-/* The carrier's frequency is what the timer makes of its counts. */
+/* The carrier's frequency follows from the timer counts. */
 static bool carrier_agrees(const hal_t *hal, const drive_params_t *params)
 {
     const int64_t counts = (int64_t)2 * params->timer_counts * params->f_pwm;
@@ -168,7 +169,7 @@ static void tell(app_t *app)
     hal_led(app->hal, hal_bridge_armed(app->hal));
 }
 
-/* The main loop comes by after every interrupt, mostly for nothing. */
+/* The main loop runs after every interrupt, mostly with nothing to do. */
 static bool is_due(app_t *app)
 {
     const bool frames = app_bus_take(app);

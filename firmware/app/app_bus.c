@@ -1,12 +1,12 @@
-/* The node and the drive profile: what they ask of the drive, and what they tell of it. */
+/* The node and the drive profile: requests to the drive, and its state for the bus. */
 #include <stddef.h>
 #include <string.h>
 
 #include "firmware/app/app_parts.h"
 
-/* Frames of one round: more would keep the rest waiting. */
+/* Most frames per round, so that the rest of the round is not delayed. */
 #define FRAMES_MOST 16U
-/* Without another lost frame an overrun is over. */
+/* An overrun ends after this time without another lost frame. */
 #define LOST_US      1000000U
 #define CODE_OVERRUN 0x8110U
 
@@ -15,7 +15,7 @@ static app_t *app_of(void *context)
     return context;
 }
 
-/* What CiA 301 and CiA 402 call a fault */
+/* Error code of a fault in CiA 301 and CiA 402 */
 static uint16_t code_of(drive_fault_t fault)
 {
     static const uint16_t codes[DRIVE_FAULT_COUNT] = {
@@ -33,7 +33,7 @@ static uint16_t error_code(const app_t *app)
     return fault == DRIVE_FAULT_REMOTE_LOST ? app->alarm : code_of(fault);
 }
 
-/* --- called up by the node -------------------------------------------------------------------------- */
+/* --- called by the node ----------------------------------------------------------------------------- */
 
 bool node_host_send(void *context, const node_frame_t *frame)
 {
@@ -192,7 +192,7 @@ static bool same(const cia402_out_t *a, const cia402_out_t *b)
            a->velocity == b->velocity && a->torque == b->torque && a->current == b->current;
 }
 
-/* Orders are given when they change: what else commands the drive is left alone until then. */
+/* Commands are passed on when they change: between changes, another source may command the drive. */
 static void profile(app_t *app)
 {
     const cia402_in_t facts = app_drive_facts(app);
@@ -248,7 +248,7 @@ static void watch_bus(app_t *app)
     }
 }
 
-/* Of a lost master the node has told already. */
+/* The node has already reported a lost master. */
 static void tell_fault(app_t *app)
 {
     const drive_fault_t fault = app->drive.fault;
@@ -264,7 +264,7 @@ void app_bus_init(app_t *app)
     app_recall(app, OD_LIVE);
     trace_init(&app->trace, app->trace_ring, APP_TRACE_NUMBERS, app);
     const cia402_in_t facts = app_drive_facts(app);
-    app->given = cia402_step(&app->cia402, &facts); /* nothing that the drive does not do already */
+    app->given = cia402_step(&app->cia402, &facts); /* no effect beyond what the drive does already */
     node_init(&app->node, app, id[0] ^ id[1] ^ id[2], hal_time_us(app->hal));
 }
 

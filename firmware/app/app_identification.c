@@ -1,4 +1,4 @@
-/* Identification on the bus: what is asked for, and the results in the units of the dictionary. */
+/* Identification over the bus: commands, and the results in the units of the dictionary. */
 #include <stddef.h>
 
 #include "firmware/app/app_parts.h"
@@ -105,7 +105,7 @@ bool app_identify_put(app_t *app, uint16_t slot, int32_t value)
     return true;
 }
 
-/* The rated current and 30 % of the highest speed unless told otherwise. */
+/* By default the rated current and 30 % of the highest speed. */
 void app_identify_command(const app_t *app, drive_command_t *command)
 {
     command->mode = DRIVE_MODE_IDENTIFY;

@@ -6,7 +6,7 @@
 
 _Static_assert((uint32_t)DRIVE_PARAM_COUNT == (uint32_t)OD_PARAMETER_COUNT, "dictionary and drive agree");
 
-/* What the hardware runs with was given to it once, before it was started. */
+/* The hardware was configured once, before its start. */
 static bool needs_restart(const app_t *app)
 {
     const hal_config_t now = app_hal_config(&app->params, app->hal_config.can_kbit_s);
@@ -41,8 +41,8 @@ static void hand_over(app_t *app)
     app->next_ready = true;
 }
 
-/* The shadow set as it is now: abort code. A set that was bad before may stay bad, or it could not be mended
- * one by one. */
+/* Abort code for the present shadow set. A set that was invalid before may stay invalid, otherwise it could
+ * not be repaired one value at a time. */
 static uint32_t check(app_t *app, bool was_bad)
 {
     const bool waited = app->next_ready;
@@ -58,13 +58,13 @@ static uint32_t check(app_t *app, bool was_bad)
     app->refused = false;
     app->restart = needs_restart(app);
     app->next_lost = false;
-    if (!app->restart) { /* else the drive keeps what the hardware has */
+    if (!app->restart) { /* else the drive keeps the values that the hardware has */
         hand_over(app);
     }
     return 0;
 }
 
-/* After a refusal, with the set as it was before: what waited to be taken is made again. */
+/* After a refusal, with the previous set: the configuration that was waiting is made again. */
 static void renew(app_t *app)
 {
     if (app->next_lost && make_next(app).ok) {

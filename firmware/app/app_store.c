@@ -1,4 +1,4 @@
-/* What is kept in flash: all objects that the dictionary marks as stored, by group. */
+/* Contents of flash: all objects that the dictionary marks as stored, by group. */
 #include <stddef.h>
 
 #include "firmware/app/app_parts.h"
@@ -82,7 +82,7 @@ void app_recall(app_t *app, od_kind_t kind)
 
 /* --- writing ----------------------------------------------------------------------------------------- */
 
-/* Where words go: to flash, or with hal NULL to memory. */
+/* Destination of words: flash, or with hal NULL memory. */
 typedef struct {
     hal_t *hal;
     uint32_t *memory;
@@ -104,8 +104,8 @@ static void put_words(sink_t *sink, const uint32_t words[], uint32_t count)
     sink->at += count;
 }
 
-/* What is to be in the new page: the present values of the groups wanted, and of the others what the old page
- * has. */
+/* Contents of the new page: the present values of the given groups, and those of the old page for the
+ * others. */
 typedef struct {
     const app_t *app; /* NULL: parameters alone */
     const drive_params_t *params;
@@ -213,7 +213,7 @@ bool app_save(hal_t *hal, const drive_params_t *params)
 static void rest_slow(app_t *app, bool rest)
 {
     hal_lock(app->hal);
-    app->slow_at = app->periods + (rest ? 0U : app->slow_divider); /* the former does not come for days */
+    app->slow_at = app->periods + (rest ? 0U : app->slow_divider); /* the former would take days */
     hal_unlock(app->hal);
 }
 

@@ -109,7 +109,7 @@ static const volatile int32_t *place_of(const app_t *app, const signal_row_t *ro
     return (const volatile int32_t *)(const volatile void *)&memory[row->offset];
 }
 
-/* Kept with a range of twice the base, resolution 2^-14 of it */
+/* Stored with a range of twice the base, resolution 2^-14 of it */
 bool trace_host_find(void *context, uint16_t index, uint8_t sub, trace_signal_t *signal)
 {
     const app_t *app = context;
@@ -133,8 +133,7 @@ bool trace_host_find(void *context, uint16_t index, uint8_t sub, trace_signal_t 
     return true;
 }
 
-/* --- torque: what the magnet gives, with the reluctance of the present i_d -------------------------------
- */
+/* --- torque of the magnet, with the reluctance torque of the present i_d ------------------------------- */
 
 static pm_num_t rated_torque(const app_t *app)
 {

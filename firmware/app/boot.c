@@ -1,4 +1,4 @@
-/* What happens once: parameters, hardware, a few words on the console. */
+/* Start-up: parameters, hardware, a few lines on the console. */
 #include "firmware/app/app.h"
 
 static const char *reset_text(hal_reset_t cause)
@@ -18,7 +18,7 @@ static const char *reset_text(hal_reset_t cause)
     }
 }
 
-/* At the start there is time to wait until the ring has room; no longer than this, should nobody send. */
+/* At start-up, waits until the ring has room; no longer than this if nobody empties it. */
 #define WAIT_US 50000U
 
 static void put(hal_t *hal, const char *text)
@@ -82,7 +82,7 @@ void app_boot(app_t *app, hal_t *hal)
     } else if (stored && app_ready(app) != APP_READY) {
         say(hal, "  ", "timer, dead time or clock are not what this board can do");
     } else {
-        /* nothing more to say */
+        /* no further message */
     }
     hal_start(hal, app);
 }

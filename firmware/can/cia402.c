@@ -52,7 +52,7 @@ static void enable(cia402_t *self)
     }
 }
 
-/* Operation is enabled, or a quick stop is under way, and voltage is to stay. */
+/* Operation is enabled, or a quick stop is in progress, and the bridge must stay on. */
 static void obey_running(cia402_t *self, uint16_t command)
 {
     const bool stopping = self->state == CIA402_QUICK_STOP_ACTIVE;
@@ -150,7 +150,7 @@ cia402_out_t cia402_step(cia402_t *self, const cia402_in_t *in)
     if (!cia402_on(self)) {
         self->active_mode = self->mode;
     }
-    /* a quick stop that does not stay lets the drive stop by itself */
+    /* after a quick stop option without staying, the drive stops by itself */
     out.enable = self->state == CIA402_OPERATION_ENABLED ||
                  (self->state == CIA402_QUICK_STOP_ACTIVE && self->quick_stop_option == OPTION_RAMP_AND_STAY);
     out.coast = !out.enable && self->state != CIA402_QUICK_STOP_ACTIVE && self->coast;

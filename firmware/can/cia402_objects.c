@@ -1,9 +1,9 @@
-/* Objects of the profile: what is set and shown of it. */
+/* Objects of the profile: settings and displayed values. */
 #include "firmware/can/cia402.h"
 #include "firmware/can/dictionary_slots.h"
 
 #define OK      0U
-#define INVALID 0x06090030U /* not one of the values that there are */
+#define INVALID 0x06090030U /* not a valid value */
 
 bool cia402_get(const cia402_t *self, uint16_t slot, int32_t *value)
 {

@@ -1,4 +1,4 @@
-/* Communication objects: which values make sense, and what follows from a new one. */
+/* Communication objects: which values are valid, and the effects of a new one. */
 #include "firmware/can/node_parts.h"
 
 #include <string.h>

@@ -56,7 +56,7 @@ static void queue(node_t *node, node_error_t source, uint32_t info)
     }
 }
 
-/* What found no room: in the end a master knows what is there, if not all that has been. */
+/* Errors that found no room: in the end the master has the present errors, if not every one in between. */
 static void catch_up(node_t *node)
 {
     for (uint32_t source = 0; source < (uint32_t)NODE_ERRORS; source++) {

@@ -1,4 +1,4 @@
-/* Heartbeat, given and watched. */
+/* Heartbeat, produced and consumed. */
 #include "firmware/can/node_parts.h"
 
 #define ID_HEARTBEAT 0x700U

@@ -136,7 +136,7 @@ static void receive_configuring(node_t *node, const uint8_t data[8])
                command == (uint8_t)LSS_STORE) {
         configure(node, data);
     } else {
-        /* nothing that it knows */
+        /* not supported */
     }
 }
 

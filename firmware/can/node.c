@@ -97,7 +97,7 @@ void node_init(node_t *node, void *context, uint32_t serial, uint32_t now_us)
     node->word[OD_NODE_IDENTITY_SERIAL_NUMBER] = serial;
 }
 
-/* What takes the controls from the master's hands is an alarm while the application is on. */
+/* Losing the master's control is an alarm while the application is on. */
 static void leave(node_t *node, node_nmt_t next)
 {
     const bool loses = next == NODE_STOPPED || node->nmt == NODE_OPERATIONAL;
@@ -108,7 +108,7 @@ static void leave(node_t *node, node_nmt_t next)
     node->nmt = next;
 }
 
-/* Two that obey the same commands: neither may be started, but by a reset of communication. */
+/* Two nodes with one id would obey the same commands: neither may start until communication is reset. */
 static void start(node_t *node)
 {
     if (node->nmt != NODE_OPERATIONAL && node->error[NODE_ERROR_COLLISION] == 0U) {
@@ -147,14 +147,14 @@ static void nmt_receive(node_t *node, const node_frame_t *frame)
     }
 }
 
-/* What only a node with this id sends: boot-up and heartbeat, answers of its SDO server. */
+/* Frames that only a node with this id sends: boot-up and heartbeat, responses of its SDO server. */
 static bool is_of_namesake(const node_t *node, const node_frame_t *frame)
 {
     return (frame->id == ID_HEARTBEAT + node->id && frame->length == 1U) ||
            (frame->id == ID_SDO_REPLY + node->id && frame->length == 8U);
 }
 
-/* A motor that runs is not stopped by what somebody plugs in. */
+/* A running motor is not stopped by a node that somebody connects. */
 static void collide(node_t *node)
 {
     node_error(node, NODE_ERROR_COLLISION, CODE_COLLISION, 0);

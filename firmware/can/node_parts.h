@@ -84,7 +84,7 @@ void heartbeat_run(node_t *node);
 
 /* emcy.c */
 void emcy_run(node_t *node);
-void emcy_forget(node_t *node); /* what waits to be told */
+void emcy_forget(node_t *node); /* clears the queued messages */
 
 /* pdo.c, pdo_transmit.c */
 uint32_t pdo_mappable(uint32_t mapping, bool receive);

@@ -40,14 +40,14 @@ typedef enum {
 typedef struct {
     node_sdo_state_t state;
     const od_entry_t *entry;
-    uint32_t size;      /* of an upload; of a download 0: not told */
-    uint32_t position;  /* bytes taken or given */
+    uint32_t size;      /* of an upload; of a download 0: unknown */
+    uint32_t position;  /* bytes transferred */
     uint32_t confirmed; /* block upload: bytes that the client has */
     uint32_t last_us;   /* of the client's last frame */
     uint16_t crc;
     uint8_t toggle; /* 0 or 0x10 */
     uint8_t block, sequence;
-    uint8_t held_count; /* block download: the last segment, whose length the end tells */
+    uint8_t held_count; /* block download: bytes of the last segment, whose length the end gives */
     bool with_crc, complete;
     uint8_t object[3]; /* index and sub-index as the client sent them */
     uint8_t number[4];
@@ -84,7 +84,7 @@ struct node {
     node_consumer_t consumer[NODE_CONSUMERS];
 
     uint16_t error[NODE_ERRORS]; /* code that is there; 0: none */
-    uint16_t told[NODE_ERRORS];  /* the same, as the messages say */
+    uint16_t told[NODE_ERRORS];  /* the same, as last sent in a message */
     node_emcy_t emcy[NODE_EMCY]; /* to be sent */
     uint8_t emcy_count;
     uint32_t emcy_last_us;

@@ -1,4 +1,4 @@
-/* Numbers of the dictionary, with every check that does not need to know what they mean. */
+/* Numbers of the dictionary, with every check that does not depend on their meaning. */
 #include "firmware/can/node_parts.h"
 
 #include <stddef.h>
@@ -40,7 +40,7 @@ int32_t object_preset(const node_t *node, const od_entry_t *entry)
     return (int32_t)((uint32_t)od_values_of(entry)->preset + relative);
 }
 
-/* A place of a PDO is shown as index, sub-index and bits of the object there. */
+/* A mapping of a PDO is reported as index, sub-index and bits of its object. */
 uint32_t object_node_word(const node_t *node, const od_entry_t *entry)
 {
     if (entry->slot < (uint32_t)OD_NODE_WORDS) {

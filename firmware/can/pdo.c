@@ -81,7 +81,7 @@ void pdo_start(node_t *node)
     }
 }
 
-/* A value that is refused leaves the old one, and the others are taken all the same. */
+/* A refused value leaves the old one; the others are applied all the same. */
 static void apply(node_t *node, const node_pdo_t *pdo)
 {
     uint32_t at = 0;

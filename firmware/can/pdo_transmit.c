@@ -4,7 +4,7 @@
 #include <string.h>
 
 #define TYPE_EVENT 254U  /* and above: no SYNC */
-#define SCAN_US    1000U /* between looks at values for a change */
+#define SCAN_US    1000U /* between checks of the values for a change */
 
 static void collect(node_t *node, const node_pdo_t *pdo, uint8_t data[8])
 {

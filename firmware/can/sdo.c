@@ -1,4 +1,4 @@
-/* SDO server: expedited and segmented transfers, and what block transfers share with them. */
+/* SDO server: expedited and segmented transfers, and functions shared with block transfers. */
 #include "firmware/can/node_parts.h"
 
 #include <string.h>
@@ -18,7 +18,7 @@ enum {
 #define TOGGLE     0x10U
 
 #define SERVER_UPLOAD           0x40U
-#define SERVER_EXPEDITED        0x43U /* upload, size told */
+#define SERVER_EXPEDITED        0x43U /* upload, size indicated */
 #define SERVER_DOWNLOAD         0x60U
 #define SERVER_DOWNLOAD_SEGMENT 0x20U
 #define SERVER_ABORT            0x80U

@@ -1,6 +1,6 @@
-/* SDO block transfers. Up: segments go out as the ring has room, and from the last confirmed one again when
- * the client has missed some. Down: each segment is held back until the next, since only the end tells how
- * many bytes of the last one count. */
+/* SDO block transfers. Upload: segments are sent as the ring has room, and repeated from the last confirmed
+ * one if the client missed some. Download: each segment is held back until the next, because only the end
+ * says how many bytes of the last one count. */
 #include "firmware/can/node_parts.h"
 
 #include <string.h>
@@ -9,7 +9,7 @@
 #define LAST        0x80U
 #define ABORT       0x80U
 #define BLOCK_MOST  127U
-#define ROOM_KEPT   4U /* in the ring, for what is more urgent */
+#define ROOM_KEPT   4U /* in the ring, for frames that are more urgent */
 #define UPLOAD      5U
 #define WITH_CRC    0x04U
 #define WITH_SIZE   0x02U
@@ -183,7 +183,8 @@ static uint32_t receive_segment(node_t *node, const uint8_t segment[8])
     if (sequence == 0U || sequence > sdo->block) {
         return SDO_SEQUENCE;
     }
-    if (sequence == (uint32_t)sdo->sequence + 1U) { /* else one before was lost: the client sends it again */
+    if (sequence ==
+        (uint32_t)sdo->sequence + 1U) { /* else an earlier one was lost: the client sends it again */
         if (sdo->held_count > 0U) {
             code = deliver_held(node, sdo->held_count, false);
         }

@@ -20,7 +20,7 @@ static inline void put(const trace_t *trace, int16_t *sample, uint32_t n)
     sample[n] = (int16_t)limited(*channel->source >> channel->shift);
 }
 
-/* Straight, as deep as there are signals; eight are none beside eight, so that every number is a case. */
+/* Straight-line code, entered at the number of signals. */
 static inline void take(const trace_t *trace, int16_t *sample)
 {
     switch (trace->count % TRACE_SIGNALS) {
@@ -57,7 +57,7 @@ static inline int32_t above(const trace_t *trace, const int16_t *sample)
     return sample[trace->trigger] - trace->level;
 }
 
-/* There is enough before the trigger, or after it. */
+/* Enough samples before the trigger, or after it. */
 static inline void advance(trace_t *trace, const int16_t *sample)
 {
     if (trace->state == TRACE_TRIGGERED) {

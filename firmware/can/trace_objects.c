@@ -1,4 +1,4 @@
-/* What is set and shown of the trace. */
+/* Settings and results of the trace. */
 #include <stddef.h>
 
 #include "firmware/can/dictionary_slots.h"
@@ -39,7 +39,7 @@ static uint32_t size_of(int32_t x)
     return x < 0 ? 0U - (uint32_t)x : (uint32_t)x;
 }
 
-/* Level in the unit of the signal to raw, bit by bit: a value beyond what can be kept is never crossed. */
+/* Level from the unit of the signal to raw, bit by bit: a value out of range is never crossed. */
 static int32_t raw_level(const trace_t *trace, const trace_signal_t *signal)
 {
     const uint32_t scale = signal->scale == 0 ? 1U : size_of(signal->scale);
@@ -114,7 +114,7 @@ static uint32_t arm(trace_t *trace)
     trace->falling = trace->edge == TRACE_FALLING ? -1 : 0;
     trace->divider = trace->set_divider;
     trace->state = TRACE_FILLING;
-    __atomic_signal_fence(__ATOMIC_RELEASE); /* the interrupt looks at this alone, so it comes last */
+    __atomic_signal_fence(__ATOMIC_RELEASE); /* the interrupt reads this alone, so it is written last */
     trace->countdown = 1;
     return OK;
 }

@@ -111,7 +111,7 @@ static void find(drive_t *drive)
     }
 }
 
-/* The end of the command ends it at once: there is no speed that the drive knows. */
+/* Withdrawing the command ends it at once: the speed is not known, so there is no ramp. */
 static void identify(drive_t *drive, bool enable)
 {
     commissioning_slow(drive);
@@ -197,7 +197,7 @@ static void move(drive_t *drive)
     }
 }
 
-/* Of a rotor that turns without current control nothing is known. */
+/* Nothing is known of a rotor that turns without current control. */
 static void report_nothing(drive_t *drive)
 {
     drive_status_t *s = &drive->status;

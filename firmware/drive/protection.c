@@ -69,8 +69,8 @@ void protection_slow(drive_t *drive)
     if (turning && pm_abs(omega) > PM_ONE) {
         drive_trip(drive, DRIVE_FAULT_OVER_SPEED);
     }
-    /* In open loop too, where the rotor can fall out of step, but for the ramp up to the speed from which the
-     * observer is believed; not in commissioning. */
+    /* Also in open loop, where the rotor can lose synchronism, except during the ramp up to the speed from
+     * which the observer's angle is used; not during identification. */
     const bool ramp = drive->led && open_loop_ramps(drive);
     const bool judged = drive->state >= DRIVE_RUNNING && drive->command.mode < DRIVE_MODE_CURRENT && !ramp;
     if (lasts(&drive->lost_ms, judged && drive->position.quality == 0, c->lost_ms)) {

@@ -85,7 +85,7 @@ void reference_vector(drive_t *drive)
         i_q = speed_control_step(&drive->speed, &c->speed, target, omega, i_min, i_max, &limited);
     }
     drive->status.limits |= limited ? DRIVE_LIMIT_CURRENT : 0U;
-    /* all at once it would upset an observer by as much as R and L are told wrong */
+    /* at once it would disturb an observer in proportion to the errors of R and L */
     drive->i_open -= drive->i_open / 16;
     drive->i_ref = (pm_dq_t){.d = flux_current(drive, i_q) + drive->i_open, .q = i_q};
     const pm_q_t injected = position_injected(&drive->position);

@@ -56,11 +56,12 @@ static void take_error(can_link_t *link, const struct can_frame *frame)
     } else if ((told & active) != 0U || (frame->can_id & CAN_ERR_RESTARTED) != 0U) {
         link->state = HAL_CAN_ACTIVE;
     } else {
-        /* says nothing of the state */
+        /* does not concern the state */
     }
 }
 
-/* A controller that was taken down and up again does not say that it has left bus-off; its frames do. */
+/* A controller that was taken down and up again does not report that it has left bus-off; its frames show it.
+ * */
 static void note_traffic(can_link_t *link)
 {
     if (link->state == HAL_CAN_BUS_OFF) {
@@ -84,7 +85,8 @@ static bool socket_receive(can_link_t *link, hal_can_frame_t *frame)
             /* not for us */
         }
     }
-    if (size < 0 && errno == ENODEV) { /* told once, when the adapter is unplugged; it does not come back */
+    if (size < 0 &&
+        errno == ENODEV) { /* reported once, when the adapter is unplugged; it does not come back */
         link->state = HAL_CAN_BUS_OFF;
     }
     return false;

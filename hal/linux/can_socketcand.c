@@ -14,7 +14,7 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Clients read the answer to < rawmode > with one call and take what else is in it for rubbish. */
+/* Clients read the response to < rawmode > with one call and discard whatever else is in it. */
 #define QUIET_S 0.02
 
 static bool refuse(char *error, size_t error_size, const char *address, const char *what)

@@ -20,7 +20,7 @@ bool hal_store_erase(hal_t *hal, uint32_t page)
     return !lost;
 }
 
-/* The bytes that were written, and noise in the rest of their double word. */
+/* The bytes that were written, and random data in the rest of their double word. */
 static void tear(uint8_t *unit, const uint8_t *data, uint32_t written)
 {
     for (uint32_t n = 0; n < UNIT; n++) {

@@ -6,7 +6,7 @@
 
 enum {
     COUNTS_LEAST = 2125, /* 40 kHz: the control interrupt needs its time */
-    COUNTS_SAFE = 4250,  /* instead of a refused number: everything else goes by this clock */
+    COUNTS_SAFE = 4250,  /* in place of a refused value: everything else is timed by this clock */
     DEAD_TIME_LEAST_ns = 300,
     BREAK_FILTER = 12, /* of BKF: 8 samples at 1/16 of the clock, 0.75 us */
     BREAK_LEVEL_MOST = 0x7FFF,
@@ -99,7 +99,7 @@ hal_status_t bridge_start(hal_t *hal, const hal_config_t *config)
     hal->legs = 0U;
     hal->bridge = reg_field(TIM_BDTR_DTG, dead_time) | TIM_BDTR_OSSI | TIM_BDTR_OSSR | TIM_BDTR_BKE |
                   TIM_BDTR_BKP | reg_field(TIM_BDTR_BKF, BREAK_FILTER);
-    /* Nothing but the main output enable can change after this, up to the next reset. */
+    /* After this only the main output enable can change, until the next reset. */
     TIM1.BDTR = hal->bridge | (status == HAL_OK ? reg_field(TIM_BDTR_LOCK, 2U) : 0U);
     return status;
 }
@@ -120,7 +120,7 @@ static uint32_t legs_of(const bool driven[])
 
 void hal_bridge_write(hal_t *hal, const drive_out_t *out)
 {
-    (void)hal; /* the address of the one there is costs less than keeping it */
+    (void)hal; /* the address of the only instance costs less than a stored pointer */
     TIM1.CCR1 = out->compare[0][0];
     TIM1.CCR2 = out->compare[1][0];
     TIM1.CCR3 = out->compare[2][0];

@@ -103,8 +103,7 @@ bool hal_can_send(hal_t *hal, const hal_can_frame_t *frame)
     return true;
 }
 
-/* The controller leaves the bus by itself; it returns after 128 times 11 recessive bits once it is asked to.
- */
+/* The controller leaves the bus by itself; it returns after 128 times 11 recessive bits once requested. */
 hal_can_state_t hal_can_state(const hal_t *hal)
 {
     (void)hal;

@@ -9,7 +9,7 @@ enum {
     WAIT_STATES = 4,
 };
 
-/* The wanted divider counts from the next update event on, which is made here. */
+/* The divider takes effect at the next update event, which is made here. */
 static void count_microseconds(uint32_t clock_MHz)
 {
     TIM2.PSC = clock_MHz - 1U;
@@ -60,7 +60,7 @@ static void start_pll(bool crystal)
     (void)clock_await(&RCC.CR, RCC_CR_PLLRDY, RCC_CR_PLLRDY, READY_US);
 }
 
-/* Above 80 MHz by way of half the speed, for 1 us at least. */
+/* Above 80 MHz through half the speed, for 1 us at least. */
 static void switch_to_pll(void)
 {
     PWR.CR5 &= ~PWR_CR5_R1MODE;

@@ -1,5 +1,5 @@
-/* What runs when: the vector table in startup.c names these. Legs are applied before anything else, so that
- * they change at the same instant of every period. */
+/* Interrupt handlers named in the vector table of startup.c. Leg states are applied before anything else, so
+ * that they change at the same instant of every period. */
 #include "hal/stm32g431/internal.h"
 #include "hal/stm32g431/registers/analog.h"
 #include "hal/stm32g431/registers/tim.h"

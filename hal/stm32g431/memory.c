@@ -1,4 +1,4 @@
-/* What the compiler calls to copy and to clear; nothing else of the C library is in the image. */
+/* Copy and clear functions that the compiler calls; nothing else of the C library is in the image. */
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>

@@ -1,5 +1,4 @@
-/* From reset to main(), and what happens when nothing else helps. No other file runs before memory is ready.
- */
+/* From reset to main(), and the last-resort handlers. No other file runs before memory is ready. */
 #include <stddef.h>
 
 #include "hal/stm32g431/internal.h"
@@ -28,8 +27,8 @@ int main(void);
 
 port_grave_t port_grave __attribute__((section(".noinit")));
 
-/* The bridge first, by one store that needs no stack; all else is frozen in that register. Then a fresh
- * stack: the old one may be what has failed, and nobody returns to it. */
+/* The bridge first, by one store that needs no stack; the other bits of that register are locked. Then a
+ * fresh stack: the old one may be the cause, and nobody returns to it. */
 __attribute__((naked)) static void fault_entry(void)
 {
     __asm volatile("movw r0, #:lower16:(TIM1 + 0x44)\n\t"
@@ -70,8 +69,8 @@ __attribute__((used)) void port_fault(const uint32_t *frame, uint32_t exception)
     port_bury(&words);
 }
 
-/* The crystal has stopped, or flash has read wrong. With the bridge off the latter is a page of the store
- * whose writing was cut short: no reason to end, as whoever reads it checks it. */
+/* The crystal has stopped, or flash has a read error. With the bridge off the latter is a page of the store
+ * whose writing was interrupted: no reason to stop, because the reader checks it. */
 void port_nmi(void)
 {
     const bool armed = (TIM1.BDTR & TIM_BDTR_MOE) != 0U;
@@ -134,7 +133,7 @@ typedef struct {
     bool execute;
 } region_t;
 
-/* Later ones win. What none covers, peripherals, is as the processor has it. */
+/* Later regions have priority. Uncovered addresses (peripherals) keep the processor's default attributes. */
 static void protect_memory(void)
 {
     const region_t regions[] = {

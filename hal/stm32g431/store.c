@@ -6,7 +6,7 @@ enum {
     FIRST_PAGE = 62, /* the last two of 64 */
     ERASE_US = 50000,
     WRITE_US = 1000,
-    PATIENCE_MS = 100, /* of the watchdog: the processor stands still while a page is erased */
+    PATIENCE_MS = 100, /* of the watchdog: the processor stalls while a page is erased */
     WATCHDOG_MS = 20,
 };
 

@@ -17,7 +17,7 @@ hal_t *hal_instance(void)
     return &port_hal;
 }
 
-/* Every internal reset also pulls the pin, so that the pin alone says something. */
+/* Every internal reset also pulls the pin, so the pin flag means a pin reset only if it is alone. */
 static hal_reset_t take_reset_cause(void)
 {
     const uint32_t cause = RCC.CSR;
@@ -40,7 +40,7 @@ void system_interrupt(uint32_t irq, uint8_t priority)
     NVIC.ISER[irq / 32U] = 1U << (irq % 32U);
 }
 
-/* What does not depend on the configuration, once: a refused one may be followed by another. */
+/* The part that does not depend on the configuration, once: a refused one may be followed by another. */
 static void start_once(hal_t *hal)
 {
     if (!hal->up) {
@@ -87,7 +87,7 @@ static void start_milliseconds(void)
 void hal_start(hal_t *hal, app_t *app)
 {
     hal->app = app;
-    DBGMCU.APB1FZR1 |= DBGMCU_APB1FZR1_IWDG; /* a breakpoint is no dead program */
+    DBGMCU.APB1FZR1 |= DBGMCU_APB1FZR1_IWDG; /* a breakpoint must not count as a hang */
     IWDG.KR = IWDG_KR_START;
     system_watchdog_period(WATCHDOG_MS);
     SCB.SHPR[SCB_SHPR_SYSTICK] = PORT_PRIO_MONITOR;
