@@ -68,4 +68,6 @@ void active_flux_tie(active_flux_t *self, const active_flux_config_t *config);
 void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in,
                       const obs_out_t *out, pm_q_t weight);
 
+void make_active_flux(maker_t *m, active_flux_config_t *c);
+
 #endif

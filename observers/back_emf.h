@@ -37,4 +37,6 @@ static inline void back_emf_tie(back_emf_t *self, const back_emf_config_t *confi
     (void)self, (void)config; /* no integrator that could drift */
 }
 
+void make_back_emf(maker_t *m, back_emf_config_t *c);
+
 #endif

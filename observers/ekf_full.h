@@ -64,4 +64,6 @@ void ekf_full_tie(ekf_full_t *self, const ekf_full_config_t *config);
 void ekf_full_slow(ekf_full_t *self, const ekf_full_config_t *config, const obs_in_t *in,
                    const obs_out_t *out, pm_q_t weight);
 
+void make_ekf_full(maker_t *m, ekf_full_config_t *c);
+
 #endif

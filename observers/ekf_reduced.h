@@ -63,4 +63,6 @@ void ekf_reduced_tie(ekf_reduced_t *self, const ekf_reduced_config_t *config);
 void ekf_reduced_slow(ekf_reduced_t *self, const ekf_reduced_config_t *config, const obs_in_t *in,
                       const obs_out_t *out, pm_q_t weight);
 
+void make_ekf_reduced(maker_t *m, ekf_reduced_config_t *c);
+
 #endif

@@ -124,4 +124,6 @@ static inline void emf_describe(const emf_t *self, pm_dq_t e, obs_out_t *out)
     out->vector.q = pm_shl(pm_mulh(e.q, self->rate), PM_Q_BITS - 19);
 }
 
+void make_emf(maker_t *m, emf_config_t *c);
+
 #endif

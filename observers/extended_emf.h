@@ -40,4 +40,6 @@ static inline void extended_emf_tie(extended_emf_t *self, const extended_emf_con
     (void)self, (void)config; /* no integrator that could drift */
 }
 
+void make_extended_emf(maker_t *m, extended_emf_config_t *c);
+
 #endif

@@ -40,4 +40,6 @@ static inline void extended_emf_ab_tie(extended_emf_ab_t *self, const extended_e
     (void)self, (void)config; /* no integrator that could drift */
 }
 
+void make_extended_emf_ab(maker_t *m, extended_emf_ab_config_t *c);
+
 #endif

@@ -38,4 +38,6 @@ void flux_linkage_tie(flux_linkage_t *self, const flux_linkage_config_t *config)
 void flux_linkage_slow(flux_linkage_t *self, const flux_linkage_config_t *config, const obs_in_t *in,
                        const obs_out_t *out, pm_q_t weight);
 
+void make_flux_linkage(maker_t *m, flux_linkage_config_t *c);
+
 #endif

@@ -28,6 +28,7 @@
 #define OBSERVERS_LOOP_H
 
 #include "firmware/math/pll.h"
+#include "firmware/params/types.h"
 
 typedef enum { LOOP_PLL, LOOP_ARCTANGENT, LOOP_SIMPLIFIED_EKF, LOOP_COUNT } loop_id_t;
 
@@ -51,5 +52,11 @@ void loop_slow(loop_t *self, const loop_config_t *config, pm_q_t weight);
 /* Its own part of the correction; returns what is left of eps for the PLL. */
 pm_q_t loop_eps(loop_t *self, const loop_config_t *config, pm_pll_t *pll, const pm_pll_config_t *gains,
                 pm_q_t eps);
+
+/* low: of the loop on a low-speed source; high: on an observer. */
+void make_loop(maker_t *m, loop_config_t *c, pm_pll_config_t *low, pm_pll_config_t *high);
+
+/* r / w_n of the simplified EKF, for makers. */
+#define LOOP_EKF_SHARE pm_num_ratio(7067, 10000)
 
 #endif

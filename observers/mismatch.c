@@ -7,7 +7,7 @@
 
 #if !PM_HAS(mismatch)
 
-/* Left out; config_mismatch.c refuses it. */
+/* Left out; mismatch_config.c refuses it. */
 pm_q_t mismatch_step(const mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
                      const mismatch_in_t *in, pm_q_t weight, pm_q_t eps)
 {

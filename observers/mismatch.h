@@ -98,4 +98,6 @@ pm_q_t mismatch_step(const mismatch_t *self, mismatch_window_t *window, const mi
 void mismatch_slow(mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
                    const observer_model_t *model, const mismatch_in_t *in);
 
+void make_mismatch(maker_t *m, mismatch_config_t *c);
+
 #endif

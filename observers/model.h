@@ -18,6 +18,7 @@
 #define OBSERVERS_MODEL_H
 
 #include "firmware/math/estimate.h"
+#include "firmware/params/types.h"
 
 typedef struct {
     pm_q_t R;

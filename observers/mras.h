@@ -68,4 +68,6 @@ static inline pm_q_t mras_relative(int32_t voltage, int32_t inverse)
     return pm_shl(pm_sat(pm_mulh(voltage, inverse), 20), PM_Q_BITS - 20);
 }
 
+void make_mras(maker_t *m, mras_config_t *c);
+
 #endif

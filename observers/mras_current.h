@@ -49,4 +49,6 @@ void mras_current_tie(mras_current_t *self, const mras_current_config_t *config)
 void mras_current_slow(mras_current_t *self, const mras_current_config_t *config, const obs_in_t *in,
                        const obs_out_t *out, pm_q_t weight);
 
+void make_mras_current(maker_t *m, mras_current_config_t *c);
+
 #endif

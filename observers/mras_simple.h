@@ -40,4 +40,6 @@ void mras_simple_tie(mras_simple_t *self, const mras_simple_config_t *config);
 void mras_simple_slow(mras_simple_t *self, const mras_simple_config_t *config, const obs_in_t *in,
                       const obs_out_t *out, pm_q_t weight);
 
+void make_mras_simple(maker_t *m, mras_simple_config_t *c);
+
 #endif

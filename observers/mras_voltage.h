@@ -44,4 +44,6 @@ void mras_voltage_tie(mras_voltage_t *self, const mras_voltage_config_t *config)
 void mras_voltage_slow(mras_voltage_t *self, const mras_voltage_config_t *config, const obs_in_t *in,
                        const obs_out_t *out, pm_q_t weight);
 
+void make_mras_voltage(maker_t *m, mras_voltage_config_t *c);
+
 #endif

@@ -81,4 +81,6 @@ static inline void observer_step(observer_t *self, const observer_config_t *conf
     }
 }
 
+void make_observer(maker_t *m, observer_config_t *c);
+
 #endif

@@ -27,6 +27,7 @@
 #define OBSERVERS_SECOND_HARMONIC_H
 
 #include "firmware/math/frames.h"
+#include "firmware/params/types.h"
 
 typedef enum {
     SECOND_HARMONIC_STAYS,
@@ -60,5 +61,7 @@ pm_q_t second_harmonic_step(second_harmonic_t *self, const second_harmonic_confi
 /* At 1 kHz. */
 void second_harmonic_slow(second_harmonic_t *self, const second_harmonic_config_t *config, pm_q_t omega,
                           pm_q_t weight);
+
+void make_second_harmonic(maker_t *m, second_harmonic_config_t *c);
 
 #endif

@@ -86,4 +86,6 @@ void sliding_mode_tie(sliding_mode_t *self, const sliding_mode_config_t *config)
 void sliding_mode_slow(sliding_mode_t *self, const sliding_mode_config_t *config, const obs_in_t *in,
                        const obs_out_t *out, pm_q_t weight);
 
+void make_sliding_mode(maker_t *m, sliding_mode_config_t *c);
+
 #endif

@@ -19,6 +19,7 @@
 
 #include "firmware/math/fixed.h"
 #include "firmware/math/frames.h"
+#include "firmware/params/types.h"
 
 #define SPEED_WINDOW 6U
 
@@ -61,5 +62,7 @@ static inline void speed_collect(speed_t *self, pm_q_t v_q)
 
 /* The first step gives the loop's speed. */
 pm_q_t speed_step(speed_t *self, const speed_config_t *config, const speed_in_t *in);
+
+void make_speed(maker_t *m, speed_config_t *c);
 
 #endif

@@ -24,6 +24,7 @@
 #include "firmware/can/node_state.h"
 #include "firmware/can/trace.h"
 #include "firmware/drive/drive_state.h"
+#include "firmware/params/parameters.h"
 #include "hal/hal.h"
 
 /* 8 kB: four signals, 20 kHz, 50 ms */

@@ -16,6 +16,7 @@
 
 #include "firmware/math/frames.h"
 #include "firmware/math/pi.h"
+#include "firmware/params/types.h"
 
 typedef struct {
     pm_pi_config_t d, q;
@@ -39,5 +40,7 @@ typedef struct {
 void current_control_reset(current_control_t *self, pm_dq_t v);
 void current_control_step(current_control_t *self, const current_control_config_t *config, pm_dq_t i,
                           pm_dq_t i_ref, pm_q_t omega, pm_q_t v_max, current_control_out_t *out);
+
+void make_current_control(maker_t *m, current_control_config_t *c);
 
 #endif

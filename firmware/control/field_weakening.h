@@ -8,6 +8,7 @@
 #define CONTROL_FIELD_WEAKENING_H
 
 #include "firmware/math/frames.h"
+#include "firmware/params/types.h"
 
 typedef struct {
     pm_frac_t k;  /* Q32, per call */
@@ -20,5 +21,7 @@ typedef struct {
 
 pm_q_t field_weakening_step(field_weakening_t *self, const field_weakening_config_t *config, pm_q_t v,
                             pm_q_t v_top);
+
+void make_field_weakening(maker_t *m, field_weakening_config_t *c);
 
 #endif

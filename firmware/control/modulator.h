@@ -17,6 +17,7 @@
 
 #include "firmware/math/frames.h"
 #include "firmware/math/root.h"
+#include "firmware/params/types.h"
 
 typedef struct {
     int32_t counts;     /* timer counts of half a period */
@@ -43,5 +44,7 @@ void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t 
 /* i_quarter: a quarter of the current, Q26. */
 void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
                     pm_ab_t i_quarter, modulator_out_t *out);
+
+void make_modulator(maker_t *m, modulator_config_t *c);
 
 #endif

@@ -10,6 +10,7 @@
 
 #include "firmware/math/frames.h"
 #include "firmware/math/pi.h"
+#include "firmware/params/types.h"
 
 typedef struct {
     pm_pi_config_t pi;  /* speed error -> i_q */
@@ -27,5 +28,7 @@ void speed_control_reset(speed_control_t *self, pm_q_t omega, pm_q_t i_q);
 /* i_min <= result <= i_max; *limited: one of them acts. */
 pm_q_t speed_control_step(speed_control_t *self, const speed_control_config_t *config, pm_q_t target,
                           pm_q_t omega, pm_q_t i_min, pm_q_t i_max, bool *limited);
+
+void make_speed_control(maker_t *m, speed_control_config_t *c);
 
 #endif

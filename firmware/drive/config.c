@@ -124,6 +124,14 @@ static void make_limits(maker_t *m, drive_config_t *config)
     config->dL = config->current.L_d - config->current.L_q;
 }
 
+/* What is beyond the range is refused by those who use it. */
+static pm_q_t i_d_rated(const maker_t *m, const mtpa_config_t *mtpa)
+{
+    int32_t i_rated;
+    (void)pm_num_to_fixed(pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i), Q_BITS, &i_rated);
+    return mtpa_i_d(mtpa, i_rated);
+}
+
 drive_result_t drive_configure(drive_config_t *config, const drive_params_t *params)
 {
     maker_t m = {.params = params, .result = {.ok = true, .param = DRIVE_PARAM_COUNT, .reason = "ok"}};
@@ -139,13 +147,13 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     config->injection = params->start_method % 2 == 1 || (params->start_method == 0 && salient(&m));
     config->align_first = !config->injection || params->start_method == 3;
     make_modulator(&m, &config->modulator);
-    make_current(&m, &config->current);
-    make_speed(&m, &config->speed);
-    make_mtpa(&m, &m.mtpa);
-    config->mtpa = m.mtpa;
-    make_flux_weakening(&m, &config->field_weakening);
+    make_current_control(&m, &config->current);
+    make_speed_control(&m, &config->speed);
+    make_mtpa(&m, &config->mtpa);
+    m.i_d_rated = i_d_rated(&m, &config->mtpa);
+    make_field_weakening(&m, &config->field_weakening);
     make_position(&m, &config->position, config->injection);
-    make_speed_estimate(&m, &config->speed_estimate);
+    make_speed(&m, &config->speed_estimate);
     config->speed_estimate.k_theta = config->position.pll_low.k_theta;
     config->position.special = config->position.second_harmonic.id != SECOND_HARMONIC_STAYS ||
                                config->position.mismatch.id != MISMATCH_OFF ||

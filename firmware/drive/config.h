@@ -10,21 +10,11 @@
 #include "firmware/control/modulator.h"
 #include "firmware/control/mtpa.h"
 #include "firmware/control/speed_control.h"
-#include "firmware/drive/parameters.h"
 #include "firmware/drive/position.h"
 #include "firmware/math/num.h"
+#include "firmware/params/types.h"
 #include "injection/initial_pulses.h"
 #include "observers/speed.h"
-
-/* Bases. A signal in SI is its per-unit value times the base. */
-typedef struct {
-    pm_num_t v;      /* V: full scale of the DC-link channel */
-    pm_num_t i;      /* A: full scale of the current channels */
-    pm_num_t omega;  /* rad/s electrical: over-speed limit */
-    pm_num_t psi;    /* Wb = v / omega */
-    pm_num_t torque; /* Nm = 1.5 P psi i */
-    pm_num_t t_s;    /* s: control period */
-} drive_base_t;
 
 typedef struct {
     int32_t i_trip_squared; /* Q24 */
@@ -75,12 +65,6 @@ typedef struct {
     pm_q_t psi_m;
     pm_q_t dL; /* L_d - L_q */
 } drive_config_t;
-
-typedef struct {
-    bool ok;
-    drive_param_id_t param; /* first parameter refused */
-    const char *reason;     /* static text */
-} drive_result_t;
 
 drive_result_t drive_configure(drive_config_t *config, const drive_params_t *params);
 

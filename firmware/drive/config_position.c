@@ -1,93 +1,6 @@
 /* Configuration of the position sources. */
 #include "firmware/drive/config_maker.h"
 
-static pm_pll_config_t make_gains(maker_t *m, pm_num_t kp, pm_num_t ki, drive_param_id_t bandwidth)
-{
-    const pm_num_t turns = pm_num_div(pm_num_mul(m->base.omega, m->base.t_s), PM_NUM_TWO_PI);
-    return (pm_pll_config_t){
-        .kp_turn = gain(m, pm_num_div(pm_num_mul(pm_num(4), kp), PM_NUM_TWO_PI), FRAC_BITS, bandwidth),
-        .ki = gain(m, ki, FRAC_BITS, bandwidth),
-        .k_theta = fixed(m, pm_num_mul(turns, pm_num(16)), 30, DRIVE_PARAM_speed_trip),
-    };
-}
-
-static pm_pll_config_t make_pll(maker_t *m, drive_param_id_t bandwidth)
-{
-    const pm_num_t w_n = angular(m, bandwidth);
-    const pm_num_t kp = mul3(pm_num_ratio(9, 5), w_n, m->base.t_s); /* zeta = 0.9 */
-    const pm_num_t ki = pm_num_div(pm_num_mul(square(w_n), m->base.t_s), m->base.omega);
-    return make_gains(m, kp, ki, bandwidth);
-}
-
-#define EKF_SHARE pm_num_ratio(7067, 10000)
-
-/* The simplified EKF with the noise of the PLL, r = 0.7067 w_n: 2 r T, 2 r^2 T, r^3 T^2. */
-static pm_pll_config_t make_ekf(maker_t *m, int32_t *k_acceleration)
-{
-    const pm_num_t r = pm_num_mul(EKF_SHARE, angular(m, DRIVE_PARAM_flux_bandwidth));
-    const pm_num_t step = pm_num_mul(r, m->base.t_s);
-    const pm_num_t jerk = pm_num_div(pm_num_mul(square(step), r), m->base.omega);
-    *k_acceleration = gain(m, jerk, 36, DRIVE_PARAM_flux_bandwidth);
-    const pm_num_t kp = pm_num_mul(pm_num(2), step);
-    return make_gains(m, kp, pm_num_div(pm_num_mul(kp, r), m->base.omega), DRIVE_PARAM_flux_bandwidth);
-}
-
-static void make_loop(maker_t *m, position_config_t *c)
-{
-    c->pll_low = make_pll(m, DRIVE_PARAM_injection_bandwidth);
-    c->pll_high = make_pll(m, DRIVE_PARAM_flux_bandwidth);
-    c->loop = (loop_config_t){.id = (loop_id_t)m->params->position_observer};
-    if (c->loop.id == LOOP_SIMPLIFIED_EKF) {
-        c->pll_high = make_ekf(m, &c->loop.k_acceleration);
-    }
-}
-
-/* Learns within 2 T / mu = 50 ms; the loop's gains as they act while the observer leads. */
-static void make_second_harmonic(maker_t *m, second_harmonic_config_t *c)
-{
-    const bool ekf = m->params->position_observer == (int32_t)LOOP_SIMPLIFIED_EKF;
-    const pm_num_t w_n = pm_num_div(angular(m, DRIVE_PARAM_flux_bandwidth), m->base.omega);
-    const pm_num_t r = pm_num_mul(EKF_SHARE, w_n);
-    const pm_num_t two = pm_num(2);
-    const pm_num_t k_p = ekf ? pm_num_mul(two, r) : pm_num_mul(pm_num_ratio(9, 5), w_n);
-    const pm_num_t k_i = ekf ? mul3(two, r, r) : square(w_n);
-    const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
-    *c = (second_harmonic_config_t){
-        .id = (second_harmonic_id_t)m->params->second_harmonic,
-        .mu = fixed(m, pm_num_mul(pm_num(40), m->base.t_s), FRAC_BITS, DRIVE_PARAM_f_pwm),
-        .k_p = fixed(m, k_p, Q_BITS, DRIVE_PARAM_flux_bandwidth),
-        .k_i = fixed(m, k_i, Q_BITS, DRIVE_PARAM_flux_bandwidth),
-        .k_1 = ekf ? fixed(m, mul3(r, r, r), Q_BITS, DRIVE_PARAM_flux_bandwidth) : 0,
-        .omega_least = fixed(m, w_n, Q_BITS, DRIVE_PARAM_flux_bandwidth) / 6,
-        .t_s = fixed(m, step, FRAC_BITS, DRIVE_PARAM_f_pwm),
-    };
-    if (c->id != SECOND_HARMONIC_STAYS && m->params->position_observer == (int32_t)LOOP_ARCTANGENT) {
-        refuse(m, DRIVE_PARAM_second_harmonic, "learns nothing behind the arctangent");
-    }
-}
-
-/* Difference over 6 ms, EMF ratio through 3 ms, their mean difference through 5 Hz. */
-void make_speed_estimate(maker_t *m, speed_config_t *c)
-{
-    const uint8_t window = 6;
-    const pm_num_t L_q = pm_num_div(si(m, DRIVE_PARAM_L_q), m->inductance);
-    const pm_num_t span = mul3(pm_num(window), m->t_slow, m->base.omega);
-    const pm_num_t corner = pm_num_mul(PM_NUM_TWO_PI, pm_num(5));
-    *c = (speed_config_t){
-        .id = (uint8_t)m->params->speed_estimator,
-        .window = window,
-        .turn_step = (uint16_t)m->slow_divider,
-        .R = per_unit(m, DRIVE_PARAM_R_s, m->impedance),
-        .L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance),
-        .psi_m = per_unit(m, DRIVE_PARAM_psi_m, m->base.psi),
-        .per_step = fixed(m, pm_num_ratio(16, (int32_t)m->slow_divider), GAIN_BITS, DRIVE_PARAM_f_pwm),
-        .rise = fixed(m, pm_num_div(L_q, pm_num_mul(m->t_slow, m->base.omega)), GAIN_BITS, DRIVE_PARAM_L_q),
-        .per_turn = fixed(m, pm_num_div(PM_NUM_TWO_PI, span), GAIN_BITS, DRIVE_PARAM_speed_trip),
-        .k_ratio = PM_FRAC(0.28),
-        .k_mean = fixed(m, pm_num_mul(corner, m->t_slow), FRAC_BITS, DRIVE_PARAM_f_pwm),
-    };
-}
-
 typedef struct {
     pm_num_t L_d, L_q, L_dq;
 } inductances_t;
@@ -207,7 +120,7 @@ void make_position(maker_t *m, position_config_t *c, bool injection)
     c->injection = injection;
     c->omega_low = speed(m, DRIVE_PARAM_speed_low);
     c->omega_high = speed(m, DRIVE_PARAM_speed_high);
-    make_loop(m, c);
+    make_loop(m, &c->loop, &c->pll_low, &c->pll_high);
     make_second_harmonic(m, &c->second_harmonic);
     make_mismatch(m, &c->mismatch);
     if (m->params->speed_high <= m->params->speed_low) {

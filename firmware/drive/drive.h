@@ -20,7 +20,6 @@
 
 #include "firmware/drive/config.h"
 #include "firmware/drive/fault.h"
-#include "firmware/drive/parameters.h"
 #include "firmware/math/frames.h"
 
 #define DRIVE_LEGS 3

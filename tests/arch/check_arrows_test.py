@@ -11,7 +11,9 @@ from check_arrows import check_tree  # noqa: E402
 CLEAN = {
     "firmware/math/fixed.h": "#include <stdint.h>\ntypedef int32_t pm_q_t; /* no float, no double */\n",
     "firmware/control/park.h": '#include "firmware/math/fixed.h"\n',
+    "firmware/params/maker.h": '#include "firmware/math/fixed.h"\n',
     "observers/active_flux.h": '#include "firmware/math/fixed.h"\n',
+    "observers/active_flux_config.c": '#include "firmware/params/maker.h"\n',
     "injection/pulsating.h": '#include "firmware/math/fixed.h"\n',
     "firmware/drive/drive.h": '#include "firmware/control/park.h"\n#include "observers/active_flux.h"\n',
     "firmware/app/main.c": '#include "firmware/drive/drive.h"\n#include "hal/hal.h"\n',
@@ -46,6 +48,7 @@ class Arrows(unittest.TestCase):
     def test_upwards(self):
         self.refused("firmware/math/x.c", '\n#include "firmware/control/park.h"\n', 2, "math", "control")
         self.refused("firmware/control/x.c", '#include "firmware/drive/drive.h"\n', 1, "control", "drive")
+        self.refused("firmware/params/x.h", '#include "observers/active_flux.h"\n', 1, "params", "observers")
         self.refused("observers/x.h", '/* why */\n\n# include "firmware/drive/drive.h"\n', 3, "observers", "drive")
 
     def test_sideways(self):

@@ -281,7 +281,7 @@ class Ledger(unittest.TestCase):
             project.replace("retired: []", "retired: [{index: 0x2100, sub: 1, name: pole_pairs, why: a test}]")
             files = generate.files(project.root)
             self.assertIn("2100:01 i32 10^0_1 pole_pairs\n", files[generate.LEDGER])
-            self.assertNotIn("pole_pairs", files["firmware/drive/parameters.def"])
+            self.assertNotIn("pole_pairs", files["firmware/params/parameters.def"])
 
     def test_place_given_again(self):
         with Project() as project:
@@ -345,7 +345,7 @@ class Made(unittest.TestCase):
         self.assertEqual(found, {place: first + n for n, place in enumerate(places)})
 
     def test_parameters_are_in_the_order_of_their_slots(self):
-        names = re.findall(r"^PM_PARAM\((\w+),", self.files["firmware/drive/parameters.def"], re.M)
+        names = re.findall(r"^PM_PARAM\((\w+),", self.files["firmware/params/parameters.def"], re.M)
         self.assertEqual(names, [entry.name for entry in self.dictionary.of("parameter")])
 
     def test_stored_values_fit_a_page(self):

@@ -99,7 +99,7 @@ class Names(unittest.TestCase):
             names.find("2100:FE")
 
     def test_select(self):
-        parameters = (ROOT / "firmware/drive/parameters.def").read_text().count("\nPM_PARAM(")
+        parameters = (ROOT / "firmware/params/parameters.def").read_text().count("\nPM_PARAM(")
         self.assertEqual(len(names.select([])), parameters)
         self.assertEqual({e.record for e in names.select(["machine", "R_s"])}, {"machine"})
 

@@ -26,7 +26,7 @@ def _environment():
 
 
 def _c_files(render, dictionary, sheet):
-    render("firmware/drive/parameters.def", "parameters.def.j2", objects=dictionary.objects)
+    render("firmware/params/parameters.def", "parameters.def.j2", objects=dictionary.objects)
     render("firmware/app/error_codes.def", "error_codes.def.j2", faults=dictionary.faults)
     render("firmware/can/dictionary_slots.h", "dictionary_slots.h.j2", words=[e for e in dictionary.of("node") if not model.is_mapping(e)],
            mappings=[e for e in dictionary.of("node") if model.is_mapping(e)], live=dictionary.of("live"), parameters=dictionary.of("parameter"),

@@ -1,6 +1,6 @@
 // The drive's parameters by name, in SI, as scenario and machine files give them.
 //
-// The table is the firmware's own (firmware/drive/parameters.def); a value becomes the decimal integer that
+// The table is the firmware's own (firmware/params/parameters.def); a value becomes the decimal integer that
 // the firmware stores. Refused: unknown names, values outside the table's range, values that fall between two
 // steps by more than 1 % of themselves (they would be stored as something else).
 // Tests: tests/unit/pmsim/drive_parameters_test.cpp.
@@ -14,7 +14,7 @@
 #include "tools/pmsim/yaml_reader.h"
 
 extern "C" {
-#include "firmware/drive/parameters.h"
+#include "firmware/params/parameters.h"
 }
 
 namespace pmsim

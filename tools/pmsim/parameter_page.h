@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "firmware/drive/parameters.h"
+#include "firmware/params/parameters.h"
 #include "firmware/params/store.h"
 
 /* Returns the number of words that are used; 0, with *refused and *reason, when the drive refuses one. */

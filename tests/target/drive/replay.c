@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "firmware/drive/drive_state.h"
+#include "firmware/params/parameters.h"
 #include "tools/pmsim/record_layout.h"
 
 /* Wrappers tell the modes apart; each adds its call, two instructions and its mark. */

@@ -7,6 +7,7 @@
 #include "firmware/drive/config.h"
 #include "firmware/math/pll.h"
 #include "firmware/math/trig.h"
+#include "firmware/params/parameters.h"
 
 typedef struct {
     pm_pll_t pll;

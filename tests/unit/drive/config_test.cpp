@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "firmware/params/parameters.h"
 #include "tests/contract/bench.h"
 #include "tests/unit/math/samples.h"
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "firmware/params/parameters.h"
 #include "tests/contract/bench.h"
 
 namespace direct

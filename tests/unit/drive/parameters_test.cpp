@@ -4,6 +4,7 @@
 #include <set>
 #include <string>
 
+#include "firmware/params/parameters.h"
 #include "tests/contract/firmware.h"
 
 namespace
@@ -36,7 +37,7 @@ TEST(Parameters, NamesAndMembersAreTheSame)
     EXPECT_EQ(std::string(drive_param_table[DRIVE_PARAM_##id].name), #id);                                   \
     p.id = 77;                                                                                               \
     EXPECT_EQ(drive_param_get(&p, DRIVE_PARAM_##id), 77) << #id;
-#include "firmware/drive/parameters.def"
+#include "firmware/params/parameters.def"
 #undef PM_PARAM
 }
 

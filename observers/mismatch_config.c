@@ -1,6 +1,7 @@
-/* Configuration of the correction of wrong parameters. */
-#include "firmware/drive/config_maker.h"
+#include "observers/mismatch.h"
+
 #include "firmware/math/image.h"
+#include "firmware/params/maker.h"
 
 #if !PM_HAS(mismatch)
 

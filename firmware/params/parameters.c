@@ -1,22 +1,22 @@
-#include "firmware/drive/parameters.h"
+#include "firmware/params/parameters.h"
 
 #include <string.h>
 
 const drive_param_info_t drive_param_table[DRIVE_PARAM_COUNT] = {
 #define PM_PARAM(name, unit, exp10, min, def, max, help) {#name, min, def, max},
-#include "firmware/drive/parameters.def"
+#include "firmware/params/parameters.def"
 #undef PM_PARAM
 };
 
 const int8_t drive_param_exp10[DRIVE_PARAM_COUNT] = {
 #define PM_PARAM(name, unit, exp10, min, def, max, help) exp10,
-#include "firmware/drive/parameters.def"
+#include "firmware/params/parameters.def"
 #undef PM_PARAM
 };
 
 const drive_param_text_t drive_param_text[DRIVE_PARAM_COUNT] = {
 #define PM_PARAM(name, unit, exp10, min, def, max, help) {unit, help},
-#include "firmware/drive/parameters.def"
+#include "firmware/params/parameters.def"
 #undef PM_PARAM
 };
 

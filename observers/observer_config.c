@@ -1,6 +1,6 @@
-/* The observer that the parameters name. */
-#include "firmware/drive/config_maker.h"
 #include "firmware/math/image.h"
+#include "firmware/params/maker.h"
+#include "observers/observer.h"
 
 void make_observer(maker_t *m, observer_config_t *c)
 {

@@ -1,26 +1,30 @@
 /* Parameters of the drive in SI decimals: one table, from which the per-unit configuration is made
- * (config.h).
+ * (drive/config.h).
  *
  * drive_params_t holds one int32 per parameter; drive_param_table describes them in the same order. A value
  * outside its range, or a combination that cannot be, is refused by drive_configure(), which names it.
  * Tests: tests/unit/drive/parameters_test.cpp. */
-#ifndef DRIVE_PARAMETERS_H
-#define DRIVE_PARAMETERS_H
+#ifndef PARAMS_PARAMETERS_H
+#define PARAMS_PARAMETERS_H
 
-#include <stdint.h>
+#include "firmware/params/types.h"
 
-typedef struct {
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+struct drive_params {
 #define PM_PARAM(name, unit, exp10, min, def, max, help) int32_t name;
-#include "firmware/drive/parameters.def"
+#include "firmware/params/parameters.def"
 #undef PM_PARAM
-} drive_params_t;
+};
 
-typedef enum {
+enum {
 #define PM_PARAM(name, unit, exp10, min, def, max, help) DRIVE_PARAM_##name,
-#include "firmware/drive/parameters.def"
+#include "firmware/params/parameters.def"
 #undef PM_PARAM
     DRIVE_PARAM_COUNT
-} drive_param_id_t;
+};
 
 typedef struct {
     const char *name;
@@ -41,5 +45,9 @@ extern const drive_param_text_t drive_param_text[DRIVE_PARAM_COUNT];
 void drive_params_default(drive_params_t *params);
 int32_t drive_param_get(const drive_params_t *params, drive_param_id_t id);
 void drive_param_set(drive_params_t *params, drive_param_id_t id, int32_t value); /* range is checked later */
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

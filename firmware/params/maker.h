@@ -1,0 +1,99 @@
+/* What the configuration of a method is made with, from SI parameters: for *_config.c, the makers.
+ *
+ * A maker stands beside its method, x_config.c beside x.c, and is declared in x.h:
+ *   void make_x(maker_t *m, x_config_t *c);
+ * With these few words its formulas read as they stand in the literature. A value that does not fit its
+ * format refuses the parameter that made it. Not for the control path; the build makes *_config.c small. */
+#ifndef PARAMS_MAKER_H
+#define PARAMS_MAKER_H
+
+#include "firmware/math/fixed.h"
+#include "firmware/params/parameters.h"
+
+/* Formats of fixed.h. */
+#define Q_BITS     28
+#define FRAC_BITS  32
+#define GAIN_BITS  26
+#define UNIT_BITS  31
+#define SMALL_BITS 20
+
+struct maker {
+    const drive_params_t *params;
+    drive_base_t base;
+    pm_num_t impedance, inductance; /* bases */
+    uint32_t slow_divider;          /* periods per slow step: the nearest to 1 ms ... */
+    pm_num_t t_slow;                /* ... and what that is, s */
+    pm_q_t i_d_rated;               /* of maximum torque per ampere at rated current */
+    drive_result_t result;
+};
+
+/* The first refusal counts. */
+static inline void refuse(maker_t *m, drive_param_id_t id, const char *reason)
+{
+    if (m->result.ok) {
+        m->result = (drive_result_t){.ok = false, .param = id, .reason = reason};
+    }
+}
+
+static inline pm_num_t si(const maker_t *m, drive_param_id_t id)
+{
+    return pm_num_dec(drive_param_get(m->params, id), drive_param_exp10[id]);
+}
+
+static inline int32_t fixed(maker_t *m, pm_num_t x, int bits, drive_param_id_t blame)
+{
+    int32_t out;
+    if (!pm_num_to_fixed(x, bits, &out)) {
+        refuse(m, blame, "beyond the fixed-point range with these bases");
+    }
+    return out;
+}
+
+/* A gain that must not round to nothing. */
+static inline int32_t gain(maker_t *m, pm_num_t x, int bits, drive_param_id_t blame)
+{
+    const int32_t out = fixed(m, x, bits, blame);
+    if (out <= 0) {
+        refuse(m, blame, "gives a gain of zero with these bases");
+    }
+    return out;
+}
+
+static inline pm_num_t mul3(pm_num_t a, pm_num_t b, pm_num_t c)
+{
+    return pm_num_mul(pm_num_mul(a, b), c);
+}
+
+static inline pm_num_t square(pm_num_t x)
+{
+    return pm_num_mul(x, x);
+}
+
+static inline pm_num_t least(pm_num_t a, pm_num_t b)
+{
+    return pm_num_cmp(a, b) < 0 ? a : b;
+}
+
+/* A parameter over its base as a signal. */
+static inline pm_q_t per_unit(maker_t *m, drive_param_id_t id, pm_num_t base)
+{
+    return fixed(m, pm_num_div(si(m, id), base), Q_BITS, id);
+}
+
+static inline pm_num_t pole_pairs(const maker_t *m)
+{
+    return pm_num(m->params->pole_pairs);
+}
+
+/* Mechanical speed parameter as per-unit electrical speed. */
+static inline pm_q_t speed(maker_t *m, drive_param_id_t id)
+{
+    return fixed(m, pm_num_div(pm_num_mul(si(m, id), pole_pairs(m)), m->base.omega), Q_BITS, id);
+}
+
+static inline pm_num_t angular(const maker_t *m, drive_param_id_t id)
+{
+    return pm_num_mul(PM_NUM_TWO_PI, si(m, id));
+}
+
+#endif

@@ -1,0 +1,28 @@
+#include "observers/second_harmonic.h"
+
+#include "firmware/params/maker.h"
+#include "observers/loop.h"
+
+/* Learns within 2 T / mu = 50 ms; the loop's gains as they act while the observer leads. */
+void make_second_harmonic(maker_t *m, second_harmonic_config_t *c)
+{
+    const bool ekf = m->params->position_observer == (int32_t)LOOP_SIMPLIFIED_EKF;
+    const pm_num_t w_n = pm_num_div(angular(m, DRIVE_PARAM_flux_bandwidth), m->base.omega);
+    const pm_num_t r = pm_num_mul(LOOP_EKF_SHARE, w_n);
+    const pm_num_t two = pm_num(2);
+    const pm_num_t k_p = ekf ? pm_num_mul(two, r) : pm_num_mul(pm_num_ratio(9, 5), w_n);
+    const pm_num_t k_i = ekf ? mul3(two, r, r) : square(w_n);
+    const pm_num_t step = pm_num_mul(m->base.t_s, m->base.omega);
+    *c = (second_harmonic_config_t){
+        .id = (second_harmonic_id_t)m->params->second_harmonic,
+        .mu = fixed(m, pm_num_mul(pm_num(40), m->base.t_s), FRAC_BITS, DRIVE_PARAM_f_pwm),
+        .k_p = fixed(m, k_p, Q_BITS, DRIVE_PARAM_flux_bandwidth),
+        .k_i = fixed(m, k_i, Q_BITS, DRIVE_PARAM_flux_bandwidth),
+        .k_1 = ekf ? fixed(m, mul3(r, r, r), Q_BITS, DRIVE_PARAM_flux_bandwidth) : 0,
+        .omega_least = fixed(m, w_n, Q_BITS, DRIVE_PARAM_flux_bandwidth) / 6,
+        .t_s = fixed(m, step, FRAC_BITS, DRIVE_PARAM_f_pwm),
+    };
+    if (c->id != SECOND_HARMONIC_STAYS && m->params->position_observer == (int32_t)LOOP_ARCTANGENT) {
+        refuse(m, DRIVE_PARAM_second_harmonic, "learns nothing behind the arctangent");
+    }
+}
