@@ -6,7 +6,9 @@
 
 #include <stddef.h>
 
+#ifndef INLINE /* builds with sanitizers, which make a minute's work of it, leave it to the compiler */
 #define INLINE static inline __attribute__((always_inline))
+#endif
 
 /* Constants, where a function is to be compiled for them. */
 typedef struct {

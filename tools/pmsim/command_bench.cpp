@@ -1,8 +1,7 @@
 #include <chrono>
 #include <cstdio>
 
-#include <CLI/CLI.hpp>
-
+#include "tools/pmsim/command_line.h"
 #include "tools/pmsim/commands.h"
 #include "tools/pmsim/loop.h"
 #include "tools/pmsim/machine_file.h"
@@ -102,17 +101,17 @@ void bench_six_legs(int repeat)
 
 } // namespace
 
-void add_bench_command(CLI::App &app)
+void add_bench_command(Command &app)
 {
-    CLI::App *command = app.add_subcommand("bench", "Measure simulated seconds per wall second");
+    Command *command = app.add_subcommand("bench", "Measure simulated seconds per wall second");
     auto options = std::make_shared<Options>();
-    const CLI::Option *scenario =
+    const Option *scenario =
         command->add_option("scenario", options->scenario, "scenario file; of a sweep, its first run")
-            ->capture_default_str();
-    command->add_option("--set", options->settings, settings_help())->allow_extra_args(false);
+            ->show_default();
+    command->add_option("--set", options->settings, settings_help())->one_each();
     command->add_option("--repeat", options->repeat, "goes, of which the fastest counts")
-        ->check(CLI::PositiveNumber)
-        ->capture_default_str();
+        ->positive()
+        ->show_default();
     command->footer(
         "Plant and drive alone replay the recorded run, so that each does the same work as in it. Without\n"
         "scenario and settings the machines with six legs follow, plant alone.\n\n"

@@ -3,9 +3,9 @@
 #include <cstring>
 #include <filesystem>
 
-#include <CLI/CLI.hpp>
 #include <unistd.h>
 
+#include "tools/pmsim/command_line.h"
 #include "tools/pmsim/commands.h"
 #include "tools/pmsim/yaml_reader.h"
 
@@ -41,13 +41,11 @@ void start(const std::vector<std::string> &words)
 
 } // namespace
 
-void add_board_command(CLI::App &app)
+void add_board_command(Command &app)
 {
-    CLI::App *command = app.add_subcommand(
+    Command *command = app.add_subcommand(
         "board", "Run a scenario on the emulated board: the flashed image closed on the plant");
-    command->prefix_command();
-    command->set_help_flag(); // pmsim-board has its own
-    command->callback([command] { start(command->remaining()); });
+    command->pass_words(start); // pmsim-board has its own help
 }
 
 } // namespace pmsim

@@ -1,7 +1,6 @@
 #include <cstdio>
 
-#include <CLI/CLI.hpp>
-
+#include "tools/pmsim/command_line.h"
 #include "tools/pmsim/commands.h"
 #include "tools/pmsim/methods.h"
 
@@ -26,9 +25,9 @@ static void print_methods(bool implemented_only)
     std::printf("%zu of %zu implemented\n", count, methods().size());
 }
 
-void add_methods_command(CLI::App &app)
+void add_methods_command(Command &app)
 {
-    CLI::App *command =
+    Command *command =
         app.add_subcommand("methods", "Print every method of the book: is it here, what selects it");
     auto implemented_only = std::make_shared<bool>(false);
     command->add_flag("--implemented", *implemented_only, "leave out what is not yet here");

@@ -1,7 +1,6 @@
 #include <memory>
 
-#include <CLI/CLI.hpp>
-
+#include "tools/pmsim/command_line.h"
 #include "tools/pmsim/commands.h"
 #include "tools/pmsim/node_command.h"
 #include "tools/pmsim/settings_option.h"
@@ -9,14 +8,14 @@
 namespace pmsim
 {
 
-void add_node_command(CLI::App &app, int &exit_code)
+void add_node_command(Command &app, int &exit_code)
 {
-    CLI::App *command =
+    Command *command =
         app.add_subcommand("node", "A drive and its motor as a live node on a CAN bus, in real time");
     auto options = std::make_shared<NodeOptions>();
     command->add_option("scenario", options->scenario, "scenario file (YAML): machine, load, temperatures")
         ->required();
-    command->add_option("--set", options->settings, settings_help())->allow_extra_args(false);
+    command->add_option("--set", options->settings, settings_help())->one_each();
     add_node_options(*command, *options);
     command->get_option("--can")->required();
     command->add_flag("--quiet", options->quiet, "no live line");

@@ -2,8 +2,7 @@
 #include <fstream>
 #include <memory>
 
-#include <CLI/CLI.hpp>
-
+#include "tools/pmsim/command_line.h"
 #include "tools/pmsim/commands.h"
 #include "tools/pmsim/drive_parameters.h"
 #include "tools/pmsim/machine_file.h"
@@ -68,15 +67,15 @@ static void print_metrics()
     }
 }
 
-void add_params_command(CLI::App &app)
+void add_params_command(Command &app)
 {
-    CLI::App *command =
+    Command *command =
         app.add_subcommand("params", "Print the drive's parameters: name, unit, range, default, help; or "
                                      "make the page of them that a board is given");
     auto options = std::make_shared<PageOptions>();
-    CLI::Option *machine =
+    Option *machine =
         command->add_option("--machine", options->machine, "machine file whose parameters to take");
-    command->add_option("--set", options->settings, settings_help())->allow_extra_args(false)->needs(machine);
+    command->add_option("--set", options->settings, settings_help())->one_each()->needs(machine);
     command->add_option("--page", options->page, "write them as a page of the board's parameter store")
         ->needs(machine);
     command->footer("These names go into `drive:` of machine and scenario files and after --set, in SI.\n\n"
@@ -92,7 +91,7 @@ void add_params_command(CLI::App &app)
     });
 }
 
-void add_metrics_command(CLI::App &app)
+void add_metrics_command(Command &app)
 {
     app.add_subcommand("metrics", "Print what a scenario's `expect:` can ask for")->callback(print_metrics);
 }

@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <fstream>
 
-#include <CLI/CLI.hpp>
 #include <unistd.h>
 
+#include "tools/pmsim/command_line.h"
 #include "tools/pmsim/commands.h"
 #include "tools/pmsim/notes.h"
 #include "tools/pmsim/plant_run.h"
@@ -101,9 +101,9 @@ void run(const Options &options)
 
 } // namespace
 
-void add_plant_command(CLI::App &app)
+void add_plant_command(Command &app)
 {
-    CLI::App *command = app.add_subcommand(
+    Command *command = app.add_subcommand(
         "plant", "Run a machine alone, on given phase voltages (no firmware, no inverter)");
     auto options = std::make_shared<Options>();
     command
@@ -112,7 +112,7 @@ void add_plant_command(CLI::App &app)
         ->required();
     command->add_option("--input", options->input, "CSV file: what is applied")->required();
     command->add_option("--out", options->out, "CSV file to write: what the machine does")->required();
-    command->add_option("--set", options->settings, settings_help())->allow_extra_args(false);
+    command->add_option("--set", options->settings, settings_help())->one_each();
     command->footer(
         "Input columns, in any order: t_s, va_V, vb_V, vc_V, held from each row to the next (two sets and\n"
         "open windings also vx_V, vy_V, vz_V); optional load_Nm, held too, and omega_mech_rad_s, a speed "

@@ -1,7 +1,6 @@
 #include <iostream>
 
-#include <CLI/CLI.hpp>
-
+#include "tools/pmsim/command_line.h"
 #include "tools/pmsim/commands.h"
 #include "tools/pmsim/loop.h"
 #include "tools/pmsim/notes.h"
@@ -35,15 +34,15 @@ void record(const Options &options)
 
 } // namespace
 
-void add_record_command(CLI::App &app)
+void add_record_command(Command &app)
 {
-    CLI::App *command =
+    Command *command =
         app.add_subcommand("record", "Record what goes into the drive and comes out, to replay it elsewhere");
     auto options = std::make_shared<Options>();
     command->add_option("scenario", options->scenario, "scenario file (YAML)")->required();
     command->add_option("--out", options->out, "file to write; format: tools/pmsim/record.h")->required();
     command->add_option("--periods", options->periods, "stop after this many control periods");
-    command->add_option("--set", options->settings, settings_help())->allow_extra_args(false);
+    command->add_option("--set", options->settings, settings_help())->one_each();
     command->footer(
         "The record holds converter codes, commands and timer counts of every control period, so a\n"
         "target that replays it must give the same bits.\n\n"

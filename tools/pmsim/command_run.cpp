@@ -1,16 +1,15 @@
 #include <memory>
 
-#include <CLI/CLI.hpp>
-
+#include "tools/pmsim/command_line.h"
 #include "tools/pmsim/commands.h"
 #include "tools/pmsim/run_command.h"
 
 namespace pmsim
 {
 
-void add_run_command(CLI::App &app, int &exit_code)
+void add_run_command(Command &app, int &exit_code)
 {
-    CLI::App *command = app.add_subcommand("run", "Run a scenario: the drive's firmware closed on the plant");
+    Command *command = app.add_subcommand("run", "Run a scenario: the drive's firmware closed on the plant");
     auto options = std::make_shared<RunOptions>();
     add_run_options(*command, *options);
     command->footer(

@@ -3,23 +3,20 @@
 #ifndef PMSIM_COMMANDS_H
 #define PMSIM_COMMANDS_H
 
-namespace CLI
-{
-class App;
-}
-
 namespace pmsim
 {
 
-void add_run_command(CLI::App &app, int &exit_code);
-void add_board_command(CLI::App &app);
-void add_plant_command(CLI::App &app);
-void add_node_command(CLI::App &app, int &exit_code);
-void add_params_command(CLI::App &app);
-void add_metrics_command(CLI::App &app);
-void add_methods_command(CLI::App &app);
-void add_bench_command(CLI::App &app);
-void add_record_command(CLI::App &app);
+class Command;
+
+void add_run_command(Command &app, int &exit_code);
+void add_board_command(Command &app);
+void add_plant_command(Command &app);
+void add_node_command(Command &app, int &exit_code);
+void add_params_command(Command &app);
+void add_metrics_command(Command &app);
+void add_methods_command(Command &app);
+void add_bench_command(Command &app);
+void add_record_command(Command &app);
 
 } // namespace pmsim
 

@@ -2,15 +2,14 @@
 #include <exception>
 #include <iostream>
 
-#include <CLI/CLI.hpp>
-
+#include "tools/pmsim/command_line.h"
 #include "tools/pmsim/commands.h"
 #include "tools/pmsim/yaml_reader.h"
 
 int main(int argc, char **argv)
 {
-    CLI::App app("pmsim: the drive's firmware, bit for bit, on a simulated motor and inverter.");
-    app.require_subcommand(1);
+    pmsim::CommandLine app("pmsim: the drive's firmware, bit for bit, on a simulated motor and inverter.");
+    app.require_subcommand();
     app.footer("`pmsim COMMAND --help` explains a command. File formats: docs/pmsim.md");
     int exit_code = 0;
     pmsim::add_run_command(app, exit_code);
@@ -23,9 +22,9 @@ int main(int argc, char **argv)
     pmsim::add_bench_command(app);
     pmsim::add_record_command(app);
     try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError &error) {
-        return app.exit(error) == 0 ? 0 : 2;
+        if (const std::optional<int> code = app.parse(argc, argv)) {
+            return *code;
+        }
     } catch (const std::exception &error) {
         std::cerr << "pmsim: " << error.what() << '\n';
         return 2;

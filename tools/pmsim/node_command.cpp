@@ -8,8 +8,7 @@
 #include <memory>
 #include <thread>
 
-#include <CLI/CLI.hpp>
-
+#include "tools/pmsim/command_line.h"
 #include "tools/pmsim/loop.h"
 #include "tools/pmsim/node_lines.h"
 #include "tools/pmsim/node_log.h"
@@ -183,7 +182,7 @@ int run_node(const NodeOptions &options)
     return 0;
 }
 
-void add_node_options(CLI::App &command, NodeOptions &options)
+void add_node_options(Command &command, NodeOptions &options)
 {
     command.add_option(
         "--can", options.can,
@@ -194,8 +193,7 @@ void add_node_options(CLI::App &command, NodeOptions &options)
     command.add_option(
         "--gpio-fault", options.gpio_fault,
         "CHIP:LINE[!]: once active, this line holds the bridge off until the enable line has been off");
-    command.add_option("--duration", options.duration_s, "seconds; default: until interrupted")
-        ->check(CLI::PositiveNumber);
+    command.add_option("--duration", options.duration_s, "seconds; default: until interrupted")->positive();
 }
 
 } // namespace pmsim

@@ -5,13 +5,10 @@
 #include <string>
 #include <vector>
 
-namespace CLI
-{
-class App;
-}
-
 namespace pmsim
 {
+
+class Command;
 
 struct NodeOptions {
     std::string scenario, can, gpio_enable, gpio_fault;
@@ -20,7 +17,7 @@ struct NodeOptions {
     bool quiet = false;
 };
 
-void add_node_options(CLI::App &command, NodeOptions &options); // but the scenario and the settings
+void add_node_options(Command &command, NodeOptions &options); // but the scenario and the settings
 
 // Returns when the time is over or the user has interrupted.
 int run_node(const NodeOptions &options);

@@ -5,9 +5,9 @@
 #include <fstream>
 #include <iostream>
 
-#include <CLI/CLI.hpp>
 #include <unistd.h>
 
+#include "tools/pmsim/command_line.h"
 #include "tools/pmsim/notes.h"
 #include "tools/pmsim/report.h"
 #include "tools/pmsim/settings_option.h"
@@ -49,16 +49,16 @@ std::string timing_line(const ScenarioFile &file, double simulated_s, double wal
 
 } // namespace
 
-void add_run_options(CLI::App &command, RunOptions &options)
+void add_run_options(Command &command, RunOptions &options)
 {
     command.add_option("scenario", options.scenario, "scenario file (YAML)")->required();
-    command.add_option("--set", options.settings, settings_help())->allow_extra_args(false);
+    command.add_option("--set", options.settings, settings_help())->one_each();
     command.add_option("--out", options.out,
                        "folder for trace.csv, summary.txt and, with a sweep, runs.csv; the trace shows the "
                        "worst run");
     command.add_option("--decimate", options.decimate,
                        "one trace row every N periods (default: at most 20000 rows)");
-    command.add_option("--jobs", options.jobs, "runs of a sweep at the same time")->capture_default_str();
+    command.add_option("--jobs", options.jobs, "runs of a sweep at the same time")->show_default();
     command.add_flag("--quiet", options.quiet, "expectations only, no progress");
     command.add_flag("--json", options.json, "result as JSON on standard output");
 }

@@ -6,13 +6,10 @@
 #include <string>
 #include <vector>
 
-namespace CLI
-{
-class App;
-}
-
 namespace pmsim
 {
+
+class Command;
 
 struct RunOptions {
     std::string scenario, out;
@@ -22,7 +19,7 @@ struct RunOptions {
     bool quiet = false, json = false;
 };
 
-void add_run_options(CLI::App &command, RunOptions &options);
+void add_run_options(Command &command, RunOptions &options);
 
 // Runs, prints the expectations, writes files. Exit code: 0 all pass, 1 an expectation fails.
 int run_and_report(const RunOptions &options);

@@ -6,8 +6,7 @@
 #include <iostream>
 #include <map>
 
-#include <CLI/CLI.hpp>
-
+#include "tools/pmsim/command_line.h"
 #include "tools/pmsim/node_command.h"
 #include "tools/pmsim/run_command.h"
 #include "tools/pmsim/yaml_reader.h"
@@ -23,7 +22,7 @@ using namespace pmsim;
 struct BoardOptions {
     std::string image, figures, last;
     std::vector<std::string> limits;
-    bus_noise_kind_t load = BUS_QUIET;
+    int load = BUS_QUIET; // a bus_noise_kind_t
     double console_s = 0.0;
     int gdb_port = -1;
     bool busy = false;
@@ -69,7 +68,7 @@ int run(RunOptions options, const BoardOptions &board, NodeOptions node)
         throw InputError("a scenario is wanted, or --console SECONDS");
     }
     rig_board_image(board.image.c_str(), !node.can.empty());
-    rig_board_bus_load(board.load);
+    rig_board_bus_load(static_cast<bus_noise_kind_t>(board.load));
     if (board.busy) {
         rig_board_busy();
     }
@@ -102,7 +101,7 @@ int run(RunOptions options, const BoardOptions &board, NodeOptions node)
 
 int main(int argc, char **argv)
 {
-    CLI::App app(
+    CommandLine app(
         "pmsim board: the flashed image, unmodified, on an emulated drive board closed on the plant.");
     app.name("pmsim board");
     RunOptions options;
@@ -119,13 +118,12 @@ int main(int argc, char **argv)
     app.add_option("--gdb", board.gdb_port,
                    "wait for gdb on this port of this machine (0: a free one) before the first instruction; "
                    "time stands while it has stopped the processor")
-        ->check(CLI::Range(0, 65535))
+        ->range(0, 65535)
         ->excludes("--console");
     add_node_options(app, node);
     app.add_option("--bus-load", board.load,
                    "other nodes that fill the bus, at 1 Mbit/s: babble (shortest frames) or garbage (any)")
-        ->transform(CLI::CheckedTransformer(
-            std::map<std::string, bus_noise_kind_t>{{"babble", BUS_BABBLE}, {"garbage", BUS_GARBAGE}}));
+        ->words({{"babble", BUS_BABBLE}, {"garbage", BUS_GARBAGE}});
     app.add_flag(
         "--busy", board.busy,
         "beside the scenario, the bus keeps the image busy: a trace of four signals in every period, "
@@ -134,7 +132,7 @@ int main(int argc, char **argv)
                    "write instructions, cycles, stack and load to this file (JSON)");
     app.add_option("--limit", board.limits,
                    "NAME=MOST of a figure, e.g. control.flux.mean=420; exit 1 above it")
-        ->allow_extra_args(false);
+        ->one_each();
     app.footer(
         "Prints the expectations of the scenario as `pmsim run` does, then what the processor did: "
         "instructions are\n"
@@ -148,10 +146,8 @@ int main(int argc, char **argv)
         "  pmsim board out/build/stm32g431/pmdrive.elf tests/scenario/demo.yaml --out out/board\n"
         "  pmsim board out/build/stm32g431/pmdrive.elf tests/scenario/node.yaml --can vcan0");
     try {
-        app.parse(argc, argv);
-        return run(options, board, node);
-    } catch (const CLI::ParseError &error) {
-        return app.exit(error) == 0 ? 0 : 2;
+        const std::optional<int> code = app.parse(argc, argv);
+        return code ? *code : run(options, board, node);
     } catch (const std::exception &error) {
         std::cerr << "pmsim board: " << error.what() << '\n';
         return 2;

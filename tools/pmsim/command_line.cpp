@@ -1,0 +1,156 @@
+#include "tools/pmsim/command_line.h"
+
+#include <CLI/CLI.hpp>
+
+namespace pmsim
+{
+
+Option *Option::required(bool value)
+{
+    option->required(value);
+    return this;
+}
+
+Option *Option::one_each()
+{
+    option->allow_extra_args(false);
+    return this;
+}
+
+Option *Option::show_default()
+{
+    option->capture_default_str();
+    return this;
+}
+
+Option *Option::positive()
+{
+    option->check(CLI::PositiveNumber);
+    return this;
+}
+
+Option *Option::range(int low, int high)
+{
+    option->check(CLI::Range(low, high));
+    return this;
+}
+
+Option *Option::words(const std::map<std::string, int> &values)
+{
+    option->transform(CLI::CheckedTransformer(values));
+    return this;
+}
+
+Option *Option::needs(const Option *other)
+{
+    option->needs(other->option);
+    return this;
+}
+
+Option *Option::excludes(const std::string &name)
+{
+    option->excludes(name);
+    return this;
+}
+
+bool Option::empty() const
+{
+    return option->empty();
+}
+
+Command::Command(std::shared_ptr<CLI::App> app) : app(std::move(app))
+{
+}
+
+Command *Command::add_subcommand(const std::string &name, const std::string &description)
+{
+    CLI::App *subcommand = app->add_subcommand(name, description);
+    commands.push_back(std::make_unique<Command>(app->get_subcommand_ptr(subcommand)));
+    return commands.back().get();
+}
+
+Option *Command::own(CLI::Option *option)
+{
+    options.push_back(std::make_unique<Option>(option));
+    return options.back().get();
+}
+
+Option *Command::add_option(const std::string &name, std::string &variable, const std::string &help)
+{
+    return own(app->add_option(name, variable, help));
+}
+
+Option *Command::add_option(const std::string &name, std::vector<std::string> &variable,
+                            const std::string &help)
+{
+    return own(app->add_option(name, variable, help));
+}
+
+Option *Command::add_option(const std::string &name, int &variable, const std::string &help)
+{
+    return own(app->add_option(name, variable, help));
+}
+
+Option *Command::add_option(const std::string &name, uint64_t &variable, const std::string &help)
+{
+    return own(app->add_option(name, variable, help));
+}
+
+Option *Command::add_option(const std::string &name, double &variable, const std::string &help)
+{
+    return own(app->add_option(name, variable, help));
+}
+
+Option *Command::add_flag(const std::string &name, bool &variable, const std::string &help)
+{
+    return own(app->add_flag(name, variable, help));
+}
+
+Option *Command::get_option(const std::string &name)
+{
+    return own(app->get_option(name));
+}
+
+void Command::footer(const std::string &text)
+{
+    app->footer(text);
+}
+
+void Command::callback(const std::function<void()> &run)
+{
+    app->callback(run);
+}
+
+void Command::pass_words(const std::function<void(const std::vector<std::string> &)> &run)
+{
+    CLI::App *command = app.get();
+    command->prefix_command();
+    command->set_help_flag();
+    command->callback([command, run] { run(command->remaining()); });
+}
+
+CommandLine::CommandLine(const std::string &description) : Command(std::make_shared<CLI::App>(description))
+{
+}
+
+void CommandLine::name(const std::string &text)
+{
+    app->name(text);
+}
+
+void CommandLine::require_subcommand()
+{
+    app->require_subcommand(1);
+}
+
+std::optional<int> CommandLine::parse(int argc, char **argv)
+{
+    try {
+        app->parse(argc, argv);
+    } catch (const CLI::ParseError &error) {
+        return app->exit(error) == 0 ? 0 : 2;
+    }
+    return std::nullopt;
+}
+
+} // namespace pmsim
