@@ -11,8 +11,8 @@ double circuit_advance(circuit_t *c, double duration_s)
     if ((c->bridge.floating | c->bridge.swinging) != 0u) { /* diodes that stop are events */
         circuit_settle_legs(c);
     }
-    double left_s = circuit_symmetrical(c) ? steps_symmetrical(c, duration_s, &event)
-                                           : steps_general(c, duration_s, &event);
+    double left_s = circuit_symmetrical(c) || circuit_two_phase(c) ? steps_symmetrical(c, duration_s, &event)
+                                                                   : steps_general(c, duration_s, &event);
     if (event) {
         c->events++;
         assert(c->events < MAX_EVENTS);

@@ -55,6 +55,7 @@ typedef struct {
     _Alignas(16) double i_A[ACTIVE];
     rotor_t rotor;
     double torque_Nm;
+    _Alignas(16) double open_V[2]; /* of the active coordinates, where a step of two_phase.h began or ended */
 } point_t;
 
 typedef struct {

@@ -50,6 +50,16 @@ void circuit_reassign_diodes(circuit_t *circuit);
 /* Rates of the currents at the present point of a symmetrical circuit whose field is known. */
 void circuit_symmetrical_rates(const circuit_t *circuit, double i_A_s[ACTIVE]);
 
+/* With circuit_two_phase(): moves the windings onto zero current of the floating legs, if one has more than
+ * that. */
+void circuit_settle_two_phase(circuit_t *circuit, double small_A);
+
+/* Then voltages of all terminals and rates of the currents at a point; or the voltages alone, where a step
+ * began or ended. */
+void circuit_two_phase_at(const circuit_t *circuit, const point_t *point, double v_leg_V[PLANT_LEGS],
+                          double i_A_s[ACTIVE]);
+void circuit_two_phase_terminals(const circuit_t *circuit, const point_t *point, double v_leg_V[PLANT_LEGS]);
+
 /* Brings the conduction of the legs into the state that belongs to the present point. */
 void circuit_settle_legs(circuit_t *circuit);
 
@@ -75,7 +85,15 @@ static inline mechanics_motion_t circuit_motion(const circuit_t *c, const point_
     };
 }
 
-/* What steps_symmetrical() can do: every leg tied or swinging, and nothing that needs the time. */
+/* Legs of a symmetrical star float, the others are tied (two_phase.h). */
+static inline bool circuit_two_phase(const circuit_t *c)
+{
+    return c->bridge.floating != 0u && c->bridge.swinging == 0u && c->machine.symmetrical &&
+           c->machine.winding.active == 2 && c->machine.winding.branch < 0 && c->bridge.both == 0u &&
+           mechanics_plain(&c->mech) && dclink_plain(&c->link);
+}
+
+/* What steps_symmetrical() can do: every leg tied or swinging, or that; and nothing that needs the time. */
 static inline bool circuit_symmetrical(const circuit_t *c)
 {
     return c->machine.symmetrical && c->machine.winding.branch < 0 && c->bridge.floating == 0u &&

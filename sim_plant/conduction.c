@@ -218,7 +218,11 @@ void circuit_settle_legs(circuit_t *c)
         catch_swinging(c);
     }
     if (c->bridge.floating != 0u) {
-        circuit_project(c);
+        if (circuit_two_phase(c)) {
+            circuit_settle_two_phase(c, SMALL_CURRENT / c->inv_i_scale_1_A);
+        } else {
+            circuit_project(c);
+        }
         for (int n = 0; n < PLANT_LEGS && start_diode(c); n++) {
         }
     }

@@ -18,7 +18,11 @@ static double floating_excess(const circuit_t *c, const point_t *p)
     const bridge_t *b = &c->bridge;
     double worst = -1.0;
     double v_leg_V[PLANT_LEGS];
-    circuit_terminals(c, p, v_leg_V);
+    if (circuit_two_phase(c)) {
+        circuit_two_phase_terminals(c, p, v_leg_V);
+    } else {
+        circuit_terminals(c, p, v_leg_V);
+    }
     for (int k = 0; k < b->legs; k++) {
         if (b->leg[k] == LEG_FLOATING && !b->off_wire[k]) {
             double beyond_V = bridge_beyond_V(b, p->x[V_DC], v_leg_V[k]);

@@ -274,6 +274,38 @@ INLINE void field_shift(const machine_t *m, rotor_t rotor, shape_t shape, const 
     field_finish(m, rotor, shape, f);
 }
 
+/* Of a star without current: the magnet alone. */
+INLINE void field_idle(const machine_t *m, rotor_t rotor, field_t *f)
+{
+    f->flux[0] = both(m->psi_m_Wb) * (pair_t){rotor.c, rotor.s};
+    f->core_Wb[0] = to_rotor(f->flux[0], rotor);
+    f->i_dq_A[0] = both(0.0);
+    core_tangent(m, f->core_Wb[0], f->gamma_1_H[0]);
+    field_finish(m, rotor, STAR, f);
+}
+
+/* Of a star: moves the linkage along an axis until no current flows along it. */
+INLINE void field_release(const machine_t *m, rotor_t rotor, pair_t axis, field_t *f)
+{
+    pair_t n = to_rotor(axis, rotor);
+    double near_Wb = FIELD_NEAR * m->scale_Wb;
+    bool near = false;
+    for (int round = 0; round < FIELD_ROUNDS && !near; round++) {
+        pair_t response = by_columns(f->gamma_1_H[0], n);
+        double move_Wb = -total(n * f->i_dq_A[0]) / total(n * response);
+        near = fabs(move_Wb) <= near_Wb || m->c_A_Wb5 == 0.0;
+        f->core_Wb[0] += both(move_Wb) * n;
+        f->flux[0] += both(move_Wb) * axis;
+        if (near) {
+            f->i_dq_A[0] += both(move_Wb) * response;
+        } else {
+            f->i_dq_A[0] = core_current(m, f->core_Wb[0]);
+            core_tangent(m, f->core_Wb[0], f->gamma_1_H[0]);
+        }
+    }
+    field_finish(m, rotor, STAR, f);
+}
+
 /* Rates of the cores in rotor coordinates and of the currents, with given ones of f->flux. */
 INLINE void field_rates(const machine_t *m, rotor_t rotor, double omega_e, shape_t shape, const field_t *f,
                         const pair_t rate[], pair_t core_V[], pair_t i_A_s[])

@@ -57,6 +57,15 @@ static void symmetrical_nodes(const circuit_t *c, circuit_nodes_t *nodes)
     set_nodes(c, &legs, c->now.rotor, c->machine.pole_pairs * c->now.x[OMEGA_MECH], c->now.i_A, i_A_s, nodes);
 }
 
+static void two_phase_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *nodes)
+{
+    double i_A_s[ACTIVE] = {0.0};
+    circuit_legs_t legs;
+    circuit_legs(c, p, &legs);
+    circuit_two_phase_at(c, p, legs.v_leg_V, i_A_s);
+    set_nodes(c, &legs, p->rotor, c->machine.pole_pairs * p->x[OMEGA_MECH], p->i_A, i_A_s, nodes);
+}
+
 /* Whether no star network sees anything */
 static bool has_plain_nodes(const circuit_t *c)
 {
@@ -66,6 +75,11 @@ static bool has_plain_nodes(const circuit_t *c)
 
 void circuit_terminals(const circuit_t *c, const point_t *p, double v_leg_V[PLANT_LEGS])
 {
+    if (circuit_two_phase(c)) {
+        double i_A_s[ACTIVE];
+        circuit_two_phase_at(c, p, v_leg_V, i_A_s);
+        return;
+    }
     machine_state_t state = circuit_machine_state(p);
     machine_point_t point;
     machine_rate_t moved;
@@ -83,6 +97,10 @@ void circuit_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *nodes)
         plain_nodes(c, p, nodes);
         return;
     }
+    if (circuit_two_phase(c)) {
+        two_phase_nodes(c, p, nodes);
+        return;
+    }
     machine_state_t state = circuit_machine_state(p);
     machine_point_t point;
     machine_evaluate(&c->machine, &state, &point);
@@ -94,6 +112,8 @@ void circuit_nodes_of(const circuit_t *c, const machine_state_t *state, const ma
 {
     if (has_plain_nodes(c)) {
         plain_nodes(c, &c->now, nodes);
+    } else if (circuit_two_phase(c)) {
+        two_phase_nodes(c, &c->now, nodes);
     } else if (c->field_known && circuit_symmetrical(c)) {
         symmetrical_nodes(c, nodes);
     } else {

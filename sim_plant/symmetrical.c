@@ -1,4 +1,4 @@
-/* Steps of a symmetrical machine on legs that are tied or swing.
+/* Steps of a symmetrical machine on legs that are tied or swing, or of a star with legs that float.
  *
  * The first and second derivative of the state are known in closed form at every point, as all follows from
  * the currents and these move by the tangent of the field. A step is the Taylor series of second order, and
@@ -60,7 +60,7 @@ INLINE void predict(const circuit_t *c, const start_t *s, double h, shape_t shap
 
 /* d from the rates at the end; where third derivatives are in the series already, what is missing of it. */
 INLINE void find_miss(const circuit_t *c, const start_t *s, double h, const rates_t *end, shape_t shape,
-                      bool swings, rates_t *miss)
+                      bool swings, bool floats, rates_t *miss)
 {
     const double third = h / 3.0, cube = third * 0.5 * h * h;
     for (int n = 0; n < FOLLOWERS; n++) {
@@ -78,6 +78,9 @@ INLINE void find_miss(const circuit_t *c, const start_t *s, double h, const rate
     if (swings) {
         miss->follow[VOLTS] -= both(0.25) * (miss->follow[VOLTS] - both(cube) * s->v_V_s2[0]);
     }
+    if (floats) {
+        miss->flux_V[0] = two_phase_part(c, miss->flux_V[0]);
+    }
 }
 
 INLINE void add_miss(const circuit_t *c, const rates_t *miss, bool swings, double x[])
@@ -91,9 +94,22 @@ INLINE void add_miss(const circuit_t *c, const rates_t *miss, bool swings, doubl
     }
 }
 
+/* Across the tied phases no current flows, and the integral of the voltage is what the linkages have moved
+ * by: those of the field, and those of the magnet's harmonics by Hermite's rule. */
+INLINE void open_volts(const circuit_t *c, const start_t *s, double h, const field_t *f, point_t *to)
+{
+    double omega_e = c->machine.pole_pairs * to->x[OMEGA_MECH];
+    pair_t slopes_V = both(s->omega_e) * s->slope_Wb + both(omega_e) * f->slope_Wb[0];
+    pair_t bends_V_s = both(s->omega_e * s->omega_e) * s->bend_Wb - both(omega_e * omega_e) * f->bend_Wb[0];
+    pair_t start_Wb = pair_at(&c->now.x[INT_V_ALPHA]);
+    pair_t moved_Wb = pair_at(&to->x[INT_V_ALPHA]) - start_Wb;
+    pair_t open_Wb = f->flux[0] - s->flux[0] + both(0.5 * h) * (slopes_V + both(h / 6.0) * bends_V_s);
+    pair_put(&to->x[INT_V_ALPHA], start_Wb + open_Wb + two_phase_part(c, moved_Wb - open_Wb));
+}
+
 /* One step of length h; its error in units of the tolerance. */
-INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape, bool swings, point_t *to,
-                   field_t *f)
+INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape, bool swings, bool floats,
+                   point_t *to, field_t *f)
 {
     rates_t end, miss;
     tied_t tied;
@@ -106,11 +122,19 @@ INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape
     to->rotor = frame_turn(c->now.rotor, turn);
     predict(c, s, h, shape, swings, to->x, f);
     field_at(&c->machine, to->rotor, shape, f);
-    rates_at(c, f, to->x, shape, swings, steady, &tied, &end);
-    find_miss(c, s, h, &end, shape, swings, &miss);
+    if (floats) {
+        two_phase_release(c, to->rotor, f);
+    }
+    rates_at(c, to->rotor, f, to->x, shape, swings, floats, steady, &tied, &end);
+    find_miss(c, s, h, &end, shape, swings, floats, &miss);
     add_miss(c, &miss, swings, to->x);
     to->x[THETA_E] = c->now.x[THETA_E] + turn;
     field_shift(&c->machine, to->rotor, shape, miss.flux_V, f);
+    if (floats) {
+        two_phase_release(c, to->rotor, f);
+        pair_put(to->open_V, end.follow[VOLTS]);
+        open_volts(c, s, h, f, to);
+    }
     for (int p = 0; p < pairs(shape); p++) {
         bool linked = shape.sets > 1;
         pair_put(&to->x[U + 2 * p], linked ? from_rotor(f->core_Wb[p], to->rotor) : f->flux[p]);
@@ -128,13 +152,13 @@ static void retake(const circuit_t *c, const void *start, double h, point_t *to)
     *to = c->now;
     switch (c->machine.winding.active) {
     case 2:
-        step(c, start, h, STAR, swings, to, &f);
+        step(c, start, h, STAR, swings, c->bridge.floating != 0u, to, &f);
         break;
     case 3:
-        step(c, start, h, OPEN, swings, to, &f);
+        step(c, start, h, OPEN, swings, false, to, &f);
         break;
     default:
-        step(c, start, h, DOUBLE, swings, to, &f);
+        step(c, start, h, DOUBLE, swings, false, to, &f);
         break;
     }
 }
@@ -184,16 +208,6 @@ INLINE void control(circuit_t *c, double h, double error)
     }
 }
 
-INLINE void know_field(circuit_t *c, shape_t shape)
-{
-    if (!c->field_known) {
-        field_from_cores(&c->machine, c->now.rotor, shape, &c->now.x[U], c->now.x[U + 2 * shape.sets],
-                         &c->field);
-        c->field_known = true;
-        c->next = c->now; /* what does not move in these steps */
-    }
-}
-
 /* The end of a step becomes the present point. */
 INLINE void arrive(circuit_t *c, const point_t *to, shape_t shape, bool swings)
 {
@@ -213,13 +227,16 @@ INLINE void arrive(circuit_t *c, const point_t *to, shape_t shape, bool swings)
     c->now.torque_Nm = to->torque_Nm;
 }
 
-INLINE double take_steps(circuit_t *c, double left_s, shape_t shape, bool swings, bool *event)
+INLINE double take_steps(circuit_t *c, double left_s, shape_t shape, bool swings, bool floats, bool *event)
 {
     point_t *to = &c->next;
     start_t start;
     know_field(c, shape);
     while (left_s > 0.0 && !*event) {
-        begin(c, shape, swings, &start);
+        begin(c, shape, swings, floats, &start);
+        if (floats) {
+            pair_put(c->now.open_V, start.rate.follow[VOLTS]);
+        }
         double h = swings || c->step_s > left_s ? left_s : c->step_s;
         h = steps_turn_s(c, start.omega_e, h);
         h = swings ? swing_s(c, &start, h) : h;
@@ -227,11 +244,11 @@ INLINE double take_steps(circuit_t *c, double left_s, shape_t shape, bool swings
         bool smooth = zone == h;
         h = zone;
         h = h > 0.999 * left_s ? left_s : h; /* no sliver at the end */
-        double error = step(c, &start, h, shape, swings, to, &c->field);
+        double error = step(c, &start, h, shape, swings, floats, to, &c->field);
         while (!(error <= 1.0) && h > 1e-9 * left_s) {
             h = steps_shorter_s(h, error);
             c->step_s = swings || !smooth ? c->step_s : h;
-            error = step(c, &start, h, shape, swings, to, &c->field);
+            error = step(c, &start, h, shape, swings, floats, to, &c->field);
         }
         if (!swings) {
             control(c, h, error);
@@ -241,7 +258,7 @@ INLINE double take_steps(circuit_t *c, double left_s, shape_t shape, bool swings
             *event = steps_event(excess);
             if (*event && !steps_landed(excess)) {
                 h = steps_locate(c, h, retake, &start, to);
-                step(c, &start, h, shape, swings, to, &c->field);
+                step(c, &start, h, shape, swings, floats, to, &c->field);
             }
         }
         if (probe_active(&c->probe)) {
@@ -268,12 +285,17 @@ WIDER double steps_symmetrical(circuit_t *c, double left_s, bool *event)
     bool swings = c->bridge.swinging != 0u;
     switch (c->machine.winding.active) {
     case 2:
-        return swings ? take_steps(c, left_s, STAR, true, event) : take_steps(c, left_s, STAR, false, event);
+        if (c->bridge.floating != 0u) {
+            return take_steps(c, left_s, STAR, false, true, event);
+        }
+        return swings ? take_steps(c, left_s, STAR, true, false, event)
+                      : take_steps(c, left_s, STAR, false, false, event);
     case 3:
-        return swings ? take_steps(c, left_s, OPEN, true, event) : take_steps(c, left_s, OPEN, false, event);
+        return swings ? take_steps(c, left_s, OPEN, true, false, event)
+                      : take_steps(c, left_s, OPEN, false, false, event);
     default:
-        return swings ? take_steps(c, left_s, DOUBLE, true, event)
-                      : take_steps(c, left_s, DOUBLE, false, event);
+        return swings ? take_steps(c, left_s, DOUBLE, true, false, event)
+                      : take_steps(c, left_s, DOUBLE, false, false, event);
     }
 }
 
@@ -284,7 +306,8 @@ INLINE void current_rates(const circuit_t *c, shape_t shape, double i_A_s[ACTIVE
     tied_t tied;
     double omega_e = c->machine.pole_pairs * c->now.x[OMEGA_MECH];
     no_drops(shape, &tied);
-    rates_at(c, &c->field, c->now.x, shape, true, c->bridge.v_switch_V == 0.0, &tied, &rate);
+    rates_at(c, c->now.rotor, &c->field, c->now.x, shape, true, false, c->bridge.v_switch_V == 0.0, &tied,
+             &rate);
     field_rates(&c->machine, c->now.rotor, omega_e, shape, &c->field, rate.flux_V, core_V, moved_A_s);
     for (int p = 0; p < pairs(shape); p++) {
         pair_put(&i_A_s[2 * p], moved_A_s[p]);

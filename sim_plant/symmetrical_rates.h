@@ -1,4 +1,5 @@
-/* First and second derivatives of a symmetrical machine on legs that are tied or swing; for symmetrical.c.
+/* First and second derivatives of a symmetrical machine on legs that are tied or swing, or of a star with
+ * legs that float (two_phase.h); for symmetrical.c.
  *
  * All follows from the currents, and these move by the tangent of the field, so that a point of the field
  * gives both in closed form, in this order:
@@ -9,8 +10,7 @@
 #ifndef PLANT_SYMMETRICAL_RATES_H
 #define PLANT_SYMMETRICAL_RATES_H
 
-#include "sim_plant/circuit_rates.h"
-#include "sim_plant/field.h"
+#include "sim_plant/two_phase.h"
 
 /* What follows the windings' linkages, in pairs: elements of the state from OMEGA_MECH to U. */
 enum { MOTION, POWER, LOSS, VOLTS, FOLLOWERS };
@@ -42,7 +42,8 @@ typedef struct {
     double leg_V_s3[PLANT_LEGS];            /* third ones of swinging terminals, nearly, */
     pair_t v_V_s2[PAIRS], flux_V_s2[PAIRS]; /* and what these do to voltages and linkages */
     tied_t tied;
-    bool steady; /* no drop turns over in the step */
+    pair_t slope_Wb, bend_Wb; /* of the magnet's harmonics, where legs float */
+    bool steady;              /* no drop turns over in the step */
 } start_t;
 
 /* Coordinates that leg k has a part in: of two stars those of its own set. */
@@ -127,8 +128,9 @@ INLINE void tied_at(const circuit_t *c, const field_t *f, const double x[], shap
     t->i_dc_A = total(i_dc_A);
 }
 
-INLINE void rates_at(const circuit_t *c, const field_t *f, const double x[], shape_t shape, bool swings,
-                     bool steady, tied_t *t, rates_t *rate)
+/* floats: legs of a star do, as in all that follows. */
+INLINE void rates_at(const circuit_t *c, rotor_t rotor, const field_t *f, const double x[], shape_t shape,
+                     bool swings, bool floats, bool steady, tied_t *t, rates_t *rate)
 {
     const machine_t *m = &c->machine;
     const bridge_t *b = &c->bridge;
@@ -143,6 +145,11 @@ INLINE void rates_at(const circuit_t *c, const field_t *f, const double x[], sha
         in_W = b->sources ? in_W + power * pair_at(&b->source_V[2 * p]) : in_W;
         copper += power * f->i_A[p];
         device_W += power * t->drop_V[p];
+    }
+    if (floats) {
+        pair_t open_V = two_phase_open_V(c, rotor, omega_e, f, rate->flux_V[0]);
+        rate->flux_V[0] += open_V;
+        t->v_V[0] += open_V;
     }
     for (unsigned legs = b->swinging; swings && legs != 0u; legs &= legs - 1u) {
         int k = bridge_first(legs);
@@ -201,8 +208,9 @@ INLINE void other_bends(const circuit_t *c, double torque_Nm_s, double i_dc_A_s,
                             (pair_t){x[V_DC], c->field.torque_Nm} * (pair_t){i_dc_A_s, omega_s};
 }
 
-/* Second derivatives from those of the currents. */
-INLINE void bends_at(const circuit_t *c, const pair_t i_A_s[], shape_t shape, bool swings, start_t *s)
+/* Second derivatives from those of the currents; without the part that floating legs add. */
+INLINE void bends_at(const circuit_t *c, const pair_t i_A_s[], shape_t shape, bool swings, bool floats,
+                     start_t *s)
 {
     const field_t *f = &c->field;
     const machine_t *m = &c->machine;
@@ -231,6 +239,11 @@ INLINE void bends_at(const circuit_t *c, const pair_t i_A_s[], shape_t shape, bo
     s->bend.follow[POWER][0] += b->sources ? total(source_W_s) : 0.0;
     s->bend.follow[LOSS] = totals(copper, device_W_s) * (pair_t){2.0 * m->R_s_ohm, 1.0};
     s->bend.follow[VOLTS] = v_V_s[0];
+    if (floats) {
+        s->bend.flux_V[0] = two_phase_part(c, s->bend.flux_V[0]);
+        s->slope_Wb = f->slope_Wb[0];
+        s->bend_Wb = f->bend_Wb[0];
+    }
 }
 
 /* Third derivatives that swinging terminals bring, without those of rotation. */
@@ -252,7 +265,7 @@ INLINE void swing_bends(const circuit_t *c, shape_t shape, start_t *s)
     }
 }
 
-INLINE void begin(const circuit_t *c, shape_t shape, bool swings, start_t *s)
+INLINE void begin(const circuit_t *c, shape_t shape, bool swings, bool floats, start_t *s)
 {
     for (int p = 0; p < pairs(shape); p++) {
         s->flux[p] = c->field.flux[p];
@@ -262,11 +275,22 @@ INLINE void begin(const circuit_t *c, shape_t shape, bool swings, start_t *s)
     }
     s->omega_e = c->machine.pole_pairs * c->now.x[OMEGA_MECH];
     no_drops(shape, &s->tied);
-    rates_at(c, &c->field, c->now.x, shape, swings, c->bridge.v_switch_V == 0.0, &s->tied, &s->rate);
+    rates_at(c, c->now.rotor, &c->field, c->now.x, shape, swings, floats, c->bridge.v_switch_V == 0.0,
+             &s->tied, &s->rate);
     field_rates(&c->machine, c->now.rotor, s->omega_e, shape, &c->field, s->rate.flux_V, s->core_V, s->i_A_s);
-    bends_at(c, s->i_A_s, shape, swings, s);
+    bends_at(c, s->i_A_s, shape, swings, floats, s);
     if (swings) {
         swing_bends(c, shape, s);
+    }
+}
+
+INLINE void know_field(circuit_t *c, shape_t shape)
+{
+    if (!c->field_known) {
+        field_from_cores(&c->machine, c->now.rotor, shape, &c->now.x[U], c->now.x[U + 2 * shape.sets],
+                         &c->field);
+        c->field_known = true;
+        c->next = c->now; /* what does not move in these steps */
     }
 }
 
