@@ -13,10 +13,12 @@ from random import Random
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
-from dictionary import generate, model, reader  # noqa: E402
+from dictionary import generate, model  # noqa: E402
 from dictionary.source import SourceError  # noqa: E402
 
 GOOD = (ROOT / generate.SOURCE).read_text(encoding="utf-8")
+LIST = "observers/observers.def"
+PART = "observers/sliding_mode.yaml"
 POLE_PAIRS = '{sub: 1, name: pole_pairs, unit: "1", exp10: 0, range: [1, 50], preset: 3, access: off, help: pole pairs}'
 
 
@@ -26,7 +28,8 @@ class Project:
     def __enter__(self):
         self.folder = tempfile.TemporaryDirectory()
         self.root = Path(self.folder.name)
-        for path in (generate.SOURCE, generate.FAULTS, generate.LEDGER):
+        headers = [path.relative_to(ROOT).as_posix() for path in ROOT.glob("observers/*.h")]
+        for path in (generate.SOURCE, generate.FAULTS, generate.LEDGER, LIST, *headers, *generate.parts(ROOT)):
             (self.root / path).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / path, self.root / path)
         return self
@@ -224,6 +227,93 @@ class Refusals(unittest.TestCase):
                 generate.files(project.root)
 
 
+class Parts(unittest.TestCase):
+    """Files of methods: merged into the source, and refused with their own name and line."""
+
+    def refused(self, old, new, words, path=PART):
+        with Project() as project:
+            line = project.replace(old, new, path)
+            with self.assertRaises(SourceError) as caught:
+                generate.files(project.root)
+            self.assertIn(words, str(caught.exception))
+            self.assertRegex(str(caught.exception), rf"^{re.escape(path)}:{line}: ")
+
+    def line_of(self, path, text):
+        content = (ROOT / path).read_text(encoding="utf-8")
+        return content[: content.index(text)].count("\n") + 1
+
+    def test_own_file_and_line(self):
+        self.refused("{sub: 3, name: sliding_gain,", "{sub: 3, gain: 1, name: sliding_gain,", "unknown key `gain`")
+
+    def test_same_index_in_two_files(self):
+        other = self.line_of(generate.SOURCE, "index: 0x2300\n")
+        self.refused("index: 0x2310\n", "index: 0x2300\n",
+                     f"index 2300h is used by position already, at {generate.SOURCE}:{other}")
+
+    def test_same_sub_index_in_two_files(self):
+        other = self.line_of("observers/emf.yaml", "{record: position, sub: 12,")
+        self.refused("{record: position, sub: 18,", "{record: position, sub: 12,",
+                     f"is used by emf_bandwidth already, at observers/emf.yaml:{other}", "observers/mismatch.yaml")
+
+    def test_same_name_in_two_files(self):
+        other = self.line_of(generate.SOURCE, "{sub: 2, name: R_s,")
+        self.refused("name: sliding_gain,", "name: R_s,", f"is used at 2100h:02 already, at {generate.SOURCE}:{other}")
+
+    def test_record_that_is_none(self):
+        self.refused("{record: position, sub: 18,", "{record: nowhere, sub: 18,", "no record `nowhere`",
+                     "observers/mismatch.yaml")
+
+    def test_method_that_is_none(self):
+        self.refused("[ekf_full, ekf_reduced]", "[ekf_full, ekf_half]",
+                     "no method `ekf_half`: observers/ekf_half.h is not there", "observers/ekf_noise.yaml")
+
+    def test_file_named_for_no_method(self):
+        with Project() as project:
+            (project.root / PART).rename(project.root / "observers/sliding.yaml")
+            with self.assertRaisesRegex(SourceError, "^observers/sliding.yaml:.* no method `sliding`"):
+                generate.files(project.root)
+
+    def test_a_new_file_is_found(self):
+        with Project() as project:
+            member = 'record: position, sub: 90, name: tried, unit: "1", range: [0, 1], preset: 0, help: a trial'
+            (project.root / "injection").mkdir()
+            (project.root / "injection/trial.h").write_text("", encoding="utf-8")
+            (project.root / "injection/trial.yaml").write_text(f"members:\n- {{{member}}}\n", encoding="utf-8")
+            entry = generate.read(project.root).named("tried")
+            self.assertEqual((entry.where, entry.methods, entry.access), ("2300h:5A", ("trial",), "live"))
+
+    def test_methods(self):
+        dictionary = generate.read(ROOT)
+        for name, methods in (("pole_pairs", ()), ("sliding_gain", ("sliding_mode",)),
+                              ("mismatch_current", ("mismatch",)), ("ekf_speed_noise", ("ekf_full", "ekf_reduced"))):
+            self.assertEqual(dictionary.named(name).methods, methods)
+
+    def test_a_row_more_is_a_value_more(self):
+        with Project() as project:
+            before = generate.read(project.root).named("observer")
+            with open(project.root / LIST, "a", encoding="utf-8") as file:
+                file.write('PM_METHOD(tried, "a trial", 0, 0)\n')
+            after = generate.read(project.root).named("observer")
+            self.assertEqual(after.values, {**before.values, before.most + 1: "a trial"})
+            self.assertEqual((before.least, after.least, after.most), (0, 0, before.most + 1))
+
+    def test_values_before_those_of_a_list(self):
+        with Project() as project:
+            project.replace("list: observers/observers.def,", "list: observers/observers.def, values: {0: none},")
+            values = generate.read(project.root).named("observer").values
+            self.assertEqual((values[0], values[1]), ("none", "active flux"))
+
+    def test_list_with_a_range(self):
+        self.refused("list: observers/observers.def,", "range: [0, 3], list: observers/observers.def,",
+                     "the range follows from the list", generate.SOURCE)
+
+    def test_list_that_is_none(self):
+        self.refused("list: observers/observers.def,", "list: observers/observe.def,", "observers/observe.def: ",
+                     generate.SOURCE)
+        self.refused("list: observers/observers.def,", "list: observers/loop.h,", "has no row PM_METHOD",
+                     generate.SOURCE)
+
+
 class Mutations(unittest.TestCase):
     """Whatever is typed, the answer is files or a refusal that names the file; never another error."""
 
@@ -256,7 +346,7 @@ class Mutations(unittest.TestCase):
                     generate.files(project.root)
                 except SourceError as error:
                     refused += 1
-                    self.assertRegex(str(error), r"(parameters\.yaml|allocations\.txt)(:\d+)?: ")
+                    self.assertRegex(str(error), r"(\w+\.yaml|allocations\.txt)(:\d+)?: ")
         self.assertGreater(refused, 75)
 
 
@@ -320,7 +410,7 @@ class Made(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.files = generate.files(ROOT)
-        cls.dictionary = reader.read(ROOT / generate.SOURCE, ROOT / generate.FAULTS)
+        cls.dictionary = generate.read(ROOT)
 
     def rows(self):
         return re.findall(r"^    \{(0x\w{4})U, (\d+)U, .*\},$", self.files["firmware/can/dictionary_table.c"], re.M)

@@ -12,6 +12,8 @@ FAULTS = "firmware/drive/fault.def"
 PACKAGE = "tools/pmdrive/pmdrive"
 BYTES = "firmware/can/dictionary_bytes.c"
 LEDGER = "firmware/params/allocations.txt"
+# Beside a method x.h stands x.yaml with its parameters.
+METHODS = "observers/*.yaml", "injection/**/*.yaml", "bldc/**/*.yaml", "firmware/control/*.yaml", "firmware/drive/**/*.yaml"
 
 
 def _environment():
@@ -43,10 +45,19 @@ def stored_eds(text):
     return bytes(int(x, 16) for x in re.findall(r"0x([0-9A-F]{2})", match[1])) if match else b""
 
 
+def parts(root=ROOT):
+    """The files of methods below root."""
+    return sorted(path.relative_to(root).as_posix() for pattern in METHODS for path in Path(root).glob(pattern))
+
+
+def read(root=ROOT):
+    return reader.read(Path(root), SOURCE, FAULTS, parts(root))
+
+
 def files(root=ROOT):
     """Reads and checks the source below root and makes everything from it: {path: text}."""
     root = Path(root)
-    dictionary = reader.read(root / SOURCE, root / FAULTS, SOURCE)
+    dictionary = read(root)
     out = {LEDGER: ledger.update(root / LEDGER, dictionary)}
     environment = _environment()
 

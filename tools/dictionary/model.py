@@ -26,7 +26,7 @@ BOOK = re.compile(r"(\d+(\.\d+)*|A|B) #(\d+)")
 ROWS = 152  # of METHODS.md
 
 TAKEN_OVER = ("type", "lives", "access", "stored", "group", "map", "unit", "exp10", "exp2")
-ENTRY_KEYS = TAKEN_OVER + ("name", "help", "range", "values", "preset", "book", "alias")
+ENTRY_KEYS = TAKEN_OVER + ("name", "help", "range", "values", "list", "preset", "book", "alias")
 MEMBER_KEYS = ENTRY_KEYS + ("sub", "repeat")
 OBJECT_KEYS = ENTRY_KEYS + ("index", "members", "sub0", "form", "flat")
 
@@ -57,6 +57,7 @@ class Entry:
     book: str = ""
     alias: str = ""
     slot: int = 0
+    methods: tuple = ()  # an image without any of them does without the entry; empty: it concerns all images
 
     def error(self, text):
         return self.place.error(f"{self.where} {self.name}: {text}")
@@ -234,8 +235,9 @@ def check_all(dictionary):
     places, names, indices = {}, {}, {}
     for obj in dictionary.objects:
         if obj.index in indices:
-            raise obj.place.error(f"index {obj.index:04X}h is used by {indices[obj.index]} already")
-        indices[obj.index] = obj.name
+            other = indices[obj.index]
+            raise obj.place.error(f"index {obj.index:04X}h is used by {other.name} already, at {other.place}")
+        indices[obj.index] = obj
         for first, last, why in dictionary.reserved:
             if first <= obj.index <= last:
                 raise obj.place.error(f"index {obj.index:04X}h is reserved for {why}")
@@ -244,12 +246,13 @@ def check_all(dictionary):
     for entry in dictionary.entries:
         at = (entry.index, entry.sub)
         if at in places:
-            raise entry.error(f"{entry.where} is used by {places[at]} already")
+            raise entry.error(f"{entry.where} is used by {places[at].name} already, at {places[at].place}")
         if entry.name in names:
-            raise entry.error(f"the name is used at {names[entry.name]} already")
+            other = names[entry.name]
+            raise entry.error(f"the name is used at {other.where} already, at {other.place}")
         if at in gone:
             raise entry.error(f"{entry.where} was `{gone[at]}` and is never used again")
         if entry.name in gone_names:
             raise entry.error("the name is that of a retired object and is never used again")
-        places[at], names[entry.name] = entry.name, entry.where
+        places[at], names[entry.name] = entry, entry
         check(entry)

@@ -1,5 +1,7 @@
-"""From the source to the dictionary of model.py."""
+"""From the source, which is parameters.yaml and the files of methods, to the dictionary of model.py."""
 import re
+from dataclasses import dataclass
+from pathlib import Path
 
 from . import model, pdo, source
 from .model import Entry, Object
@@ -8,6 +10,17 @@ NODE_ID = re.compile(r"\$NODEID *\+ *(0x[0-9A-Fa-f]+|\d+)")
 EDS_FORMAT = 0x80  # 1022h: the manufacturer's own
 DEVICE_KEYS = ("vendor", "vendor_id", "product", "product_code", "revision", "default_node_id")
 FAULT_LINE = re.compile(r'PM_FAULT\((\w+), "([^"]*)"\)')
+ROW = re.compile(r'^PM_METHOD\((\w+), "([^"]*)"', re.MULTILINE)
+PART_KEYS = ("methods", "objects", "members")
+
+
+@dataclass
+class Context:
+    """What entries are read with beside their own table."""
+
+    device: dict
+    root: Path  # of the project, for lists of methods
+    added: dict  # record -> [(member, methods)] of the files of methods
 
 
 def _preset(table, entry, device):
@@ -33,7 +46,7 @@ def _name(table, pattern=model.NAME):
     return name
 
 
-def _entry(table, index, sub, member, record, inherit, device):
+def _entry(table, index, sub, member, record, inherit, context):
     def get(key, method, *args):
         holder = table if key in table.nodes else inherit
         return getattr(holder, method)(key, *args)
@@ -51,6 +64,16 @@ def _entry(table, index, sub, member, record, inherit, device):
         map=get("map", "choice", model.MAPS, "none"), book=table.text("book", ""),
     )
     entry.book = entry.book.strip()
+    _values(table, entry)
+    if "list" in table.nodes:
+        _list(table, entry, context.root)
+    _preset(table, entry, context.device)
+    if not entry.stored:
+        entry.group = "none"
+    return entry
+
+
+def _values(table, entry):
     if "range" in table.nodes:
         limits = table.integers("range")
         if len(limits) != 2:
@@ -62,17 +85,31 @@ def _entry(table, index, sub, member, record, inherit, device):
             entry.values = {int(key, 0): values.text(key) for key in values.nodes}
         except ValueError:
             raise table.error("keys of values are integers", "values") from None
-    _preset(table, entry, device)
-    if not entry.stored:
-        entry.group = "none"
-    return entry
 
 
-def _members(table, index, device):
+def _list(table, entry, root):
+    """A value for each row of a list of methods, numbered on from the values that the entry has itself."""
+    if "range" in table.nodes:
+        raise table.error("the range follows from the list", "range")
+    name = table.text("list")
+    try:
+        rows = ROW.findall((root / name).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise table.error(f"{name}: {error}", "list") from None
+    if not rows:
+        raise table.error(f"{name} has no row PM_METHOD(name, \"help\", ...)", "list")
+    first = max(entry.values, default=-1) + 1
+    entry.values.update(enumerate((text for _, text in rows), first))
+    entry.least, entry.most = min(entry.values), max(entry.values)
+
+
+def _members(table, index, methods, context):
     """Entries of a record, with sub-index 0 before them."""
     entries = []
-    for member in table.tables("members", f"member of {table.text('name')}"):
+    own = table.tables("members", f"member of {table.text('name')}")
+    for member in own:
         member.only(model.MEMBER_KEYS)
+    for member, of in [(x, methods) for x in own] + context.added.pop(table.text("name"), []):
         first, count = member.integer("sub"), member.integer("repeat", 1)
         if first < 1 or count < 1 or first + count > 255:
             raise member.error("sub-indices are 1 to 254", "sub")
@@ -80,38 +117,40 @@ def _members(table, index, device):
         if count > 1 and "{n}" not in name:
             raise member.error("the name of repeated members must hold {n}", "name")
         for n in range(count):
-            own = name.replace("{n}", str(n + 1))
-            if not (model.NAME if table.flag("flat") else model.MEMBER).fullmatch(own):
-                raise member.error(f"`{own}` is not a name: letters, digits and _ only", "name")
-            entries.append(_entry(member, index, first + n, own, table, table, device))
+            text = name.replace("{n}", str(n + 1))
+            if not (model.NAME if table.flag("flat") else model.MEMBER).fullmatch(text):
+                raise member.error(f"`{text}` is not a name: letters, digits and _ only", "name")
+            entries.append(_entry(member, index, first + n, text, table, table, context))
+            entries[-1].methods = of
     if not entries:
         raise table.error("a record has members", "members")
     entries.sort(key=lambda x: x.sub)
-    return [_count_entry(table, index, entries[-1].sub, device)] + entries
+    return [_count_entry(table, index, entries[-1].sub, context)] + entries
 
 
-def _count_entry(table, index, highest, device):
+def _count_entry(table, index, highest, context):
     if "sub0" not in table.nodes:
         return Entry(place=table.place, index=index, sub=0, name=f"{_name(table)}.count", member="count", type="u8",
                      lives="constant", access="const", help="highest sub-index", preset=highest)
     own = table.table("sub0")
     own.only(("access", "preset", "range", "help"))
-    entry = _entry(own, index, 0, "count", table, table, device)
+    entry = _entry(own, index, 0, "count", table, table, context)
     entry.type, entry.unit, entry.exp10, entry.map, entry.values = "u8", "", 0, "none", {}
     return entry
 
 
-def _object(table, device):
+def _object(table, methods, context):
     table.only(model.OBJECT_KEYS)
     index, name = table.integer("index"), _name(table)
     if not 0x1000 <= index <= 0x9FFF:
         raise table.error(f"index {index:#x} is outside 1000h to 9FFFh", "index")
     if "members" in table.nodes:
         form = table.choice("form", ("record", "array"), "record")
-        entries = _members(table, index, device)
+        entries = _members(table, index, methods, context)
     else:
         form = "variable"
-        entries = [_entry(table, index, 0, name, None, table, device)]
+        entries = [_entry(table, index, 0, name, None, table, context)]
+        entries[0].methods = methods
     return Object(table.place, index, name, table.text("help"), form, entries)
 
 
@@ -181,17 +220,45 @@ def _retired(root):
     return out
 
 
-def read(path, fault_file, shown=None):
-    """The whole dictionary; SourceError with file and line if anything is wrong."""
-    root = source.load(path, shown)
+def _methods(root, file, project):
+    """The methods of a file: what `methods` says, or the one that the file is named for."""
+    names = root.texts("methods") if "methods" in root.nodes else [Path(file).stem]
+    for name in names:
+        if not (project / file).with_name(f"{name}.h").is_file():
+            raise root.error(f"no method `{name}`: {Path(file).with_name(name + '.h')} is not there", "methods")
+    return tuple(names)
+
+
+def _part(file, project, added):
+    """The objects of a method's file, [(table, methods)]; its members go to `added`."""
+    root = source.load(project / file, file)
+    root.only(PART_KEYS)
+    methods = _methods(root, file, project)
+    for member in root.tables("members", "member") if "members" in root.nodes else []:
+        member.only(model.MEMBER_KEYS + ("record",))
+        added.setdefault(member.text("record"), []).append((member, methods))
+    return [(x, methods) for x in root.tables("objects", "object")] if "objects" in root.nodes else []
+
+
+def read(project, path, fault_file, parts=()):
+    """The whole dictionary of the project, a folder; all files relative to it. parts: those of methods.
+
+    SourceError with file and line if anything is wrong.
+    """
+    root = source.load(project / path, path)
     root.only(("device", "reserved", "retired", "objects", "pdos", "faults", "errors"))
-    device = _device(root)
-    objects = [_object(table, device) for table in root.tables("objects", "object")]
+    context = Context(_device(root), project, {})
+    tables = [(table, ()) for table in root.tables("objects", "object")]
+    for file in parts:
+        tables += _part(file, project, context.added)
+    objects = [_object(table, methods, context) for table, methods in tables]
+    for name, members in context.added.items():
+        raise members[0][0].error(f"no record `{name}`", "record")
     plans = pdo.read(root)
     objects += pdo.objects(plans)
     objects.sort(key=lambda x: x.index)
     dictionary = model.Dictionary(
-        device, objects, [], _faults(root, fault_file), _errors(root), _reserved(root), _retired(root)
+        context.device, objects, [], _faults(root, project / fault_file), _errors(root), _reserved(root), _retired(root)
     )
     model.link_alias(dictionary)
     model.check_all(dictionary)

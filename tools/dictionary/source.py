@@ -16,8 +16,11 @@ class Place:
     def __init__(self, file, node):
         self.file, self.line = file, node.start_mark.line + 1
 
+    def __str__(self):
+        return f"{self.file}:{self.line}"
+
     def error(self, text):
-        return SourceError(f"{self.file}:{self.line}: {text}")
+        return SourceError(f"{self}: {text}")
 
 
 def as_text(place, node):
