@@ -29,6 +29,7 @@
 extern "C" {
 #include "firmware/drive/config.h"
 #include "firmware/math/trig.h"
+#include "firmware/params/parameters.h"
 #include "tools/pmsim/rig_drive.h"
 }
 #pragma GCC diagnostic pop
@@ -46,7 +47,7 @@ struct Period {
 };
 
 struct Record {
-    drive_params_t params;
+    pmsim::Parameters params;
     double omega_base_rad_s;
     uint32_t slow_divider;
     std::vector<Period> periods;
@@ -56,7 +57,7 @@ Record record(const pmsim::Scenario &scenario)
 {
     pmsim::Loop loop(scenario);
     Record r = {scenario.setup.params, 0, loop.slow_divider(), {}};
-    const double pole_pairs = r.params.pole_pairs;
+    const double pole_pairs = r.params->pole_pairs;
     const double start = kStart * scenario.setup.rated.speed_rated_rad_s;
     const uint64_t count = pmsim::period_count(scenario);
     const drive_t *drive = rig_drive(loop.rig());
@@ -89,7 +90,7 @@ int32_t parameter(drive_param_id_t id, double value)
 
 bool configure(const Record &r, int observer, const Noise &noise, drive_config_t *config)
 {
-    drive_params_t params = r.params;
+    drive_params_t params = *r.params;
     params.observer = observer;
     params.ekf_voltage_noise = parameter(DRIVE_PARAM_ekf_voltage_noise, noise.voltage);
     params.ekf_speed_noise = parameter(DRIVE_PARAM_ekf_speed_noise, noise.speed);

@@ -2,6 +2,7 @@
 #include <fstream>
 #include <memory>
 
+#include "firmware/params/parameters.h"
 #include "tools/pmsim/command_line.h"
 #include "tools/pmsim/commands.h"
 #include "tools/pmsim/drive_parameters.h"

@@ -4,10 +4,28 @@
 #include <cmath>
 #include <limits>
 
+#include "firmware/params/parameters.h"
 #include "tools/pmsim/text.h"
 
 namespace pmsim
 {
+
+Parameters::Parameters() : values_(std::make_unique<drive_params_t>())
+{
+    drive_params_default(values_.get());
+}
+
+Parameters::Parameters(const Parameters &other) : values_(std::make_unique<drive_params_t>(*other.values_))
+{
+}
+
+Parameters &Parameters::operator=(const Parameters &other)
+{
+    *values_ = *other.values_;
+    return *this;
+}
+
+Parameters::~Parameters() = default;
 
 static const double max_rounding = 0.01; // of the value
 

@@ -7,18 +7,51 @@
 #ifndef PMSIM_DRIVE_PARAMETERS_H
 #define PMSIM_DRIVE_PARAMETERS_H
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "firmware/params/types.h"
 #include "tools/pmsim/yaml_reader.h"
-
-extern "C" {
-#include "firmware/params/parameters.h"
-}
 
 namespace pmsim
 {
+
+// A set of values, at first the defaults. Who reads or writes a parameter by its name includes
+// firmware/params/parameters.h; all others need not know which there are, and a new one does not concern them.
+class Parameters
+{
+  public:
+    Parameters();
+    Parameters(const Parameters &other);
+    Parameters &operator=(const Parameters &other);
+    ~Parameters();
+
+    const drive_params_t *get() const
+    {
+        return values_.get();
+    }
+    const drive_params_t &operator*() const
+    {
+        return *values_;
+    }
+    drive_params_t &operator*()
+    {
+        return *values_;
+    }
+    const drive_params_t *operator->() const
+    {
+        return values_.get();
+    }
+    drive_params_t *operator->()
+    {
+        return values_.get();
+    }
+
+  private:
+    std::unique_ptr<drive_params_t> values_;
+};
 
 const std::vector<std::string> &parameter_names();
 std::optional<drive_param_id_t> find_parameter(const std::string &name);

@@ -22,7 +22,7 @@ static bool refusal_expected(const Scenario &scenario)
 static rig_t *create(const Scenario &scenario)
 {
     char error[200];
-    rig_t *rig = rig_create(&scenario.setup.plant, scenario.theta_e_rad, &scenario.setup.params,
+    rig_t *rig = rig_create(&scenario.setup.plant, scenario.theta_e_rad, scenario.setup.params.get(),
                             refusal_expected(scenario), error, sizeof error);
     if (rig == nullptr) {
         const std::string reason = error, plant = "plant: ";

@@ -4,8 +4,8 @@
 
 #include <stdint.h>
 
-#include "firmware/params/parameters.h"
 #include "firmware/params/store.h"
+#include "firmware/params/types.h"
 
 /* Returns the number of words that are used; 0, with *refused and *reason, when the drive refuses one. */
 uint32_t parameter_page(const drive_params_t *params, uint32_t words[STORE_WORDS], const char **refused,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <fstream>
 
+#include "firmware/params/parameters.h"
 #include "tools/pmsim/loop.h"
 #include "tools/pmsim/rig.h"
 
@@ -94,7 +95,7 @@ void write_recording(const Recording &recording, const std::string &path)
         bytes.put(word);
     }
     for (int id = 0; id < DRIVE_PARAM_COUNT; ++id) {
-        bytes.put(drive_param_get(&recording.params, static_cast<drive_param_id_t>(id)));
+        bytes.put(drive_param_get(recording.params.get(), static_cast<drive_param_id_t>(id)));
     }
     for (const record_period_t &period : recording.periods) {
         put_period(bytes, period);

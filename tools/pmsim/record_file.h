@@ -15,7 +15,7 @@ namespace pmsim
 {
 
 struct Recording {
-    drive_params_t params;
+    Parameters params;
     uint32_t slow_divider = 0;
     std::vector<record_period_t> periods;
 };

@@ -10,7 +10,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "firmware/params/parameters.h"
+#include "firmware/params/types.h"
 #include "hal/can_frame.h"
 #include "sim_plant/plant.h"
 #include "tools/pmsim/record.h"

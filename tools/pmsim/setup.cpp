@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "firmware/params/parameters.h"
 #include "tools/pmsim/setup_fields.h"
 #include "tools/pmsim/text.h"
 
@@ -63,7 +64,7 @@ void derive_board_parameters(Setup &setup)
     const plant_sensor_t &sensor = setup.plant.sensor;
     const auto derive = [&setup](drive_param_id_t id, double si) {
         if (setup.given.count(std::string("drive.") + drive_param_table[id].name) == 0) {
-            set_parameter_si(setup.params, id, si);
+            set_parameter_si(*setup.params, id, si);
         }
     };
     derive(DRIVE_PARAM_f_pwm, inverter.f_pwm_Hz);
@@ -136,7 +137,6 @@ std::vector<std::string> section_keys(const std::string &section)
 Setup default_setup()
 {
     Setup setup{};
-    drive_params_default(&setup.params);
     setup.trapezoid_flat_deg = -1.0;
     setup.plant.winding.sets = 1;
     setup.plant.inverter.f_pwm_Hz = 10e3;
@@ -156,7 +156,7 @@ Setup default_setup()
 void read_setting(Setup &setup, const std::string &section, const std::string &key, const Value &value)
 {
     if (section == "drive") {
-        read_parameter(setup.params, key, value);
+        read_parameter(*setup.params, key, value);
         setup.given[section + "." + key] = value.place();
         return;
     }

@@ -38,7 +38,7 @@ struct Setup {
     double trapezoid_flat_deg;               // of the EMF; negative: none
     Rated rated;
     double i_break_A; // over-current comparator of the board; 0: none
-    drive_params_t params;
+    Parameters params;
     std::map<std::string, Place> given; // "section.key": where it stands, the last time
 };
 

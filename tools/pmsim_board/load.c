@@ -3,6 +3,7 @@
 #include <stddef.h>
 
 #include "firmware/can/dictionary.h"
+#include "firmware/params/parameters.h"
 
 #define NODE_ID        1U
 #define REQUEST_ID     (0x600U + NODE_ID)

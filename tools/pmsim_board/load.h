@@ -7,7 +7,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "firmware/params/parameters.h"
+#include "firmware/params/types.h"
 #include "sim_plant/board/board.h"
 
 #ifdef __cplusplus

@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "firmware/can/cia402.h"
+#include "firmware/params/parameters.h"
 
 /* controlword, mode, velocity; controlword, torque, current */
 #define NODE_ID   1U

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "firmware/params/parameters.h"
 #include "tests/unit/pmsim/support.h"
 
 namespace pmsim

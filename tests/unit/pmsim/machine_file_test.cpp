@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 
+#include "firmware/params/parameters.h"
 #include "tests/unit/pmsim/support.h"
 
 extern "C" {
@@ -132,7 +133,7 @@ TEST_P(DriveFiles, AreAcceptedByTheDrive)
 {
     const pmsim::Setup setup = load_machine_file(GetParam());
     char error[200] = "";
-    rig_t *rig = rig_create(&setup.plant, 0.0, &setup.params, false, error, sizeof error);
+    rig_t *rig = rig_create(&setup.plant, 0.0, setup.params.get(), false, error, sizeof error);
     EXPECT_NE(rig, nullptr) << error;
     rig_destroy(rig);
 }
@@ -153,10 +154,10 @@ TEST_P(DriveFiles, DriveKnowsTheMachine)
 {
     const pmsim::Setup setup = load_machine_file(GetParam());
     const plant_machine_t &m = setup.plant.machine;
-    const auto si = [&setup](drive_param_id_t id) { return parameter_si(setup.params, id); };
+    const auto si = [&setup](drive_param_id_t id) { return parameter_si(*setup.params, id); };
     const Core core(m);
     const Incremental zero = inductances(core, 0.0, 1e-6);
-    EXPECT_EQ(setup.params.pole_pairs, m.pole_pairs);
+    EXPECT_EQ(setup.params->pole_pairs, m.pole_pairs);
     EXPECT_NEAR(si(DRIVE_PARAM_psi_m), m.psi_m_Wb, rounding * m.psi_m_Wb);
     EXPECT_NEAR(si(DRIVE_PARAM_R_s), m.R_s_ohm + setup.plant.inverter.r_on_ohm, rounding * m.R_s_ohm);
     EXPECT_NEAR(si(DRIVE_PARAM_J), setup.plant.mech.J_kgm2, rounding * setup.plant.mech.J_kgm2);
@@ -180,15 +181,15 @@ double mtpa_i_d(const drive_params_t &p, double i_q)
 TEST_P(DriveFiles, RatedInductancesAreThoseOfTheCore)
 {
     const pmsim::Setup setup = load_machine_file(GetParam());
-    const auto si = [&setup](drive_param_id_t id) { return parameter_si(setup.params, id); };
+    const auto si = [&setup](drive_param_id_t id) { return parameter_si(*setup.params, id); };
     const Core core(setup.plant.machine);
     const double i_q = setup.rated.i_rated_A;
-    const Incremental rated = inductances(core, mtpa_i_d(setup.params, i_q), i_q);
+    const Incremental rated = inductances(core, mtpa_i_d(*setup.params, i_q), i_q);
     EXPECT_NEAR(si(DRIVE_PARAM_L_q_rated), rated.L_q_apparent, rounding * rated.L_q);
     EXPECT_NEAR(si(DRIVE_PARAM_L_dh_rated), rated.L_d, rounding * rated.L_d);
     EXPECT_NEAR(si(DRIVE_PARAM_L_qh_rated), rated.L_q, rounding * rated.L_q);
     EXPECT_NEAR(si(DRIVE_PARAM_L_dqh_rated), rated.L_dq, 0.005 * rated.L_q);
-    const Incremental half = inductances(core, mtpa_i_d(setup.params, 0.5 * i_q), 0.5 * i_q);
+    const Incremental half = inductances(core, mtpa_i_d(*setup.params, 0.5 * i_q), 0.5 * i_q);
     EXPECT_NEAR(si(DRIVE_PARAM_cross_half), half.L_dq / half.L_q, 0.002);
 }
 
@@ -207,7 +208,7 @@ TEST(MachineFile, Ipm1000IsTheFirmwaresDefault)
     for (int i = 0; i < DRIVE_PARAM_COUNT; ++i) {
         const auto id = static_cast<drive_param_id_t>(i);
         if (id != DRIVE_PARAM_i_noise) { // derived from the converter
-            EXPECT_EQ(drive_param_get(&setup.params, id), drive_param_table[i].def)
+            EXPECT_EQ(drive_param_get(setup.params.get(), id), drive_param_table[i].def)
                 << drive_param_table[i].name;
         }
     }
@@ -280,13 +281,13 @@ TEST(MachineFile, BoardParametersFollowTheBoardUnlessGiven)
         read_setting(setup, section, key, Value::from_text(value, "t"));
     };
     set("inverter", "dead_time_s", "1.0e-6");
-    EXPECT_EQ(setup.params.dead_time, 1000);
+    EXPECT_EQ(setup.params->dead_time, 1000);
     set("drive", "dead_time", "3.0e-6");
     set("inverter", "dead_time_s", "0.5e-6");
-    EXPECT_EQ(setup.params.dead_time, 3000);
+    EXPECT_EQ(setup.params->dead_time, 3000);
     set("rated", "v_dc_V", "200");
     EXPECT_EQ(setup.plant.dclink.v_source_V, 200.0);
-    EXPECT_EQ(setup.params.v_dc_nominal, 200000);
+    EXPECT_EQ(setup.params->v_dc_nominal, 200000);
 }
 
 } // namespace

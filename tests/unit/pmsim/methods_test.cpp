@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "firmware/params/parameters.h"
 #include "tools/pmsim/drive_parameters.h"
 
 namespace pmsim

@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 
+#include "firmware/params/parameters.h"
 #include "tests/support/temporary_file.h"
 #include "tests/unit/pmsim/support.h"
 #include "tools/pmsim/loop.h"

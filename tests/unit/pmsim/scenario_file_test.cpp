@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include "firmware/params/parameters.h"
 #include "tests/unit/pmsim/support.h"
 
 namespace pmsim
@@ -55,7 +56,7 @@ TEST(ScenarioFile, OverridesAreLaidOverTheMachine)
     EXPECT_EQ(scenario.setup.plant.machine.c_A_Wb5, 0.0);
     EXPECT_EQ(scenario.setup.plant.machine.L_d0_H, 46.3e-3);
     EXPECT_EQ(scenario.setup.plant.sensor.offset_A[2], -0.1);
-    EXPECT_EQ(scenario.setup.params.flux_bandwidth, 25000);
+    EXPECT_EQ(scenario.setup.params->flux_bandwidth, 25000);
 }
 
 TEST(ScenarioFile, SeedDecidesTheRandomAngleAndTheNoise)
@@ -204,10 +205,10 @@ TEST(ScenarioFile, SettingsReachEverything)
                                                       {"inverter.dead_time_s", "0"},
                                                       {"start.theta_e_deg", "90"},
                                                       {"duration_s", "0.5"}});
-    EXPECT_EQ(scenario.setup.params.flux_bandwidth, 20000);
-    EXPECT_EQ(scenario.setup.params.speed_low, 3000);
+    EXPECT_EQ(scenario.setup.params->flux_bandwidth, 20000);
+    EXPECT_EQ(scenario.setup.params->speed_low, 3000);
     EXPECT_EQ(scenario.setup.plant.inverter.dead_time_s, 0.0);
-    EXPECT_EQ(scenario.setup.params.dead_time, 0); // follows the inverter
+    EXPECT_EQ(scenario.setup.params->dead_time, 0); // follows the inverter
     EXPECT_NEAR(scenario.theta_e_rad, 1.5707963268, 1e-9);
     EXPECT_EQ(scenario.duration_s, 0.5);
 }
