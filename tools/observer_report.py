@@ -27,35 +27,23 @@ PMSIM = ROOT / "out/build/host-release/tools/pmsim/pmsim"
 COST = ROOT / "out/build/stm32g431/tests/target/observers/observers_cost.elf"
 # SPM-400 is told to be round, whatever its inductances say; its open-loop start is against rated load
 START = {"IPM-1000": "", "SPM-400": ", start_method: 2, i_open_loop: 4.5"}
-ROUND = ("back_emf", "flux_linkage")  # observers that know one inductance
 MACHINES = {"IPM-1000": "ipm_1000.yaml", "SPM-400": "spm_400.yaml"}
 SPEEDS = [0.05, 0.1, 0.2, 0.5, 1.0]
 LOADS = [0, 0.5, 1]
 USABLE_DEG = 10  # an observer is usable where its largest error at three loads stays below
 
-# What must be known of the machine beside its speed range: of every observer of the list.
-NEEDS = {
-    "active_flux": "R (follows at low speed), L_q(i_q); psi_m as a centre, L_d for it",
-    "back_emf": "R (follows), L_s(i_q); psi_m as a centre",
-    "extended_emf": "R (follows), L_d, L_q(i_q); psi_m as a centre",
-    "extended_emf_ab": "R (follows), L_d, L_q(i_q); psi_m as a centre",
-    "flux_linkage": "R (follows), L_s(i_q); psi_m as a centre",
-    "sliding_mode": "R, L_q(i_q); psi_m for error scale and gain, which must exceed the EMF",
-    "ekf_full": "R, L_d, L_q(i_q), psi_m; noise of voltage, current and acceleration",
-    "ekf_reduced": "R, L_d, L_q(i_q), psi_m; noise of the EMF and acceleration",
-    "mras_current": "R, L_d, L_q(i_q), psi_m",
-    "mras_voltage": "R, L_d, L_q(i_q), psi_m",
-    "mras_simple": "R, L_d, L_q(i_q), psi_m",
-}
 SEEN = "fault", "angle_error_mean_deg", "angle_error_rms_deg", "angle_error_max_deg"
+
+
+def knows(name):
+    """What must be known of the machine beside its speed range: observers/x.yaml."""
+    match = re.search(r'^knows: "(.*)"$', (ROOT / f"observers/{name}.yaml").read_text(), re.MULTILINE)
+    return match[1] if match else sys.exit(f"observer_report: observers/{name}.yaml does not say `knows`")
 
 
 def observers():
     text = (ROOT / "observers/observers.def").read_text()
     found = re.findall(r'^PM_METHOD\((\w+), "(.*?)",', text, re.MULTILINE)
-    for name, _ in found:
-        if name not in NEEDS:
-            sys.exit(f"observer_report: NEEDS says nothing of {name}")
     return found
 
 
@@ -244,8 +232,9 @@ def table(head, rows):
 
 def plot(machine, results, path):
     figure, axes = plt.subplots(1, 2, figsize=(11, 4.2))
+    names = [name for name, _ in observers()]
     for name, r in results.items():
-        n = list(NEEDS).index(name)  # the same line in every figure
+        n = names.index(name)  # the same line in every figure
         style = {"color": f"C{n % 6}", "linestyle": "-" if n < 6 else "--"}
         per_speed = [[r["steady"][k * len(LOADS) + n] for n in range(len(LOADS))] for k in range(len(SPEEDS))]
         axes[0].plot([100 * s for s in SPEEDS], [worst(part) for part in per_speed], marker="o", label=name, ms=4,
@@ -270,10 +259,11 @@ def measure(machine, chosen, ids, count):
                "reversal": dynamics(machine, "reversal"), "errors": errors(machine),
                "harmonics": harmonics(machine)}
     results = {}
+    one_inductance = [name for name, words in observers() if "(round machines)" in words]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for name in chosen:
-            own = studies | {"machines": monte_carlo(machine, count, 4, name in ROUND),
-                             "quick": monte_carlo(machine, count, 5, name in ROUND)}
+            own = studies | {"machines": monte_carlo(machine, count, 4, name in one_inductance),
+                             "quick": monte_carlo(machine, count, 5, name in one_inductance)}
             got = dict(zip(own, pool.map(lambda study, n=ids[name]: study.run(n), own.values())))
             if None not in got.values():  # the drive takes it for this machine
                 results[name] = got
@@ -307,7 +297,7 @@ def page(all_results, names, plots, counted, sizes, help_of, count):
             lowest.append("-" if r is None else lowest_usable(r["steady"]))
             lost.append("-" if r is None else f"{sum(m[0] for m in r['machines'])} ({sum(m[0] for m in r['quick'])})")
         state, config = sizes.get(name, (0, 0))
-        rows.append([f"`{name}`: {words}", str(instructions[name]), f"{state} + {config}", *lowest, *lost, NEEDS[name]])
+        rows.append([f"`{name}`: {words}", str(instructions[name]), f"{state} + {config}", *lowest, *lost, knows(name)])
     text.append(table(["observer", "instructions with the loop", "bytes of state + configuration",
                        *[f"lowest speed, {m}" for m in all_results], *[f"lost of {count}, {m}" for m in all_results],
                        "needs to know"], rows))

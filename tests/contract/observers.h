@@ -1,89 +1,72 @@
-// Every observer of observers/observers.def for the linear machine of the tests: per-unit configurations as
-// the headers give them, and a speed at which each works.
+// Every observer of observers/observers.def for a linear machine, configured as the drive does it: by its maker,
+// from SI parameters.
 #pragma once
 
+#include <cmath>
+#include <string>
 #include <vector>
 
+#include "firmware/params/parameters.h"
 #include "tests/contract/bench.h"
-#include "tests/contract/mras_config.h"
-#include "tests/unit/observers/ekf_bench.h"
-#include "tests/unit/observers/sliding_mode_bench.h"
 
 namespace bench
 {
 
 struct ObserverCase {
-    const char *name;
+    std::string name;
     observer_config_t config;
-    double omega_pu; // electrical, of the base
-    int settle;      // periods until a change of the frame shows in eps to 3 %
 };
 
-namespace observers
+// The machine without saturation, on an inverter that has these bases.
+inline drive_params_t parameters(const Machine &linear, const Base &b)
 {
-
-// A filter of 300 Hz in the present frame.
-constexpr int kFilter300Hz = 20;
-
-inline int settle(observer_id_t id)
-{
-    return id == OBSERVER_back_emf || id == OBSERVER_extended_emf ? kFilter300Hz : 5;
+    drive_params_t p;
+    drive_params_default(&p);
+    const auto set = [&p](drive_param_id_t id, double si) {
+        drive_param_set(&p, id, static_cast<int32_t>(std::lround(si * std::pow(10, -drive_param_exp10[id]))));
+    };
+    set(DRIVE_PARAM_f_pwm, 1 / b.period_s);
+    set(DRIVE_PARAM_v_full_scale, b.v_V);
+    set(DRIVE_PARAM_i_full_scale, b.i_A);
+    set(DRIVE_PARAM_speed_trip, b.omega_rad_s / linear.pole_pairs);
+    set(DRIVE_PARAM_pole_pairs, linear.pole_pairs);
+    set(DRIVE_PARAM_R_s, linear.R_ohm);
+    for (const auto id : {DRIVE_PARAM_L_d, DRIVE_PARAM_L_dh_rated}) {
+        set(static_cast<drive_param_id_t>(id), linear.L_d0_H);
+    }
+    for (const auto id : {DRIVE_PARAM_L_q, DRIVE_PARAM_L_q_rated, DRIVE_PARAM_L_qh_rated}) {
+        set(static_cast<drive_param_id_t>(id), linear.L_q0_H);
+    }
+    set(DRIVE_PARAM_L_dqh_rated, 0);
+    set(DRIVE_PARAM_cross_half, 0);
+    set(DRIVE_PARAM_psi_m, linear.psi_m_Wb);
+    return p;
 }
 
-inline void configure(active_flux_config_t &c, const Machine &m, const Base &b)
+// As the drive makes it. An observer for round machines refuses a salient one; it gets L_q for both axes, which
+// is the same machine without i_d.
+inline ObserverCase observer_case(observer_id_t id, const char *name, const Machine &m, const Base &b)
 {
-    c = flux_config(m, b);
+    drive_params_t p = parameters(m, b);
+    p.observer = static_cast<int32_t>(id);
+    drive_config_t config = {};
+    if (!drive_configure(&config, &p).ok) {
+        p.L_d = p.L_q;
+        p.L_dh_rated = p.L_qh_rated;
+        p.start_method = 2;
+    }
+    const drive_result_t result = drive_configure(&config, &p);
+    return {result.ok ? name : name + (": " + std::string(drive_param_table[result.param].name)),
+            result.ok ? config.position.observer : observer_config_t{OBSERVER_COUNT, {}}};
 }
-
-inline void configure(emf_config_t &c, const Machine &m, const Base &b)
-{
-    c = emf_config(m, b);
-}
-
-inline void configure(flux_linkage_config_t &c, const Machine &m, const Base &b)
-{
-    c.flux = flux_config(m, b);
-    c.g = PM_Q(0.5);
-}
-
-inline void configure(sliding_mode_config_t &c, const Machine &m, const Base &b)
-{
-    c = sliding_mode_config(m, b, SLIDING_MODE_SATURATION, false);
-}
-
-inline void configure(ekf_full_config_t &c, const Machine &m, const Base &b)
-{
-    c = ekf_full_config(m, b);
-}
-
-inline void configure(ekf_reduced_config_t &c, const Machine &m, const Base &b)
-{
-    c = ekf_reduced_config(m, b);
-}
-
-// The three of observers/mras.h have one configuration.
-inline void configure(mras_config_t &c, const Machine &m, const Base &b)
-{
-    c = mras_config(m, b);
-}
-
-} // namespace observers
 
 inline std::vector<ObserverCase> observer_cases(const Machine &m = kIpmLinear, const Base &b = kIpmBase)
 {
-    std::vector<ObserverCase> all;
-    ObserverCase c = {};
-    c.omega_pu = 0.4;
-#define PM_METHOD(x, help, traits, needs)                                                                    \
-    c.name = #x;                                                                                             \
-    c.config = {};                                                                                           \
-    c.config.id = OBSERVER_##x;                                                                              \
-    c.settle = observers::settle(c.config.id);                                                               \
-    observers::configure(c.config.x, m, b);                                                                  \
-    all.push_back(c);
+    return {
+#define PM_METHOD(x, help, traits, needs) observer_case(OBSERVER_##x, #x, m, b),
 #include "observers/observers.def"
 #undef PM_METHOD
-    return all;
+    };
 }
 
 } // namespace bench

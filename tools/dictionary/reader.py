@@ -11,7 +11,8 @@ EDS_FORMAT = 0x80  # 1022h: the manufacturer's own
 DEVICE_KEYS = ("vendor", "vendor_id", "product", "product_code", "revision", "default_node_id")
 FAULT_LINE = re.compile(r'PM_FAULT\((\w+), "([^"]*)"\)')
 ROW = re.compile(r'^PM_METHOD\((\w+), "([^"]*)"', re.MULTILINE)
-PART_KEYS = ("methods", "objects", "members")
+FACTS = ("knows", "period_instructions", "step_instructions", "interrupt", "replay")  # read by tests and reports
+PART_KEYS = ("methods", "objects", "members") + FACTS
 
 
 @dataclass
@@ -233,6 +234,8 @@ def _part(file, project, added):
     """The objects of a method's file, [(table, methods)]; its members go to `added`."""
     root = source.load(project / file, file)
     root.only(PART_KEYS)
+    for key in FACTS:
+        root.text(key, "-")
     methods = _methods(root, file, project)
     for member in root.tables("members", "member") if "members" in root.nodes else []:
         member.only(model.MEMBER_KEYS + ("record",))

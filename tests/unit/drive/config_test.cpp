@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "firmware/params/parameters.h"
+#include "observer_gains.h" // made by CMake: all of tests/unit/observers/*_gains.h
 #include "tests/contract/bench.h"
 #include "tests/unit/math/samples.h"
 
@@ -386,53 +387,16 @@ class Draw
     int n_ = 0;
 };
 
-using Names = std::vector<std::pair<const char *, int64_t>>;
-
-Names flux_must_be_positive(const active_flux_config_t &f)
-{
-    return {{"flux R", f.model.R}, {"flux t_s", f.model.t_s}, {"flux g", f.g}, {"flux k_seed", f.k_seed}};
-}
+using gains::Names;
 
 Names observer_must_be_positive(const observer_config_t &o)
 {
     switch (o.id) {
-    case OBSERVER_active_flux:
-        return flux_must_be_positive(o.active_flux);
-    case OBSERVER_flux_linkage:
-        return flux_must_be_positive(o.flux_linkage.flux);
-    case OBSERVER_back_emf:
-    case OBSERVER_extended_emf:
-    case OBSERVER_extended_emf_ab:
-        return {{"EMF R", o.extended_emf.model.R},
-                {"EMF k_filter", o.extended_emf.k_filter},
-                {"EMF lag", o.extended_emf.lag},
-                {"EMF rate", o.extended_emf.rate},
-                {"EMF slow_rate", o.extended_emf.slow_rate},
-                {"EMF slow_step", o.extended_emf.slow_step},
-                {"EMF speed_lag", o.extended_emf.speed_lag},
-                {"EMF omega_min", o.extended_emf.omega_min},
-                {"EMF omega_tied", o.extended_emf.omega_tied}};
-    case OBSERVER_sliding_mode:
-        return {{"sliding t_s", o.sliding_mode.model.t_s},
-                {"sliding k_lp", o.sliding_mode.k_lp},
-                {"sliding slope", o.sliding_mode.slope},
-                {"sliding omega_min", o.sliding_mode.omega_min}};
-    case OBSERVER_ekf_full:
-        return {{"ekf per_unit", o.ekf_full.per_unit},
-                {"ekf q_lambda beyond rounding", o.ekf_full.q_lambda + 1 - PM_KALMAN_LEAST(EKF_STATES)},
-                {"ekf q_omega beyond rounding", o.ekf_full.q_omega + 1 - PM_KALMAN_LEAST(EKF_STATES)},
-                {"ekf q_delta beyond rounding", o.ekf_full.q_delta + 1 - PM_KALMAN_LEAST(EKF_STATES)},
-                {"ekf r_d in range", o.ekf_full.r_d + 1 - PM_KALMAN_LEAST_R},
-                {"ekf r_q in range", o.ekf_full.r_q + 1 - PM_KALMAN_LEAST_R}};
-    case OBSERVER_mras_current:
-    case OBSERVER_mras_voltage:
-    case OBSERVER_mras_simple:
-        return {{"mras k", o.mras_current.k},
-                {"mras emf_min", o.mras_current.emf_min},
-                {"mras turn", o.mras_current.turn}};
-    case OBSERVER_ekf_reduced:
-        return {{"ekf omega_min", o.ekf_reduced.omega_min},
-                {"ekf r in range", o.ekf_reduced.r + 1 - PM_KALMAN_LEAST_R}};
+#define PM_METHOD(x, help, traits, needs)                                                                    \
+    case OBSERVER_##x:                                                                                       \
+        return gains::must_be_positive(o.x);
+#include "observers/observers.def"
+#undef PM_METHOD
     default:
         return {};
     }

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tests/contract/bench.h"
+#include "tests/unit/observers/flux_bench.h"
 
 namespace
 {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "tests/contract/bench.h"
+#include "tests/unit/observers/flux_bench.h"
 
 namespace
 {

@@ -6,6 +6,7 @@
 
 #include "tests/unit/math/samples.h"
 #include "tests/unit/observers/closed.h"
+#include "tests/unit/observers/emf_bench.h"
 
 namespace
 {

@@ -4,6 +4,7 @@
 
 #include "tests/unit/math/samples.h"
 #include "tests/unit/observers/closed.h"
+#include "tests/unit/observers/flux_bench.h"
 
 namespace
 {

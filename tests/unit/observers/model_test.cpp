@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "tests/unit/observers/closed.h"
+#include "tests/unit/observers/emf_bench.h"
+#include "tests/unit/observers/flux_bench.h"
 
 namespace
 {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "tests/contract/mras_config.h"
+#include "tests/unit/observers/mras_bench.h"
 
 namespace
 {
