@@ -73,6 +73,11 @@ hal_status_t hal_init(hal_t *hal, const hal_config_t *config);
 void hal_start(hal_t *hal, app_t *app);
 
 const char *hal_board_name(const hal_t *hal);
+
+/* any: what it measures and does beside the common, NEEDS_... of measure.h; the same from reset on. A member
+ * of drive_in_t.more that belongs to no declared channel is zero, one of drive_out_t.instants is ignored. */
+uint32_t hal_channels(const hal_t *hal);
+
 uint32_t hal_timer_Hz(const hal_t *hal); /* clock of the carrier: timer_counts = timer_Hz / (2 f_pwm) */
 void hal_unique_id(const hal_t *hal, uint32_t id[3]);
 hal_reset_t hal_reset_cause(const hal_t *hal);
@@ -90,8 +95,8 @@ void hal_reset(hal_t *hal); /* thread: bridge off, then restart; does not return
 /* --- bridge.c ------------------------------------------------------------------------------------------ */
 
 /* control, budget 60 instructions: compare values take effect at the next update event, a change of the
- * driven legs there or within 2 us after it; out->trip switches all off at once. Both halves of a period are
- * equal on ports that say so in port.h. */
+ * legs' states there or within 2 us after it; out->trip switches all off at once. Without NEEDS_HALVES
+ * compare[leg][0] serves both halves. */
 void hal_bridge_write(hal_t *hal, const drive_out_t *out);
 
 /* thread: lets the outputs follow hal_bridge_write(). False, and still off, while the break input is active

@@ -134,15 +134,13 @@ static void pulses(drive_t *drive, drive_out_t *out)
         const int32_t on = pm_mulh(p.duty[x], pm_shl(drive->config.modulator.counts, 32 - PM_Q_BITS));
         out->compare[x][0] = (uint16_t)on;
         out->compare[x][1] = (uint16_t)on;
-        out->driven[x] = p.driven;
     }
+    out->legs = p.driven ? PM_LEGS_PWM : PM_LEGS_OFF;
 }
 
 static void off(drive_out_t *out)
 {
-    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-        out->driven[x] = false;
-    }
+    out->legs = PM_LEGS_OFF;
 }
 
 /* A period without control: a fault, the bridge off, calibration, pulses. */
@@ -153,7 +151,7 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
     drive->v_acting = drive->v_next;
     drive->v_next = (pm_ab_t){0, 0};
     drive->status.theta = drive->position.pll.theta;
-    out->trip = drive->fault != DRIVE_FAULT_NONE;
+    out->trip = drive->fault != DRIVE_FAULT_NONE ? 1U : 0U;
     if (drive->stage == STAGE_PULSES) {
         pulses(drive, out);
     } else {
@@ -186,10 +184,8 @@ static inline void write_out(const modulator_out_t *m, drive_out_t *out)
     pm_store_twice(out->compare[0], m->on[0]);
     pm_store_twice(out->compare[1], m->on[1]);
     pm_store_twice(out->compare[2], m->on[2]);
-    out->driven[0] = true;
-    out->driven[1] = true;
-    out->driven[2] = true;
-    out->trip = false;
+    out->legs = PM_LEGS_PWM;
+    out->trip = 0;
 }
 
 /* The voltage acts one and a half periods later, when the frame has turned to drive->ahead. */

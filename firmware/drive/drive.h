@@ -16,27 +16,50 @@
 #define DRIVE_DRIVE_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "firmware/drive/config.h"
 #include "firmware/drive/fault.h"
 #include "firmware/drive/parameters.h"
 #include "firmware/math/frames.h"
+#include "firmware/math/legs.h"
+#include "firmware/math/measure.h"
 
-#define DRIVE_LEGS 3
+#define DRIVE_LEGS PM_LEGS
 
+/* What every board measures, then what methods may need beside it (measure.h). */
 typedef struct {
     uint16_t i_leg[DRIVE_LEGS]; /* left-aligned code, mid-scale = zero, positive into the motor */
     uint16_t v_dc;              /* left-aligned code */
     bool hw_fault;              /* break input has switched the bridge off */
+#if PM_CARRIES(PM_MEASURED)
+    pm_measure_t more;
+#endif
 } drive_in_t;
 
 typedef struct {
-    /* timer counts of the rising- and falling-edge half of the carrier: on-time of that half */
+    /* timer counts of the rising- and falling-edge half of the carrier: on-time of the upper switch in that
+     * half */
     uint16_t compare[DRIVE_LEGS][2];
-    bool driven[DRIVE_LEGS]; /* false: both switches off */
-    bool trip;               /* a fault: the port opens the bridge now, not at the update event */
+    uint16_t legs; /* PM_LEGS_... */
+    uint16_t trip; /* 1, a fault: the port opens the bridge now, not at the update event */
+#if PM_CARRIES(PM_DONE_AT)
+    pm_instants_t instants;
+#endif
 } drive_out_t;
+
+/* Bytes that come first and are the same in every program. */
+#if PM_CARRIES(PM_MEASURED)
+#define DRIVE_IN_COMMON offsetof(drive_in_t, more)
+#else
+#define DRIVE_IN_COMMON sizeof(drive_in_t)
+#endif
+#if PM_CARRIES(PM_DONE_AT)
+#define DRIVE_OUT_COMMON offsetof(drive_out_t, instants)
+#else
+#define DRIVE_OUT_COMMON sizeof(drive_out_t)
+#endif
 
 typedef struct {
     int32_t temperature_dC; /* 0.1 degC, hottest of the sensors */

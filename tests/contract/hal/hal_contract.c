@@ -100,11 +100,11 @@ static void wait_us(run_t *run, uint32_t us)
 static void float_all(struct app *app)
 {
     for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
-        app->out.driven[leg] = false;
         app->out.compare[leg][0] = 0;
         app->out.compare[leg][1] = 0;
     }
-    app->out.trip = false;
+    app->out.legs = PM_LEGS_OFF;
+    app->out.trip = 0;
 }
 
 static void check_refusals(run_t *run)
@@ -182,12 +182,10 @@ static void check_bridge(run_t *run)
     check(run, "arms", hal_bridge_arm(run->hal), 0);
     check(run, "is armed", hal_bridge_armed(run->hal), 0);
     wait_us(run, 1000);
-    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
-        app->out.driven[leg] = true; /* compare 0: all low */
-    }
+    app->out.legs = PM_LEGS_PWM; /* compare 0: all low */
     wait_us(run, 1000);
     check(run, "stays armed with all legs low", hal_bridge_armed(run->hal), 0);
-    app->out.trip = true;
+    app->out.trip = 1;
     wait_us(run, 1000);
     check(run, "a trip disarms", !hal_bridge_armed(run->hal), 0);
     float_all(app);

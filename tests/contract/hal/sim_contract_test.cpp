@@ -28,7 +28,7 @@ void pass_period(hal_t *hal)
             app_monitor(hal->app);
         }
     }
-    plant_run_period(hal->plant);
+    sim_run_period(hal);
     hal->time_us += 100;
 }
 

@@ -34,10 +34,10 @@ static void step(const drive_in_t *in, drive_out_t *out)
 static bool same(const record_period_t *r, const drive_out_t *out)
 {
     for (uint32_t x = 0; x < RECORD_LEGS; x++) {
-        if (out->driven[x] != (r->driven[x] != 0U)) {
+        if ((pm_leg(out->legs, x) != PM_LEG_OFF) != (r->driven[x] != 0U)) {
             return false;
         }
-        if (out->driven[x] &&
+        if (pm_leg(out->legs, x) != PM_LEG_OFF &&
             (out->compare[x][0] != r->compare[x][0] || out->compare[x][1] != r->compare[x][1])) {
             return false;
         }

@@ -77,7 +77,7 @@ struct Drive {
 
     bool driven() const
     {
-        return out.driven[0] || out.driven[1] || out.driven[2];
+        return out.legs != PM_LEGS_OFF;
     }
 
     // Current mode needs no motor: calibration and align, then it runs.

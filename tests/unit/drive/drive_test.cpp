@@ -49,7 +49,7 @@ class Closed
     {
         for (int k = 0; k < 10 * ms; ++k) {
             sim_loop_step(&loop);
-            const bool driven = loop.app.out.driven[0] || loop.app.out.driven[1] || loop.app.out.driven[2];
+            const bool driven = loop.app.out.legs != PM_LEGS_OFF;
             const drive_state_t s = state();
             if (states.empty() || states.back() != s) {
                 states.push_back(s);

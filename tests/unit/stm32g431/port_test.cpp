@@ -109,7 +109,7 @@ TEST_F(Port, WritesLegsAndTrips)
     for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
         out.compare[leg][0] = out.compare[leg][1] = static_cast<uint16_t>(100 * (leg + 1));
     }
-    out.driven[0] = out.driven[2] = true;
+    out.legs = pm_legs_of(PM_LEG_PWM, PM_LEG_OFF, PM_LEG_PWM);
     ASSERT_TRUE(hal_bridge_arm(hal));
     hal_bridge_write(hal, &out);
     EXPECT_EQ(TIM1.CCR1, 100U);
