@@ -124,9 +124,11 @@ static void make_limits(maker_t *m, drive_config_t *config)
     config->dL = config->current.L_d - config->current.L_q;
 }
 
-drive_result_t drive_configure(drive_config_t *config, const drive_params_t *params)
+drive_result_t drive_configure(drive_config_t *config, const drive_params_t *params, uint32_t channels)
 {
-    maker_t m = {.params = params, .result = {.ok = true, .param = DRIVE_PARAM_COUNT, .reason = "ok"}};
+    maker_t m = {.params = params,
+                 .channels = channels & PM_CHANNELS,
+                 .result = {.ok = true, .param = DRIVE_PARAM_COUNT, .reason = "ok"}};
     check_ranges(&m);
     check_machine(&m);
     if (!m.result.ok) {

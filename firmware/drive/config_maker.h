@@ -5,6 +5,8 @@
 #define DRIVE_CONFIG_MAKER_H
 
 #include "firmware/drive/config.h"
+#include "firmware/math/compiler.h"
+#include "firmware/math/measure.h"
 
 /* Formats of fixed.h. */
 #define Q_BITS     28
@@ -21,6 +23,7 @@ typedef struct {
     pm_num_t t_slow;                /* ... and what that is, s */
     mtpa_config_t mtpa;             /* already made */
     drive_result_t result;
+    uint32_t channels; /* that the board has and the image carries: NEEDS_... */
 } maker_t;
 
 /* The first refusal counts. */
@@ -28,6 +31,15 @@ static inline void refuse(maker_t *m, drive_param_id_t id, const char *reason)
 {
     if (m->result.ok) {
         m->result = (drive_result_t){.ok = false, .param = id, .reason = reason};
+    }
+}
+
+/* What the method that parameter `id` chooses needs of the board. No code where it needs nothing. */
+PM_INLINE void require(maker_t *m, uint32_t needs, drive_param_id_t id)
+{
+    const uint32_t missing = needs & ~m->channels;
+    if (missing != 0U) {
+        refuse(m, id, pm_need_text(missing));
     }
 }
 

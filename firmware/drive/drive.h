@@ -4,7 +4,9 @@
  * it from the same interrupt every config.slow_divider periods, or with that interrupt masked. The rest is
  * for thread context. No function blocks or allocates. The bridge is off unless the state says on.
  *
- *   drive_init(d, params)   configuration from SI parameters; refuses bad ones and names the first
+ *   drive_init(d, params, channels)
+ *                           configuration from SI parameters; refuses bad ones, and methods that need what
+ *                           the board has not, and names the first
  *   drive_step(d, in, out)  one control period; cost: tests/target/drive
  *   drive_slow(d, in)       state machine, speed control, derating
  *   drive_command(d, cmd)   what the user wants; at any time from thread context, with the interrupt masked
@@ -119,7 +121,7 @@ typedef struct {
 typedef struct drive drive_t; /* caller-owned: the struct stands in drive_state.h */
 
 /* On refusal the drive is in DRIVE_FAULT with DRIVE_FAULT_PARAMETERS and stays off. */
-drive_result_t drive_init(drive_t *drive, const drive_params_t *params);
+drive_result_t drive_init(drive_t *drive, const drive_params_t *params, uint32_t channels);
 
 /* Takes a new configuration, whole; ends the fault PARAMETERS. Between two steps: in the slow interrupt.
  * While the drive is not off, nothing that drive_same_frame() compares may differ; the observer may. */

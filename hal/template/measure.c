@@ -7,6 +7,8 @@
 void hal_measure(hal_t *hal, drive_in_t *in)
 {
     (void)hal;
+    /* in->more: each member whose channel hal_channels() declares, for example under
+     * #if PM_CARRIES(NEEDS_TERMINALS), so that an image without it pays nothing */
     *in = (drive_in_t){.i_leg = {0x8000U, 0x8000U, 0x8000U}, .v_dc = 0, .hw_fault = true};
 }
 

@@ -81,7 +81,8 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         return NULL;
     }
     drive_t drive;
-    const drive_result_t result = drive_init(&drive, params);
+    const drive_result_t result =
+        drive_init(&drive, params, 0); /* what the image carries beside the common */
     if (!result.ok && !refusal_expected) {
         snprintf(error, error_size, "drive refuses parameter %s: %s", drive_param_table[result.param].name,
                  result.reason);

@@ -68,7 +68,7 @@ static bool open_record(FILE *file, record_header_t *header)
         header->parameters != DRIVE_PARAM_COUNT || header->period_bytes != sizeof(record_period_t)) {
         return false;
     }
-    return fread(&params, sizeof params, 1, file) == 1 && drive_init(&drive, &params).ok;
+    return fread(&params, sizeof params, 1, file) == 1 && drive_init(&drive, &params, PM_CHANNELS).ok;
 }
 
 static bool same_layout(const record_header_t *header)

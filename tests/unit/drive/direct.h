@@ -36,7 +36,7 @@ struct Drive {
 
     explicit Drive(const drive_params_t &p = params())
     {
-        drive_init(&d, &p);
+        drive_init(&d, &p, PM_CHANNELS);
         for (uint16_t &leg : in.i_leg) {
             leg = current_code(0);
         }

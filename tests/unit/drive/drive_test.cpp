@@ -230,7 +230,7 @@ TEST(Drive, ReferencesFollowCommandAndBases)
     drive_params_t p = direct::params();
     p.speed_trip *= 2;
     drive_config_t other = {};
-    ASSERT_TRUE(drive_configure(&other, &p).ok);
+    ASSERT_TRUE(drive_configure(&other, &p, PM_CHANNELS).ok);
     drive_reconfigure(&x.d, &other);
     x.run_ms(1);
     EXPECT_NEAR(2 * x.d.omega_target, omega, 4);
