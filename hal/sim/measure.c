@@ -1,6 +1,7 @@
 #include "hal/sim/port.h"
 
 #include <math.h>
+#include <string.h>
 
 #define MID_SCALE 0x8000
 
@@ -59,7 +60,7 @@ static void fill_captures(const hal_t *hal, pm_measure_t *more)
 {
     const double capture_s = plant_sensor(hal->plant)->capture_s;
     plant_capture_t edge[PM_CAPTURES];
-    const int seen = capture_s > 0.0 ? plant_captured(hal->plant, edge, PM_CAPTURES) : 0;
+    const int seen = plant_captured(hal->plant, edge, PM_CAPTURES);
     more->captures = (uint16_t)(seen < PM_CAPTURES ? seen : PM_CAPTURES);
     for (uint32_t n = 0; n < more->captures; n++) {
         more->capture[n] = (pm_capture_t){.at = (uint16_t)lrint(edge[n].count * capture_s / count_s(hal)),
@@ -70,13 +71,23 @@ static void fill_captures(const hal_t *hal, pm_measure_t *more)
 
 static void fill_more(const hal_t *hal, pm_measure_t *more)
 {
-    more->missing = (uint16_t)(~hal->adc.settled & 7U);
-    for (uint32_t leg = 0; leg < PM_LEGS; leg++) {
-        more->v_terminal[leg] = hal->adc.v_leg[leg];
+    const uint32_t channels = hal_channels(hal);
+    *more = (pm_measure_t){0};
+    if ((channels & NEEDS_CURRENT_MASK) != 0U) {
+        more->missing = (uint16_t)(~hal->adc.settled & 7U);
     }
-    more->v_neutral = neutral_code(&hal->adc);
-    fill_samples(hal, more);
-    fill_captures(hal, more);
+    if ((channels & NEEDS_TERMINALS) != 0U) {
+        memcpy(more->v_terminal, hal->adc.v_leg, sizeof more->v_terminal);
+    }
+    if ((channels & NEEDS_NEUTRAL) != 0U) {
+        more->v_neutral = neutral_code(&hal->adc);
+    }
+    if ((channels & NEEDS_SECOND_SAMPLE) != 0U) {
+        fill_samples(hal, more);
+    }
+    if ((channels & NEEDS_CAPTURES) != 0U) {
+        fill_captures(hal, more);
+    }
 }
 
 /* Since the last measurement, or still. */
