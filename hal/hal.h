@@ -73,11 +73,6 @@ hal_status_t hal_init(hal_t *hal, const hal_config_t *config);
 void hal_start(hal_t *hal, app_t *app);
 
 const char *hal_board_name(const hal_t *hal);
-
-/* any: what it measures and does beside the common, NEEDS_... of measure.h; the same from reset on. A member
- * of drive_in_t.more that belongs to no declared channel is zero, one of drive_out_t.instants is ignored. */
-uint32_t hal_channels(const hal_t *hal);
-
 uint32_t hal_timer_Hz(const hal_t *hal); /* clock of the carrier: timer_counts = timer_Hz / (2 f_pwm) */
 void hal_unique_id(const hal_t *hal, uint32_t id[3]);
 hal_reset_t hal_reset_cause(const hal_t *hal);
@@ -106,6 +101,10 @@ void hal_bridge_off(hal_t *hal); /* any, 0.2 us: all switches open until armed a
 bool hal_bridge_armed(const hal_t *hal);
 
 /* --- measure.c ----------------------------------------------------------------------------------------- */
+
+/* any: what it measures and does beside the common, NEEDS_... of measure.h; the same from reset on. A member
+ * of drive_in_t.more that belongs to no declared channel is zero, one of drive_out_t.instants is ignored. */
+uint32_t hal_channels(const hal_t *hal);
 
 /* control, budget 40 instructions: the samples at the centre of this period's zero vector. */
 void hal_measure(hal_t *hal, drive_in_t *in);

@@ -104,12 +104,6 @@ const char *hal_board_name(const hal_t *hal)
     return "B-G431B-ESC1";
 }
 
-uint32_t hal_channels(const hal_t *hal)
-{
-    (void)hal;
-    return PORT_CHANNELS;
-}
-
 uint32_t hal_timer_Hz(const hal_t *hal)
 {
     (void)hal;

@@ -53,14 +53,6 @@ const char *hal_board_name(const hal_t *hal)
     return "template";
 }
 
-/* What beside leg currents and DC-link voltage your converters deliver and your timer does: NEEDS_... of
- * firmware/math/measure.h. A method that needs more is refused by name. Declare nothing before it works. */
-uint32_t hal_channels(const hal_t *hal)
-{
-    (void)hal;
-    return 0U;
-}
-
 /* What the PWM counter counts by. */
 uint32_t hal_timer_Hz(const hal_t *hal)
 {

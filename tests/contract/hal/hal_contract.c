@@ -175,11 +175,13 @@ static void check_measurement(run_t *run)
           app->slow.temperature_dC);
 }
 
+#if PM_CARRIES(PM_MEASURED)
 /* A code between two bounds. */
 static void check_code(run_t *run, const char *name, int32_t code, int32_t least, int32_t most)
 {
     check(run, name, code >= least && code <= most, code);
 }
+#endif
 
 /* What the port declares and the program carries, with all legs low: no voltages, no currents. */
 static void check_channels(run_t *run)
