@@ -90,8 +90,8 @@ void hal_reset(hal_t *hal); /* thread: bridge off, then restart; does not return
 /* --- bridge.c ------------------------------------------------------------------------------------------ */
 
 /* control, budget 60 instructions: compare values take effect at the next update event, a change of the
- * driven legs there or within 2 us after it; out->trip switches all off at once. Both halves of a period are
- * equal on ports that say so in port.h. */
+ * legs' states there or within 2 us after it; out->trip switches all off at once. Without NEEDS_HALVES
+ * compare[leg][0] serves both halves. */
 void hal_bridge_write(hal_t *hal, const drive_out_t *out);
 
 /* thread: lets the outputs follow hal_bridge_write(). False, and still off, while the break input is active
@@ -101,6 +101,10 @@ void hal_bridge_off(hal_t *hal); /* any, 0.2 us: all switches open until armed a
 bool hal_bridge_armed(const hal_t *hal);
 
 /* --- measure.c ----------------------------------------------------------------------------------------- */
+
+/* any: what it measures and does beside the common, NEEDS_... of measure.h; the same from reset on. A member
+ * of drive_in_t.more that belongs to no declared channel is zero, one of drive_out_t.instants is ignored. */
+uint32_t hal_channels(const hal_t *hal);
 
 /* control, budget 40 instructions: the samples at the centre of this period's zero vector. */
 void hal_measure(hal_t *hal, drive_in_t *in);

@@ -7,7 +7,9 @@ void make_observer(maker_t *m, observer_config_t *c)
     c->id = (observer_id_t)m->params->observer;
     switch (c->id) {
 #define PM_METHOD(name, help, traits, needs)                                                                 \
-    PM_IN_IMAGE(name, case OBSERVER_##name : make_##name(m, &c->name); break;)
+    PM_IN_IMAGE(name, case OBSERVER_##name                                                                   \
+                : require(m, needs, DRIVE_PARAM_observer);                                                   \
+                make_##name(m, &c->name); break;)
 #include "observers/observers.def"
 #undef PM_METHOD
     case OBSERVER_COUNT:

@@ -73,7 +73,7 @@ drive_result_t app_configure(app_t *app, hal_t *hal, const drive_params_t *param
     app->params = *params;
     app->f_pwm = params->f_pwm;
     app->stored = stored;
-    const drive_result_t result = drive_init(&app->drive, params);
+    const drive_result_t result = drive_init(&app->drive, params, hal_channels(hal));
     app->refused_param = result.param;
     app->hal_config = app_hal_config(params, bit_rate(hal));
     app->hardware = hal_init(hal, &app->hal_config) == HAL_OK;

@@ -32,7 +32,7 @@ static drive_result_t make_next(app_t *app)
     app->next_ready = false;
     __atomic_signal_fence(__ATOMIC_SEQ_CST);
     (void)memset(&app->next, 0, sizeof app->next);
-    return drive_configure(&app->next, &app->params);
+    return drive_configure(&app->next, &app->params, hal_channels(app->hal));
 }
 
 static void hand_over(app_t *app)

@@ -132,9 +132,11 @@ static pm_q_t i_d_rated(const maker_t *m, const mtpa_config_t *mtpa)
     return mtpa_i_d(mtpa, i_rated);
 }
 
-drive_result_t drive_configure(drive_config_t *config, const drive_params_t *params)
+drive_result_t drive_configure(drive_config_t *config, const drive_params_t *params, uint32_t channels)
 {
-    maker_t m = {.params = params, .result = {.ok = true, .param = DRIVE_PARAM_COUNT, .reason = "ok"}};
+    maker_t m = {.params = params,
+                 .channels = channels & PM_CHANNELS,
+                 .result = {.ok = true, .param = DRIVE_PARAM_COUNT, .reason = "ok"}};
     check_ranges(&m);
     check_machine(&m);
     if (!m.result.ok) {

@@ -66,6 +66,7 @@ typedef struct {
     pm_q_t dL; /* L_d - L_q */
 } drive_config_t;
 
-drive_result_t drive_configure(drive_config_t *config, const drive_params_t *params);
+/* channels: what the board has, hal_channels(). */
+drive_result_t drive_configure(drive_config_t *config, const drive_params_t *params, uint32_t channels);
 
 #endif

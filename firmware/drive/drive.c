@@ -13,10 +13,10 @@
 /* The modulator's smallest link voltage; below v_dc_min, which is larger, the bridge is off. */
 #define V_DC_LEAST PM_Q(0.0625)
 
-PM_RARE drive_result_t drive_init(drive_t *drive, const drive_params_t *params)
+PM_RARE drive_result_t drive_init(drive_t *drive, const drive_params_t *params, uint32_t channels)
 {
     *drive = (drive_t){.state = DRIVE_OFF, .stage = STAGE_OFF};
-    const drive_result_t result = drive_configure(&drive->config, params);
+    const drive_result_t result = drive_configure(&drive->config, params, channels);
     if (!result.ok) {
         drive_trip(drive, DRIVE_FAULT_PARAMETERS);
     }
@@ -92,15 +92,44 @@ const drive_fault_record_t *drive_fault_record(const drive_t *drive)
     return &drive->record;
 }
 
+#if PM_CARRIES(NEEDS_CURRENT_MASK)
+/* The currents sum to zero, so one that is missing follows from the others; with fewer than two those of the
+ * period before stand. */
+PM_RARE static pm_abc_t complete(const drive_t *drive, pm_abc_t i, uint32_t missing)
+{
+    pm_abc_t whole = i;
+    switch (missing) {
+    case 1U:
+        whole.a = -(i.b + i.c);
+        break;
+    case 2U:
+        whole.b = -(i.c + i.a);
+        break;
+    case 4U:
+        whole.c = -(i.a + i.b);
+        break;
+    default:
+        whole = drive->i_abc;
+        break;
+    }
+    return whole;
+}
+#endif
+
 static inline void measure(drive_t *drive, const drive_in_t *in)
 {
     const pm_q_t *zero = drive->zero;
     const pm_pair_t zero_ab = pm_pair(&zero[0], &zero[1]);
-    const pm_abc_t i = {
+    pm_abc_t i = {
         .a = pm_shl(in->i_leg[0], CURRENT_BITS) - zero_ab.first,
         .b = pm_shl(in->i_leg[1], CURRENT_BITS) - zero_ab.second,
         .c = pm_shl(in->i_leg[2], CURRENT_BITS) - zero[2],
     };
+#if PM_CARRIES(NEEDS_CURRENT_MASK)
+    if (pm_rarely(in->more.missing != 0U)) {
+        i = complete(drive, i, in->more.missing);
+    }
+#endif
     drive->i_abc = i;
     drive->i_ab = pm_clarke(i);
     drive->status.v_dc = pm_shl(in->v_dc, VOLTAGE_BITS);
@@ -134,15 +163,13 @@ static void pulses(drive_t *drive, drive_out_t *out)
         const int32_t on = pm_mulh(p.duty[x], pm_shl(drive->config.modulator.counts, 32 - PM_Q_BITS));
         out->compare[x][0] = (uint16_t)on;
         out->compare[x][1] = (uint16_t)on;
-        out->driven[x] = p.driven;
     }
+    out->legs = p.driven ? PM_LEGS_PWM : PM_LEGS_OFF;
 }
 
 static void off(drive_out_t *out)
 {
-    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-        out->driven[x] = false;
-    }
+    out->legs = PM_LEGS_OFF;
 }
 
 /* A period without control: a fault, the bridge off, calibration, pulses. */
@@ -153,7 +180,7 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
     drive->v_acting = drive->v_next;
     drive->v_next = (pm_ab_t){0, 0};
     drive->status.theta = drive->position.pll.theta;
-    out->trip = drive->fault != DRIVE_FAULT_NONE;
+    out->trip = drive->fault != DRIVE_FAULT_NONE ? 1U : 0U;
     if (drive->stage == STAGE_PULSES) {
         pulses(drive, out);
     } else {
@@ -186,10 +213,8 @@ static inline void write_out(const modulator_out_t *m, drive_out_t *out)
     pm_store_twice(out->compare[0], m->on[0]);
     pm_store_twice(out->compare[1], m->on[1]);
     pm_store_twice(out->compare[2], m->on[2]);
-    out->driven[0] = true;
-    out->driven[1] = true;
-    out->driven[2] = true;
-    out->trip = false;
+    out->legs = PM_LEGS_PWM;
+    out->trip = 0;
 }
 
 /* The voltage acts one and a half periods later, when the frame has turned to drive->ahead. */

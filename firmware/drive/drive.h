@@ -4,7 +4,9 @@
  * it from the same interrupt every config.slow_divider periods, or with that interrupt masked. The rest is
  * for thread context. No function blocks or allocates. The bridge is off unless the state says on.
  *
- *   drive_init(d, params)   configuration from SI parameters; refuses bad ones and names the first
+ *   drive_init(d, params, channels)
+ *                           configuration from SI parameters; refuses bad ones, and methods that need what
+ *                           the board has not, and names the first
  *   drive_step(d, in, out)  one control period; cost: tests/target/drive
  *   drive_slow(d, in)       state machine, speed control, derating
  *   drive_command(d, cmd)   what the user wants; at any time from thread context, with the interrupt masked
@@ -16,26 +18,49 @@
 #define DRIVE_DRIVE_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "firmware/drive/config.h"
 #include "firmware/drive/fault.h"
 #include "firmware/math/frames.h"
+#include "firmware/math/legs.h"
+#include "firmware/math/measure.h"
 
-#define DRIVE_LEGS 3
+#define DRIVE_LEGS PM_LEGS
 
+/* What every board measures, then what methods may need beside it (measure.h). */
 typedef struct {
     uint16_t i_leg[DRIVE_LEGS]; /* left-aligned code, mid-scale = zero, positive into the motor */
     uint16_t v_dc;              /* left-aligned code */
     bool hw_fault;              /* break input has switched the bridge off */
+#if PM_CARRIES(PM_MEASURED)
+    pm_measure_t more;
+#endif
 } drive_in_t;
 
 typedef struct {
-    /* timer counts of the rising- and falling-edge half of the carrier: on-time of that half */
+    /* timer counts of the rising- and falling-edge half of the carrier: on-time of the upper switch in that
+     * half */
     uint16_t compare[DRIVE_LEGS][2];
-    bool driven[DRIVE_LEGS]; /* false: both switches off */
-    bool trip;               /* a fault: the port opens the bridge now, not at the update event */
+    uint16_t legs; /* PM_LEGS_... */
+    uint16_t trip; /* 1, a fault: the port opens the bridge now, not at the update event */
+#if PM_CARRIES(PM_DONE_AT)
+    pm_instants_t instants;
+#endif
 } drive_out_t;
+
+/* Bytes that come first and are the same in every program. */
+#if PM_CARRIES(PM_MEASURED)
+#define DRIVE_IN_COMMON offsetof(drive_in_t, more)
+#else
+#define DRIVE_IN_COMMON sizeof(drive_in_t)
+#endif
+#if PM_CARRIES(PM_DONE_AT)
+#define DRIVE_OUT_COMMON offsetof(drive_out_t, instants)
+#else
+#define DRIVE_OUT_COMMON sizeof(drive_out_t)
+#endif
 
 typedef struct {
     int32_t temperature_dC; /* 0.1 degC, hottest of the sensors */
@@ -95,7 +120,7 @@ typedef struct {
 typedef struct drive drive_t; /* caller-owned: the struct stands in drive_state.h */
 
 /* On refusal the drive is in DRIVE_FAULT with DRIVE_FAULT_PARAMETERS and stays off. */
-drive_result_t drive_init(drive_t *drive, const drive_params_t *params);
+drive_result_t drive_init(drive_t *drive, const drive_params_t *params, uint32_t channels);
 
 /* Takes a new configuration, whole; ends the fault PARAMETERS. Between two steps: in the slow interrupt.
  * While the drive is not off, nothing that drive_same_frame() compares may differ; the observer may. */

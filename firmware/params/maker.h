@@ -7,7 +7,9 @@
 #ifndef PARAMS_MAKER_H
 #define PARAMS_MAKER_H
 
+#include "firmware/math/compiler.h"
 #include "firmware/math/fixed.h"
+#include "firmware/math/measure.h"
 #include "firmware/params/parameters.h"
 
 /* Formats of fixed.h. */
@@ -25,6 +27,7 @@ struct maker {
     pm_num_t t_slow;                /* ... and what that is, s */
     pm_q_t i_d_rated;               /* of maximum torque per ampere at rated current */
     drive_result_t result;
+    uint32_t channels; /* that the board has and the image carries: NEEDS_... */
 };
 
 /* The first refusal counts. */
@@ -32,6 +35,15 @@ static inline void refuse(maker_t *m, drive_param_id_t id, const char *reason)
 {
     if (m->result.ok) {
         m->result = (drive_result_t){.ok = false, .param = id, .reason = reason};
+    }
+}
+
+/* What the method that parameter `id` chooses needs of the board. No code where it needs nothing. */
+PM_INLINE void require(maker_t *m, uint32_t needs, drive_param_id_t id)
+{
+    const uint32_t missing = needs & ~m->channels;
+    if (missing != 0U) {
+        refuse(m, id, pm_need_text(missing));
     }
 }
 

@@ -1,15 +1,30 @@
 #include "hal/sim/port.h"
 
+#include <assert.h>
+
+/* A leg that is held is one with the duty 0 or 1. */
+static void set_leg(const hal_t *hal, int leg, const drive_out_t *out, plant_pwm_t *pwm)
+{
+    const pm_leg_t state = pm_leg(out->legs, (uint32_t)leg);
+    assert(state != PM_LEG_UPPER && state != PM_LEG_LOWER && state <= PM_LEG_LOW); /* not declared */
+    const bool held = state == PM_LEG_HIGH || state == PM_LEG_LOW;
+    const uint32_t all = state == PM_LEG_HIGH ? hal->timer_counts : 0U;
+    pwm->compare[leg][0] = held ? all : out->compare[leg][0];
+    pwm->compare[leg][1] = held ? all : out->compare[leg][1];
+    pwm->driven[leg] = state != PM_LEG_OFF && hal->armed;
+}
+
 void hal_bridge_write(hal_t *hal, const drive_out_t *out)
 {
     plant_pwm_t pwm = {0};
     for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
-        pwm.compare[leg][0] = out->compare[leg][0];
-        pwm.compare[leg][1] = out->compare[leg][1];
-        pwm.driven[leg] = out->driven[leg] && hal->armed;
+        set_leg(hal, leg, out, &pwm);
     }
     plant_set_pwm(hal->plant, &pwm);
-    if (out->trip) {
+    for (int n = 0; n < PM_SAMPLES; ++n) {
+        hal->sample_at[1][n] = out->instants.sample_at[n];
+    }
+    if (out->trip != 0U) {
         hal_bridge_off(hal);
     }
 }

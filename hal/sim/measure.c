@@ -1,5 +1,95 @@
 #include "hal/sim/port.h"
 
+#include <math.h>
+#include <string.h>
+
+#define MID_SCALE 0x8000
+
+/* Of the sensors that the plant has. Not yet: the link current beside the leg currents, PWM on one switch,
+ * commutation within the period. */
+uint32_t hal_channels(const hal_t *hal)
+{
+    const plant_sensor_t *sensor = plant_sensor(hal->plant);
+    const bool voltages = sensor->v_leg_full_scale_V > 0.0;
+    const uint32_t all = NEEDS_SECOND_SAMPLE | NEEDS_CURRENT_MASK | NEEDS_HALVES | NEEDS_HELD |
+                         (voltages ? NEEDS_TERMINALS | NEEDS_NEUTRAL : 0U) |
+                         (sensor->capture_s > 0.0 ? NEEDS_CAPTURES : 0U);
+    return all & ~hal->without;
+}
+
+/* Of a period of the plant. */
+static double count_s(const hal_t *hal)
+{
+    return 1.0 / (double)hal->timer_Hz;
+}
+
+void sim_run_period(hal_t *hal)
+{
+    hal->sampled = 0;
+    for (uint32_t n = 0; n < PM_SAMPLES; n++) {
+        const uint16_t at = hal->sample_at[0][n];
+        if (at != 0U) {
+            plant_sample_at(hal->plant, at * count_s(hal), &hal->sample[n]);
+            hal->sampled = (uint16_t)(hal->sampled | (1U << n));
+        }
+        hal->sample_at[0][n] = hal->sample_at[1][n];
+        hal->sample_at[1][n] = 0;
+    }
+    plant_run_period(hal->plant);
+}
+
+static void fill_samples(const hal_t *hal, pm_measure_t *more)
+{
+    more->sampled = hal->sampled;
+    for (uint32_t n = 0; n < PM_SAMPLES; n++) {
+        for (uint32_t leg = 0; leg < PM_LEGS; leg++) {
+            more->i_sample[n][leg] = hal->sample[n].i_leg[leg];
+        }
+    }
+}
+
+/* The differential amplifier between star point and the network of resistors at the terminals: half of the
+ * code's range on either side. */
+static uint16_t neutral_code(const plant_adc_t *adc)
+{
+    const int32_t sum = adc->v_leg[0] + adc->v_leg[1] + adc->v_leg[2];
+    return (uint16_t)(MID_SCALE + (3 * adc->v_neutral[0] - sum) / (2 * PM_LEGS));
+}
+
+static void fill_captures(const hal_t *hal, pm_measure_t *more)
+{
+    const double capture_s = plant_sensor(hal->plant)->capture_s;
+    plant_capture_t edge[PM_CAPTURES];
+    const int seen = plant_captured(hal->plant, edge, PM_CAPTURES);
+    more->captures = (uint16_t)(seen < PM_CAPTURES ? seen : PM_CAPTURES);
+    for (uint32_t n = 0; n < more->captures; n++) {
+        more->capture[n] = (pm_capture_t){.at = (uint16_t)lrint(edge[n].count * capture_s / count_s(hal)),
+                                          .leg = edge[n].leg,
+                                          .rising = edge[n].rising};
+    }
+}
+
+static void fill_more(const hal_t *hal, pm_measure_t *more)
+{
+    const uint32_t channels = hal_channels(hal);
+    *more = (pm_measure_t){0};
+    if ((channels & NEEDS_CURRENT_MASK) != 0U) {
+        more->missing = (uint16_t)(~hal->adc.settled & 7U);
+    }
+    if ((channels & NEEDS_TERMINALS) != 0U) {
+        memcpy(more->v_terminal, hal->adc.v_leg, sizeof more->v_terminal);
+    }
+    if ((channels & NEEDS_NEUTRAL) != 0U) {
+        more->v_neutral = neutral_code(&hal->adc);
+    }
+    if ((channels & NEEDS_SECOND_SAMPLE) != 0U) {
+        fill_samples(hal, more);
+    }
+    if ((channels & NEEDS_CAPTURES) != 0U) {
+        fill_captures(hal, more);
+    }
+}
+
 /* Since the last measurement, or still. */
 static bool comparators_tripped(hal_t *hal)
 {
@@ -14,6 +104,7 @@ void hal_measure(hal_t *hal, drive_in_t *in)
         in->i_leg[leg] = hal->adc.i_leg[leg];
     }
     in->v_dc = hal->adc.v_dc;
+    fill_more(hal, &in->more);
     in->hw_fault = comparators_tripped(hal) || hal->hw_fault;
     if (in->hw_fault) {
         hal_bridge_off(hal);

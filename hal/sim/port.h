@@ -25,6 +25,11 @@ struct hal {
     plant_adc_t adc; /* of the present period */
     uint32_t time_us, timer_Hz;
     bool armed, configured;
+    uint16_t timer_counts;             /* of half a period */
+    uint16_t sample_at[2][PM_SAMPLES]; /* asked for: for this period, for the next */
+    plant_adc_t sample[PM_SAMPLES];    /* taken in the last period ... */
+    uint16_t sampled;                  /* ... bit n: so it was */
+    uint32_t without;                  /* channels that are taken from what the plant has: NEEDS_... */
     bool slow_pending;
 
     /* for the user of the loop */
@@ -40,6 +45,9 @@ struct hal {
     char console[SIM_CONSOLE];
     bool led, reset;
 };
+
+/* The plant's period, with the samples that were asked for. Once a period after app_control(). */
+void sim_run_period(hal_t *hal);
 
 /* Erased store, no faults; the timer's clock of the drive board. */
 void sim_hal_init(hal_t *hal, plant_t *plant);

@@ -34,7 +34,7 @@ void sim_loop_step(sim_loop_t *loop)
         app_monitor(&loop->app);
         app_turn(&loop->app);
     }
-    plant_run_period(loop->hal.plant);
+    sim_run_period(&loop->hal);
     loop->time_us += loop->period_us;
     loop->hal.time_us = (uint32_t)loop->time_us;
 }

@@ -18,6 +18,7 @@ hal_status_t hal_init(hal_t *hal, const hal_config_t *config)
 {
     hal->armed = false;
     hal->configured = config->timer_counts > 0U;
+    hal->timer_counts = config->timer_counts;
     return hal->configured ? HAL_OK : HAL_TIMER_COUNTS;
 }
 

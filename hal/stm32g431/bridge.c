@@ -12,9 +12,8 @@ enum {
     BREAK_LEVEL_MOST = 0x7FFF,
 };
 
-#define LEG_U  (TIM_CCER_CC1E | TIM_CCER_CC1NE)
-#define LEG_V  (TIM_CCER_CC2E | TIM_CCER_CC2NE)
-#define LEG_W  (TIM_CCER_CC3E | TIM_CCER_CC3NE)
+/* Both switches of a leg; the legs follow each other by four bits, as the states in drive_out_t. */
+#define LEG    (TIM_CCER_CC1E | TIM_CCER_CC1NE)
 #define BREAKS (TIM_SR_BIF | TIM_SR_SBIF)
 
 /* DTG counts in four ranges, of 1, 2, 8 and 16 clocks; the ranges begin at 0, 64, 32 and 32 of their unit. */
@@ -112,20 +111,43 @@ void bridge_run(void)
     TIM1.RCR = 1U;
 }
 
-/* The legs follow each other by four bits. */
-static uint32_t legs_of(const bool driven[])
+#if PM_CARRIES(NEEDS_HELD)
+/* A leg that is held follows a compare value that the counter never passes, or never falls below. */
+static uint32_t on_time(const drive_out_t *out, uint32_t leg)
 {
-    return LEG_U * driven[0] + LEG_V * driven[1] + LEG_W * driven[2];
+    const pm_leg_t state = pm_leg(out->legs, leg);
+    if (state == PM_LEG_HIGH) {
+        return UINT16_MAX;
+    }
+    return state == PM_LEG_LOW ? 0U : out->compare[leg][0];
 }
+
+static uint32_t enables_of(uint32_t legs)
+{
+    const uint32_t any = legs | legs >> 1U | legs >> 2U;
+    return (any & PM_LEGS_PWM) * LEG;
+}
+#else
+static uint32_t on_time(const drive_out_t *out, uint32_t leg)
+{
+    return out->compare[leg][0];
+}
+
+/* Each PM_LEG_OFF or PM_LEG_PWM. */
+static uint32_t enables_of(uint32_t legs)
+{
+    return legs * LEG;
+}
+#endif
 
 void hal_bridge_write(hal_t *hal, const drive_out_t *out)
 {
     (void)hal; /* the address of the only instance costs less than a stored pointer */
-    TIM1.CCR1 = out->compare[0][0];
-    TIM1.CCR2 = out->compare[1][0];
-    TIM1.CCR3 = out->compare[2][0];
-    port_hal.legs = legs_of(out->driven);
-    if (out->trip) {
+    TIM1.CCR1 = on_time(out, 0);
+    TIM1.CCR2 = on_time(out, 1);
+    TIM1.CCR3 = on_time(out, 2);
+    port_hal.legs = enables_of(out->legs);
+    if (out->trip != 0U) {
         TIM1.BDTR = port_hal.bridge;
         port_hal.legs = 0U;
     }

@@ -67,6 +67,12 @@ void measure_run(void)
     ADC1.CR = ADC_CR_ADVREGEN | ADC_CR_ADSTART;
 }
 
+uint32_t hal_channels(const hal_t *hal)
+{
+    (void)hal;
+    return PORT_CHANNELS;
+}
+
 /* The shunt is between leg and ground: a current into the motor makes the code fall. One below the exact
  * complement, so that the smallest fits; the calibration takes that as an offset. */
 static uint16_t current_code(uint32_t converted)

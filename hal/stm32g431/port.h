@@ -1,12 +1,17 @@
 /* Port for ST's B-G431B-ESC1 (STM32G431CB, 170 MHz): the state that the application allocates.
  *
  * Both halves of a carrier period are equal: compare[leg][0] serves both. New compare values take effect at
- * the centre of the zero vector, a change of the driven legs about 1 us later. docs/board.md has wiring and
+ * the centre of the zero vector, a change of the legs' states about 1 us later. docs/board.md has wiring and
  * bench checks, README.md here the registers that are used. */
 #ifndef STM32G431_PORT_H
 #define STM32G431_PORT_H
 
 #include "hal/hal.h"
+
+/* As wired and programmed today: three leg currents and the DC-link voltage, both halves of a period alike.
+ * Dividers of the terminals are on the board (PA4, PC4, PB11, enabled by PB5), not yet in the sequence of the
+ * converters. PWM on one switch and commutation by COM events are within TIM1 and not yet programmed. */
+#define PORT_CHANNELS NEEDS_HELD
 
 #define PORT_CONSOLE_SIZE 128U /* powers of two */
 #define PORT_CAN_FRAMES   16U

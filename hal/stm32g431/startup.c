@@ -7,6 +7,8 @@
 #include "hal/stm32g431/registers/core.h"
 #include "hal/stm32g431/registers/tim.h"
 
+PM_CHECK_BOARD(PORT_CHANNELS)
+
 #define STACK_PAINT 0xC5C5C5C5U
 enum {
     EXCEPTION_RESET = 1,

@@ -3,11 +3,11 @@
 
 /* 1. compare values into preload registers, so that they take effect at the update event, which is the centre
  * of the all-low vector
- * 2. keep the driven flags for the next control interrupt, or preload them
+ * 2. keep the legs' states for the next control interrupt, or preload them
  * 3. out->trip: off, now */
 void hal_bridge_write(hal_t *hal, const drive_out_t *out)
 {
-    if (out->trip) {
+    if (out->trip != 0U) {
         hal_bridge_off(hal);
     }
 }

@@ -95,7 +95,7 @@ bool configure(const Record &r, int observer, const Noise &noise, drive_config_t
     params.ekf_voltage_noise = parameter(DRIVE_PARAM_ekf_voltage_noise, noise.voltage);
     params.ekf_speed_noise = parameter(DRIVE_PARAM_ekf_speed_noise, noise.speed);
     params.ekf_angle_noise = parameter(DRIVE_PARAM_ekf_angle_noise, noise.angle);
-    return drive_configure(config, &params).ok;
+    return drive_configure(config, &params, PM_CHANNELS).ok;
 }
 
 // The filter's idea of the machine alone.

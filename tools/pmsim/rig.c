@@ -185,7 +185,7 @@ bool rig_step_drive(rig_t *rig, const record_period_t *record)
     for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
         same = same && app->out.compare[leg][0] == record->compare[leg][0] &&
                app->out.compare[leg][1] == record->compare[leg][1] &&
-               app->out.driven[leg] == (record->driven[leg] != 0U);
+               (pm_leg(app->out.legs, (uint32_t)leg) != PM_LEG_OFF) == (record->driven[leg] != 0U);
     }
     return same;
 }

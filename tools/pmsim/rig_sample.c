@@ -106,7 +106,7 @@ void rig_fill_sample(rig_scale_t *scale, const drive_t *drive, const drive_out_t
     sample->v_dc_hat_V = scale->v_V * status->v_dc;
     sample->weight = (double)status->weight / PM_ONE;
     sample->quality = (double)status->quality / PM_ONE;
-    sample->driven = out->driven[0] || out->driven[1] || out->driven[2];
+    sample->driven = out->legs != PM_LEGS_OFF;
     sample->identified = identified(scale, &drive->commissioning_report);
 }
 
@@ -118,7 +118,7 @@ void rig_record_legs(const drive_in_t *in, const drive_out_t *out, record_period
         record->i_leg[leg] = in->i_leg[leg];
         record->compare[leg][0] = out->compare[leg][0];
         record->compare[leg][1] = out->compare[leg][1];
-        record->driven[leg] = out->driven[leg];
+        record->driven[leg] = pm_leg(out->legs, (uint32_t)leg) != PM_LEG_OFF;
     }
 }
 

@@ -81,7 +81,8 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         return NULL;
     }
     drive_t drive;
-    const drive_result_t result = drive_init(&drive, params);
+    const drive_result_t result =
+        drive_init(&drive, params, 0); /* what the image carries beside the common */
     if (!result.ok && !refusal_expected) {
         snprintf(error, error_size, "drive refuses parameter %s: %s", drive_param_table[result.param].name,
                  result.reason);
@@ -109,7 +110,7 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
     }
     if (!watch_begin(&rig->watch, rig->board)) {
         snprintf(error, error_size, "%s: has no variable app_instance of at least %zu bytes", image_path,
-                 sizeof(watched_t));
+                 sizeof(image_memory_t));
         rig_destroy(rig);
         return NULL;
     }
@@ -241,7 +242,8 @@ void rig_step(rig_t *rig, rig_sample_t *sample)
         take_frames(rig);
     }
     rig->watch.figures.simulated_s += board_period_s(rig->board);
-    rig_fill_sample(&rig->scale, &rig->watch.image->drive, &rig->watch.image->out, sample);
+    const drive_out_t out = image_out(rig->watch.image);
+    rig_fill_sample(&rig->scale, &rig->watch.image->drive, &out, sample);
 }
 
 uint32_t rig_slow_divider(const rig_t *rig)
@@ -260,7 +262,9 @@ void rig_record(const rig_t *rig, record_period_t *record)
         .current_mA = rig->sent.current_mA,
         .temperature_dC = rig->watch.image->slow.temperature_dC,
     };
-    rig_record_legs(&rig->watch.image->in, &rig->watch.image->out, record);
+    const drive_in_t in = image_in(rig->watch.image);
+    const drive_out_t out = image_out(rig->watch.image);
+    rig_record_legs(&in, &out, record);
 }
 
 /* Replays are for the drive on the host. */

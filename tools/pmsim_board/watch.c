@@ -100,7 +100,8 @@ static void step(watch_t *watch, drive_out_t *out)
     watch->mode = mode_of(drive);
     drive->current.limited = false;
     drive->modulator.limited = false;
-    drive_step(drive, &watch->image->in, out);
+    const drive_in_t in = image_in(watch->image);
+    drive_step(drive, &in, out);
     watch->event[FIGURE_LIMITED] = drive->current.limited || drive->modulator.limited;
     watch->event[FIGURE_FAULT] = !fault && drive->fault != DRIVE_FAULT_NONE;
     drive->current.limited = drive->current.limited || current;
@@ -124,13 +125,14 @@ static void step_slow(watch_t *watch)
 static void compare(watch_t *watch, int interrupt)
 {
     drive_t *drive = &watch->before;
-    drive_out_t out = watch->image->out;
+    drive_out_t out = image_out(watch->image);
     if (interrupt == FIGURE_CONTROL) {
         step(watch, &out);
     } else {
         step_slow(watch);
     }
-    if (!same(drive, &watch->image->drive, sizeof *drive) || !same(&out, &watch->image->out, sizeof out)) {
+    if (!same(drive, &watch->image->drive, sizeof *drive) ||
+        !same(&out, &watch->image->out, sizeof watch->image->out)) {
         cpu_fail(board_cpu(watch->board),
                  "image and host differ after the %s interrupt of period %u, from byte %zu of %zu",
                  interrupt == FIGURE_CONTROL ? "control" : "slow", watch->image->drive.period,

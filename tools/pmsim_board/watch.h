@@ -6,26 +6,17 @@
 #ifndef PMSIM_BOARD_WATCH_H
 #define PMSIM_BOARD_WATCH_H
 
-#include "firmware/drive/drive_state.h"
-#include "hal/hal.h"
 #include "sim_plant/board/board.h"
 #include "tools/pmsim_board/figures.h"
+#include "tools/pmsim_board/image_memory.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* What the application's memory begins with, the same on processor and host. */
-typedef struct {
-    drive_t drive;
-    drive_in_t in;
-    drive_out_t out;
-    hal_slow_t slow;
-} watched_t;
-
 typedef struct {
     board_t *board;
-    const watched_t *image;                           /* in the processor's memory */
+    const image_memory_t *image;                      /* in the processor's memory */
     drive_t before;                                   /* at the entry of the interrupt that runs, */
     int entered;                                      /* which is this one; -1: none seen yet */
     int mode;                                         /* of the control interrupt that ends, */

@@ -59,10 +59,8 @@ static inline void write_legs(drive_t *drive, pm_abc_t u, drive_out_t *out)
     write_leg(pm_mulh_add(PM_SHARE_HALF, u.a, per_volt), parts, &self->rest[0], out->compare[0]);
     write_leg(pm_mulh_add(PM_SHARE_HALF, u.b, per_volt), parts, &self->rest[1], out->compare[1]);
     write_leg(pm_mulh_add(PM_SHARE_HALF, u.c, per_volt), parts, &self->rest[2], out->compare[2]);
-    out->driven[0] = true;
-    out->driven[1] = true;
-    out->driven[2] = true;
-    out->trip = false;
+    out->legs = PM_LEGS_PWM;
+    out->trip = 0;
 }
 
 static inline pm_wide_t axis_voltage(const drive_t *drive, pm_pi_t *pi, pm_q_t error)

@@ -100,11 +100,11 @@ static void wait_us(run_t *run, uint32_t us)
 static void float_all(struct app *app)
 {
     for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
-        app->out.driven[leg] = false;
         app->out.compare[leg][0] = 0;
         app->out.compare[leg][1] = 0;
     }
-    app->out.trip = false;
+    app->out.legs = PM_LEGS_OFF;
+    app->out.trip = 0;
 }
 
 static void check_refusals(run_t *run)
@@ -175,6 +175,117 @@ static void check_measurement(run_t *run)
           app->slow.temperature_dC);
 }
 
+#if PM_CARRIES(PM_MEASURED)
+/* A code between two bounds. */
+static void check_code(run_t *run, const char *name, int32_t code, int32_t least, int32_t most)
+{
+    check(run, name, code >= least && code <= most, code);
+}
+#endif
+
+/* What the port declares and the program carries, with all legs low: no voltages, no currents. */
+static void check_channels(run_t *run)
+{
+    const uint32_t channels = hal_channels(run->hal);
+    check(run, "declares its channels", channels == run->contract->channels, (int32_t)channels);
+#if PM_CARRIES(PM_MEASURED)
+    const pm_measure_t *more = &the_app.in.more;
+#endif
+#if PM_CARRIES(NEEDS_CURRENT_MASK)
+    check_code(run, "currents valid with all legs low", more->missing, 0, 0);
+#endif
+#if PM_CARRIES(NEEDS_DC_CURRENT)
+    if ((channels & NEEDS_DC_CURRENT) != 0U) {
+        check_code(run, "no link current is mid-scale", more->i_dc - MID_SCALE, -2000, 2000);
+    }
+#endif
+#if PM_CARRIES(NEEDS_TERMINALS)
+    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) { /* also where there is no such channel */
+        check_code(run, "a terminal that is low", more->v_terminal[leg], 0, 2000);
+    }
+#endif
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    if ((channels & NEEDS_NEUTRAL) != 0U) {
+        check_code(run, "no neutral voltage is mid-scale", more->v_neutral - MID_SCALE, -2000, 2000);
+    }
+#endif
+#if PM_CARRIES(NEEDS_CAPTURES)
+    check_code(run, "no edges with all legs low", more->captures, 0, 0);
+#endif
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    check_code(run, "no sample that was not asked for", more->sampled, 0, 0);
+#endif
+}
+
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+static void check_samples(run_t *run)
+{
+    struct app *app = &the_app;
+    app->out.instants.sample_at[1] = (uint16_t)(run->contract->config.timer_counts + 100U);
+    wait_us(run, 1000);
+    check_code(run, "the sample that was asked for", app->in.more.sampled, 2, 2);
+    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        check_code(run, "no current is mid-scale in it", app->in.more.i_sample[1][leg] - MID_SCALE, -2000,
+                   2000);
+    }
+    app->out.instants.sample_at[1] = 0;
+    wait_us(run, 1000);
+    check_code(run, "no sample any more", app->in.more.sampled, 0, 0);
+}
+#endif
+
+#if PM_CARRIES(NEEDS_HELD)
+/* All alike, so that no current flows. The compare values say the opposite. */
+static void check_held(run_t *run)
+{
+    struct app *app = &the_app;
+    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        app->out.compare[leg][0] = 0;
+        app->out.compare[leg][1] = 0;
+    }
+    app->out.legs = PM_LEGS_ALL(PM_LEG_HIGH);
+    wait_us(run, 1000);
+    check(run, "stays armed with all legs held high", hal_bridge_armed(run->hal), 0);
+#if PM_CARRIES(NEEDS_TERMINALS)
+    const bool supplied = app->in.v_dc > 16000U;
+    for (size_t leg = 0; supplied && leg < DRIVE_LEGS; leg++) {
+        const bool there = (hal_channels(run->hal) & NEEDS_TERMINALS) != 0U;
+        check_code(run, "a terminal that is held high", app->in.more.v_terminal[leg], there ? 8000 : 0,
+                   there ? UINT16_MAX : 0);
+    }
+#endif
+    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        app->out.compare[leg][0] = run->contract->config.timer_counts;
+        app->out.compare[leg][1] = run->contract->config.timer_counts;
+    }
+    app->out.legs = PM_LEGS_ALL(PM_LEG_LOW);
+    wait_us(run, 1000);
+    check(run, "stays armed with all legs held low", hal_bridge_armed(run->hal), 0);
+#if PM_CARRIES(NEEDS_TERMINALS)
+    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        check_code(run, "a terminal that is held low", app->in.more.v_terminal[leg], 0, 2000);
+    }
+#endif
+}
+#endif
+
+static void check_legs(run_t *run)
+{
+    const uint32_t channels = hal_channels(run->hal);
+    check_channels(run);
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    if ((channels & NEEDS_SECOND_SAMPLE) != 0U) {
+        check_samples(run);
+    }
+#endif
+#if PM_CARRIES(NEEDS_HELD)
+    if ((channels & NEEDS_HELD) != 0U) {
+        check_held(run);
+    }
+#endif
+    (void)channels;
+}
+
 static void check_bridge(run_t *run)
 {
     struct app *app = &the_app;
@@ -182,12 +293,11 @@ static void check_bridge(run_t *run)
     check(run, "arms", hal_bridge_arm(run->hal), 0);
     check(run, "is armed", hal_bridge_armed(run->hal), 0);
     wait_us(run, 1000);
-    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
-        app->out.driven[leg] = true; /* compare 0: all low */
-    }
+    app->out.legs = PM_LEGS_PWM; /* compare 0: all low */
     wait_us(run, 1000);
     check(run, "stays armed with all legs low", hal_bridge_armed(run->hal), 0);
-    app->out.trip = true;
+    check_legs(run);
+    app->out.trip = 1;
     wait_us(run, 1000);
     check(run, "a trip disarms", !hal_bridge_armed(run->hal), 0);
     float_all(app);

@@ -3,8 +3,8 @@
  *
  *   PASS name | FAIL name: why ... | DONE failed of total
  *
- * No motor and no supply are needed; the bridge is armed for a moment with all legs floating, and with all
- * legs low: keep the motor off. Takes 1.5 s of the port's time. */
+ * No motor and no supply are needed; the bridge is armed for a moment with all legs floating, all
+ * low, and, where the port can hold them, all high: keep the motor off. Takes 1.5 s of the port's time. */
 #ifndef TESTS_HAL_CONTRACT_H
 #define TESTS_HAL_CONTRACT_H
 
@@ -14,6 +14,7 @@
 typedef struct {
     hal_config_t config;
     uint32_t period_us;
+    uint32_t channels;        /* NEEDS_...: what it has to declare */
     void (*idle)(hal_t *hal); /* lets time pass; on a processor hal_idle() */
 } hal_contract_t;
 

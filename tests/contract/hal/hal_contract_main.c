@@ -9,6 +9,7 @@ int main(void)
                    .break_level = 0,
                    .can_kbit_s = 500},
         .period_us = PM_CONTRACT_PERIOD_US,
+        .channels = PM_CONTRACT_CHANNELS,
         .idle = hal_idle,
     };
     hal_t *hal = hal_instance();

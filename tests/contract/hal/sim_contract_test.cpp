@@ -28,21 +28,47 @@ void pass_period(hal_t *hal)
             app_monitor(hal->app);
         }
     }
-    plant_run_period(hal->plant);
+    sim_run_period(hal);
     hal->time_us += 100;
 }
 
-TEST(HalContract, Sim)
+void keeps_contract(const plant_config_t &config, uint32_t without, uint32_t channels)
 {
-    plant_config_t config = plants::ipm_1000();
     const char *error = nullptr;
     const std::unique_ptr<plant_t, void (*)(plant_t *)> plant(plant_create(&config, 0.0, &error),
                                                               &plant_destroy);
+    ASSERT_NE(plant, nullptr) << error;
     static hal_t hal;
     sim_hal_init(&hal, plant.get());
-    const hal_contract_t contract = {{8500, 500, 0, 500}, 100, pass_period};
+    hal.without = without;
+    const hal_contract_t contract = {{8500, 500, 0, 500}, 100, channels, pass_period};
     EXPECT_EQ(hal_contract_run(&hal, &contract), 0) << hal.console;
     EXPECT_NE(std::string(hal.console).find("DONE 0 of"), std::string::npos) << hal.console;
+}
+
+constexpr uint32_t kAlways = NEEDS_SECOND_SAMPLE | NEEDS_CURRENT_MASK | NEEDS_HALVES | NEEDS_HELD;
+
+TEST(HalContract, Sim)
+{
+    keeps_contract(plants::ipm_1000(), 0, kAlways);
+}
+
+plant_config_t with_voltages()
+{
+    plant_config_t config = plants::ipm_1000();
+    config.sensor.v_leg_full_scale_V = 450;
+    config.sensor.capture_s = 1e-7;
+    return config;
+}
+
+TEST(HalContract, SimWithTerminalsAndComparators)
+{
+    keeps_contract(with_voltages(), 0, kAlways | NEEDS_TERMINALS | NEEDS_NEUTRAL | NEEDS_CAPTURES);
+}
+
+TEST(HalContract, SimWithoutWhatIsTaken)
+{
+    keeps_contract(with_voltages(), ~0U, 0);
 }
 
 } // namespace

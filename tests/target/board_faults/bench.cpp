@@ -115,9 +115,9 @@ plant_truth_t Bench::truth() const
     return t;
 }
 
-const Watched *Bench::watched()
+const image_memory_t *Bench::watched()
 {
-    return static_cast<const Watched *>(board_variable(board, "app_instance", sizeof(Watched)));
+    return static_cast<const image_memory_t *>(board_variable(board, "app_instance", sizeof(image_memory_t)));
 }
 
 std::vector<uint16_t> Bench::patch(const std::vector<uint16_t> &code)

@@ -16,6 +16,7 @@ extern "C" {
 #include "firmware/app/app.h"
 #include "firmware/params/store.h"
 #include "sim_plant/board/board_inside.h"
+#include "tools/pmsim_board/image_memory.h"
 #include "tools/pmsim_board/master.h"
 }
 
@@ -23,14 +24,6 @@ namespace bench
 {
 
 extern const char *image, *contract; // paths, from the command line
-
-// What the application's memory begins with: the same on processor and host.
-struct Watched {
-    drive_t drive;
-    drive_in_t in;
-    drive_out_t out;
-    hal_slow_t slow;
-};
 
 plant_config_t plant_config();
 drive_params_t params();
@@ -52,7 +45,7 @@ class Bench
     bool bridge_on() const;
     std::string console() const;
     plant_truth_t truth() const;
-    const Watched *watched();
+    const image_memory_t *watched();
     // In place of the instructions behind the main loop's sleep; gives back what was there.
     std::vector<uint16_t> patch(const std::vector<uint16_t> &code);
     void put_back(const std::vector<uint16_t> &code);

@@ -129,7 +129,7 @@ TEST(BoardReset, APageCutShortFallsBackToTheOther)
         b.boot();
         b.run_ms(20);
         drive_t expected;
-        drive_init(&expected, cut ? &older : &newer);
+        drive_init(&expected, cut ? &older : &newer, PM_CHANNELS);
         EXPECT_EQ(b.watched()->drive.config.protection.i_trip_squared,
                   expected.config.protection.i_trip_squared);
         EXPECT_THAT(b.console(), HasSubstr("parameters: stored"));

@@ -46,7 +46,7 @@ TEST(BoardRun, ArmsAndItsCompareValuesAreTheDrives)
         const tim1_t *tim = &board_inside(b.board)->tim1;
         for (int leg = 0; leg < DRIVE_LEGS; leg++) {
             EXPECT_EQ(tim->compare[leg], b.watched()->out.compare[leg][0]);
-            EXPECT_TRUE(b.watched()->out.driven[leg]);
+            EXPECT_EQ(pm_leg(b.watched()->out.legs, leg), PM_LEG_PWM);
         }
     }
 }
@@ -60,7 +60,7 @@ TEST(BoardRun, CurrentsArriveWithSignAndScale)
         plant_truth_t before =
             b.truth(); // at the centre of the zero vector: what the image is about to sample
         b.run_ms(0.1);
-        const drive_in_t &in = b.watched()->in;
+        const image_in_t &in = b.watched()->in;
         for (int leg = 0; leg < DRIVE_LEGS; leg++) {
             double seen_A = 10.0 * (in.i_leg[leg] / 32768.0 - 1.0);
             EXPECT_NEAR(seen_A, before.i_A[leg], 0.03); // 0.6 us later, 12 bits, 0.5 LSB of noise

@@ -35,10 +35,10 @@ static void step(const drive_in_t *in, drive_out_t *out)
 static bool same(const record_period_t *r, const drive_out_t *out)
 {
     for (uint32_t x = 0; x < RECORD_LEGS; x++) {
-        if (out->driven[x] != (r->driven[x] != 0U)) {
+        if ((pm_leg(out->legs, x) != PM_LEG_OFF) != (r->driven[x] != 0U)) {
             return false;
         }
-        if (out->driven[x] &&
+        if (pm_leg(out->legs, x) != PM_LEG_OFF &&
             (out->compare[x][0] != r->compare[x][0] || out->compare[x][1] != r->compare[x][1])) {
             return false;
         }
@@ -69,7 +69,7 @@ static bool open_record(FILE *file, record_header_t *header)
         header->parameters != DRIVE_PARAM_COUNT || header->period_bytes != sizeof(record_period_t)) {
         return false;
     }
-    return fread(&params, sizeof params, 1, file) == 1 && drive_init(&drive, &params).ok;
+    return fread(&params, sizeof params, 1, file) == 1 && drive_init(&drive, &params, PM_CHANNELS).ok;
 }
 
 static bool same_layout(const record_header_t *header)

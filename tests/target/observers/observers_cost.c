@@ -52,13 +52,13 @@ static bool configure(observer_id_t id)
     drive_params_t params;
     drive_params_default(&params);
     params.observer = (int32_t)id;
-    if (!drive_configure(&config, &params).ok) { /* for a round machine */
+    if (!drive_configure(&config, &params, PM_CHANNELS).ok) { /* for a round machine */
         params.L_q = params.L_d;
         params.L_q_rated = params.L_d;
         params.L_qh_rated = params.L_dh_rated;
         params.start_method = 2;
     }
-    return drive_configure(&config, &params).ok;
+    return drive_configure(&config, &params, PM_CHANNELS).ok;
 }
 
 static void run(observer_id_t id)

@@ -33,7 +33,7 @@ TEST(BusParameters, AreReadAndWritten)
     drive_params_t wanted = params;
     wanted.i_max = 4321;
     drive_config_t config = {};
-    ASSERT_TRUE(drive_configure(&config, &wanted).ok);
+    ASSERT_TRUE(drive_configure(&config, &wanted, PM_CHANNELS).ok);
     EXPECT_EQ(x.loop.app.drive.config.i_max, config.i_max);
 }
 
@@ -52,7 +52,7 @@ TEST(BusParameters, AtAndBeyondTheirLimits)
             drive_params_t wanted = params;
             drive_param_set(&wanted, id, value);
             drive_config_t config = {};
-            const bool good = drive_configure(&config, &wanted).ok;
+            const bool good = drive_configure(&config, &wanted, PM_CHANNELS).ok;
             EXPECT_EQ(x.set(id, value), good ? 0U : INCOMPATIBLE) << info.name << " " << value;
             EXPECT_EQ(x.get(id), good ? value : drive_param_get(&params, id)) << info.name;
             taken += good ? 1 : 0;
@@ -82,7 +82,7 @@ TEST(BusParameters, WhileRunningTheyArriveWhole)
     plant_truth(x.plant(), &t);
     EXPECT_NEAR(t.omega_mech_rad_s, 30, 1);
     drive_config_t config = {};
-    ASSERT_TRUE(drive_configure(&config, &x.loop.app.params).ok);
+    ASSERT_TRUE(drive_configure(&config, &x.loop.app.params, PM_CHANNELS).ok);
     EXPECT_EQ(std::memcmp(&config, &x.loop.app.drive.config, sizeof config), 0);
 }
 

@@ -100,7 +100,7 @@ class Bench
 
     bool driven() const
     {
-        return loop.app.out.driven[0] || loop.app.out.driven[1] || loop.app.out.driven[2];
+        return loop.app.out.legs != PM_LEGS_OFF;
     }
 
     plant_t *plant()

@@ -32,7 +32,7 @@ drive_params_t defaults()
 drive_config_t configure(const drive_params_t &p)
 {
     drive_config_t c = {};
-    const drive_result_t r = drive_configure(&c, &p);
+    const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
     EXPECT_TRUE(r.ok) << r.reason;
     return c;
 }
@@ -46,7 +46,7 @@ TEST(Config, DefaultsAreAccepted)
 {
     drive_config_t c = {};
     const drive_params_t p = defaults();
-    const drive_result_t r = drive_configure(&c, &p);
+    const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
     EXPECT_TRUE(r.ok);
     EXPECT_TRUE(c.injection);
     EXPECT_FALSE(c.align_first);
@@ -60,7 +60,7 @@ TEST(Config, RefusesAndNamesWhatIsOutOfRange)
             drive_params_t p = defaults();
             drive_param_set(&p, static_cast<drive_param_id_t>(id), x);
             drive_config_t c = {};
-            const drive_result_t r = drive_configure(&c, &p);
+            const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
             EXPECT_FALSE(r.ok) << info.name;
             EXPECT_EQ(r.param, id) << info.name;
             EXPECT_NE(std::string(r.reason), "") << info.name;
@@ -120,7 +120,7 @@ TEST(Config, RefusesWhatCannotBeTogether)
     for (const Cross &x : kCrosses) {
         const drive_params_t p = changed(x.changes);
         drive_config_t c = {};
-        const drive_result_t r = drive_configure(&c, &p);
+        const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
         EXPECT_FALSE(r.ok) << x.what;
         if (!r.ok) {
             EXPECT_EQ(std::string(drive_param_table[r.param].name), drive_param_table[x.named].name)
@@ -137,7 +137,7 @@ TEST(Config, RefusesWhatDoesNotFitItsFormat)
                                       {DRIVE_PARAM_L_q, 0.3},
                                       {DRIVE_PARAM_start_method, 2}});
     drive_config_t c = {};
-    const drive_result_t r = drive_configure(&c, &p);
+    const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
     EXPECT_FALSE(r.ok);
     EXPECT_EQ(r.param, DRIVE_PARAM_current_bandwidth);
 }
@@ -285,7 +285,7 @@ TEST(Config, AnObserverForRoundMachinesRefusesSaliency)
 {
     drive_config_t c;
     const drive_params_t params = changed({{DRIVE_PARAM_observer, OBSERVER_back_emf}});
-    const drive_result_t result = drive_configure(&c, &params);
+    const drive_result_t result = drive_configure(&c, &params, PM_CHANNELS);
     EXPECT_FALSE(result.ok);
     EXPECT_EQ(result.param, DRIVE_PARAM_observer);
 }
@@ -483,7 +483,7 @@ Survey survey(int draws)
     for (int n = 0; n < draws; ++n) {
         const drive_params_t p = draw.next();
         drive_config_t c = {};
-        if (!drive_configure(&c, &p).ok) {
+        if (!drive_configure(&c, &p, PM_CHANNELS).ok) {
             continue;
         }
         ++s.accepted;
@@ -551,7 +551,7 @@ TEST(Config, CorrectionOfWrongParameters)
                                           {DRIVE_PARAM_mismatch_frequency, 2},
                                           {DRIVE_PARAM_J, 1e-6}});
     drive_config_t c;
-    EXPECT_EQ(drive_configure(&c, &light).param, DRIVE_PARAM_mismatch_frequency);
+    EXPECT_EQ(drive_configure(&c, &light, PM_CHANNELS).param, DRIVE_PARAM_mismatch_frequency);
 }
 
 TEST(Config, TheArctangentLeavesNothingToLearnASecondHarmonicFrom)
@@ -559,7 +559,7 @@ TEST(Config, TheArctangentLeavesNothingToLearnASecondHarmonicFrom)
     const drive_params_t params = changed({{DRIVE_PARAM_position_observer, LOOP_ARCTANGENT},
                                            {DRIVE_PARAM_second_harmonic, SECOND_HARMONIC_NOTCH}});
     drive_config_t c;
-    const drive_result_t result = drive_configure(&c, &params);
+    const drive_result_t result = drive_configure(&c, &params, PM_CHANNELS);
     EXPECT_FALSE(result.ok);
     EXPECT_EQ(result.param, DRIVE_PARAM_second_harmonic);
 }
@@ -589,7 +589,7 @@ TEST(Config, RefusesInjectionWhoseSaliencyTurnsRound)
     for (const double L_qh : {20e-3, 42.55e-3}) {
         const drive_params_t p = changed({{DRIVE_PARAM_L_qh_rated, L_qh}, {DRIVE_PARAM_L_dqh_rated, 0}});
         drive_config_t c = {};
-        const drive_result_t r = drive_configure(&c, &p);
+        const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
         if (r.ok && c.injection) {
             EXPECT_GT(square_gain(c, 0.4), 0) << L_qh;
         }

@@ -37,7 +37,7 @@ struct Drive {
 
     explicit Drive(const drive_params_t &p = params())
     {
-        drive_init(&d, &p);
+        drive_init(&d, &p, PM_CHANNELS);
         for (uint16_t &leg : in.i_leg) {
             leg = current_code(0);
         }
@@ -78,7 +78,7 @@ struct Drive {
 
     bool driven() const
     {
-        return out.driven[0] || out.driven[1] || out.driven[2];
+        return out.legs != PM_LEGS_OFF;
     }
 
     // Current mode needs no motor: calibration and align, then it runs.

@@ -49,7 +49,7 @@ class Closed
     {
         for (int k = 0; k < 10 * ms; ++k) {
             sim_loop_step(&loop);
-            const bool driven = loop.app.out.driven[0] || loop.app.out.driven[1] || loop.app.out.driven[2];
+            const bool driven = loop.app.out.legs != PM_LEGS_OFF;
             const drive_state_t s = state();
             if (states.empty() || states.back() != s) {
                 states.push_back(s);
@@ -230,7 +230,7 @@ TEST(Drive, ReferencesFollowCommandAndBases)
     drive_params_t p = direct::params();
     p.speed_trip *= 2;
     drive_config_t other = {};
-    ASSERT_TRUE(drive_configure(&other, &p).ok);
+    ASSERT_TRUE(drive_configure(&other, &p, PM_CHANNELS).ok);
     drive_reconfigure(&x.d, &other);
     x.run_ms(1);
     EXPECT_NEAR(2 * x.d.omega_target, omega, 4);

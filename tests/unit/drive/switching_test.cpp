@@ -27,7 +27,7 @@ std::vector<int32_t> observers()
         drive_params_t p = direct::params();
         p.observer = id;
         drive_config_t c = {};
-        if (drive_configure(&c, &p).ok) {
+        if (drive_configure(&c, &p, PM_CHANNELS).ok) {
             all.push_back(id);
         }
     }
@@ -60,7 +60,7 @@ class Closed
     {
         params_.observer = id;
         drive_config_t c = {};
-        ASSERT_TRUE(drive_configure(&c, &params_).ok) << id;
+        ASSERT_TRUE(drive_configure(&c, &params_, PM_CHANNELS).ok) << id;
         ASSERT_TRUE(drive_same_frame(&c, &loop.app.drive.config));
         drive_reconfigure(&loop.app.drive, &c);
     }

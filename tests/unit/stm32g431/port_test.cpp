@@ -109,7 +109,7 @@ TEST_F(Port, WritesLegsAndTrips)
     for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
         out.compare[leg][0] = out.compare[leg][1] = static_cast<uint16_t>(100 * (leg + 1));
     }
-    out.driven[0] = out.driven[2] = true;
+    out.legs = pm_legs_of(PM_LEG_PWM, PM_LEG_OFF, PM_LEG_PWM);
     ASSERT_TRUE(hal_bridge_arm(hal));
     hal_bridge_write(hal, &out);
     EXPECT_EQ(TIM1.CCR1, 100U);
@@ -124,6 +124,32 @@ TEST_F(Port, WritesLegsAndTrips)
     hal->refused = true;
     EXPECT_FALSE(hal_bridge_arm(hal));
     EXPECT_FALSE(hal_bridge_armed(hal));
+}
+
+// RM0440, PWM mode 1: the upper switch is closed while the counter is below the compare value, here above or
+// below all that it reaches. The dead-time generator stays in charge of both switches.
+TEST_F(Port, AHeldLegFollowsACompareValueOutOfReach)
+{
+    ASSERT_EQ(bridge_start(hal, &good), HAL_OK);
+    drive_out_t out = {};
+    for (auto &compare : out.compare) {
+        compare[0] = compare[1] = 1234;
+    }
+    out.legs = pm_legs_of(PM_LEG_HIGH, PM_LEG_LOW, PM_LEG_OFF);
+    hal_bridge_write(hal, &out);
+    EXPECT_GT(TIM1.CCR1, TIM1.ARR);
+    EXPECT_EQ(TIM1.CCR2, 0U);
+    EXPECT_EQ(hal->legs, TIM_CCER_CC1E | TIM_CCER_CC1NE | TIM_CCER_CC2E | TIM_CCER_CC2NE);
+    out.legs = pm_legs_of(PM_LEG_OFF, PM_LEG_PWM, PM_LEG_HIGH);
+    hal_bridge_write(hal, &out);
+    EXPECT_EQ(TIM1.CCR2, 1234U);
+    EXPECT_GT(TIM1.CCR3, TIM1.ARR);
+    EXPECT_EQ(hal->legs, TIM_CCER_CC2E | TIM_CCER_CC2NE | TIM_CCER_CC3E | TIM_CCER_CC3NE);
+}
+
+TEST_F(Port, DeclaresWhatIsWired)
+{
+    EXPECT_EQ(hal_channels(hal), NEEDS_HELD);
 }
 
 TEST_F(Port, CurrentsAreTurned)

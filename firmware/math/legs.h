@@ -1,0 +1,45 @@
+/* What the legs of the bridge do in a period: the output of a procedure that owns the bridge, and of a
+ * commutation.
+ *
+ * With PM_LEG_PWM the mean voltage of a terminal against the negative rail is, dead time and drops aside,
+ *   v = duty v_dc.
+ * With the other states a diode, the motor or a closed switch decides. Tests: tests/contract/hal,
+ * tests/unit/drive. */
+#ifndef PM_MATH_LEGS_H
+#define PM_MATH_LEGS_H
+
+#include "firmware/math/fixed.h"
+#include "firmware/math/measure.h"
+
+/* Every port can do OFF and PWM; the others are NEEDS_HELD and NEEDS_ONE_SWITCH. */
+typedef enum {
+    PM_LEG_OFF,   /* both switches open */
+    PM_LEG_PWM,   /* complementary, with dead time */
+    PM_LEG_UPPER, /* the upper switch as with PWM, the lower one open */
+    PM_LEG_LOWER, /* the lower switch as with PWM, the upper one open */
+    PM_LEG_HIGH,  /* the upper switch closed throughout; the duty does not matter */
+    PM_LEG_LOW,   /* the lower switch closed throughout */
+} pm_leg_t;
+
+/* The states of three legs, four bits each: one word, so that a period in which nothing is unusual costs one
+ * store. */
+#define PM_LEGS_ALL(state) ((uint16_t)(0x111U * (uint32_t)(state)))
+#define PM_LEGS_OFF        PM_LEGS_ALL(PM_LEG_OFF)
+#define PM_LEGS_PWM        PM_LEGS_ALL(PM_LEG_PWM)
+
+static inline uint16_t pm_legs_of(pm_leg_t a, pm_leg_t b, pm_leg_t c)
+{
+    return (uint16_t)((uint32_t)a | (uint32_t)b << 4U | (uint32_t)c << 8U);
+}
+
+static inline pm_leg_t pm_leg(uint16_t legs, uint32_t leg)
+{
+    return (pm_leg_t)((uint32_t)legs >> 4U * leg & 15U);
+}
+
+typedef struct {
+    pm_q_t duty[PM_LEGS]; /* Q28, 0 ... 1: share of the period in which the upper switch of PWM is closed */
+    uint16_t legs;        /* PM_LEGS_... */
+} pm_legs_t;
+
+#endif

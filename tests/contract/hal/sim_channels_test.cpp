@@ -1,0 +1,177 @@
+// What the port `sim` delivers beside the common measurements, against the plant's truth and closed formulas.
+#include <cmath>
+#include <memory>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/application.h"
+#include "tests/support/plants.h"
+
+extern "C" {
+#include "hal/sim/port.h"
+}
+
+namespace
+{
+
+constexpr uint16_t kCounts = 8500;
+constexpr double kPeriod_s = 100e-6;
+constexpr double kFullScale_V = 450;
+
+plant_config_t machine()
+{
+    plant_config_t c = plants::ipm_1000();
+    c.sensor.bits = 0; // 16 bits, without noise
+    c.sensor.v_leg_full_scale_V = kFullScale_V;
+    c.sensor.capture_s = kPeriod_s / 2 / kCounts;
+    return c;
+}
+
+struct Port {
+    explicit Port(const plant_config_t &config) : plant(plant_create(&config, 0.3, &error), &plant_destroy)
+    {
+        sim_hal_init(&hal, plant.get());
+        const hal_config_t good = {kCounts, 500, 0, 500};
+        EXPECT_EQ(hal_init(&hal, &good), HAL_OK);
+    }
+    void step()
+    {
+        plant_sample(plant.get(), &hal.adc);
+        hal_measure(&hal, &in);
+        hal_bridge_write(&hal, &out);
+        sim_run_period(&hal);
+    }
+    const char *error = nullptr;
+    std::unique_ptr<plant_t, void (*)(plant_t *)> plant;
+    hal_t hal = {};
+    drive_in_t in = {};
+    drive_out_t out = {};
+};
+
+void unequal_duties(drive_out_t &out)
+{
+    for (int leg = 0; leg < 3; ++leg) {
+        out.compare[leg][0] = out.compare[leg][1] = static_cast<uint16_t>(4000 + 400 * leg);
+    }
+    out.legs = PM_LEGS_PWM;
+}
+
+double current_code(double i_A)
+{
+    return 32768 * (1 + i_A / 10.0);
+}
+
+// Asked for at k, taken in [k+1, k+2), delivered at k+2; a twin that is stopped at those instants has the truth.
+TEST(SimChannels, FurtherSamplesAreOfTheirInstants)
+{
+    Port port(machine());
+    Port twin(machine());
+    const uint16_t at[2] = {3000, 14000};
+    for (Port *p : {&port, &twin}) {
+        ASSERT_TRUE(hal_bridge_arm(&p->hal));
+        unequal_duties(p->out);
+        for (int k = 0; k < 20; ++k) {
+            p->step();
+        }
+    }
+    port.out.instants.sample_at[0] = at[0];
+    port.out.instants.sample_at[1] = at[1];
+    port.step(); // k
+    port.out.instants.sample_at[0] = port.out.instants.sample_at[1] = 0;
+    EXPECT_EQ(port.in.more.sampled, 0);
+    port.step(); // k+1
+    EXPECT_EQ(port.in.more.sampled, 0);
+    port.step(); // k+2
+    EXPECT_EQ(port.in.more.sampled, 3);
+    twin.step();
+    for (int n = 0; n < 2; ++n) {
+        plant_truth_t truth;
+        plant_move(twin.plant.get(), at[n] * kPeriod_s / (2 * kCounts));
+        plant_truth(twin.plant.get(), &truth);
+        for (int leg = 0; leg < 3; ++leg) {
+            EXPECT_NEAR(port.in.more.i_sample[n][leg], current_code(truth.i_A[leg]), 1.0) << n << leg;
+            EXPECT_GT(std::fabs(truth.i_A[leg] * 3276.8 + (leg == 1 ? 1e3 : 0)), 50.0) << "nothing to see";
+        }
+    }
+    port.step();
+    EXPECT_EQ(port.in.more.sampled, 0);
+}
+
+// Without current v_n - (v_a + v_b + v_c)/3 = -d/dt psi_3 cos(3 theta + phase) = 3 omega psi_3 sin(3 theta + phase).
+TEST(SimChannels, NeutralIsTheThirdHarmonicWithItsSign)
+{
+    plant_config_t config = machine();
+    const double psi_3_Wb = 0.02, omega_e = 300.0;
+    config.winding.emf[0] = {3, psi_3_Wb, 0.0};
+    Port port(config);
+    plant_set_speed(port.plant.get(), omega_e / config.machine.pole_pairs);
+    port.step(); // from standstill
+    double peak = 0.0;
+    for (int k = 0; k < 100; ++k) {
+        plant_truth_t truth;
+        plant_truth(port.plant.get(), &truth);
+        port.step();
+        const double v_V = 3 * omega_e * psi_3_Wb * std::sin(3 * truth.theta_e_rad);
+        EXPECT_NEAR(port.in.more.v_neutral - 32768.0, v_V / (2 * kFullScale_V) * 65536, 3.0) << k;
+        peak = std::max(peak, std::fabs(v_V));
+    }
+    EXPECT_GT(peak, 17.0);
+}
+
+// Legs held against each other: their terminals are at the rails.
+TEST(SimChannels, TerminalsOfHeldLegs)
+{
+    Port port(machine());
+    ASSERT_TRUE(hal_bridge_arm(&port.hal));
+    port.out.legs = pm_legs_of(PM_LEG_HIGH, PM_LEG_LOW, PM_LEG_OFF);
+    for (int k = 0; k < 5; ++k) {
+        port.step();
+    }
+    EXPECT_NEAR(port.in.more.v_terminal[0] / 65536.0 * kFullScale_V, 300.0,
+                3.0); // less the drop, and the source's
+    EXPECT_NEAR(port.in.more.v_terminal[1] / 65536.0 * kFullScale_V, 1.0, 0.5);
+    EXPECT_NEAR(port.in.more.v_neutral, 32768 + (150.0 - (300.0 + 150.0) / 3) / (2 * kFullScale_V) * 65536,
+                400);
+}
+
+// Between a leg held low and one held high a terminal passes the mean of all three where its PWM switches.
+TEST(SimChannels, CapturesOfEdges)
+{
+    plant_config_t config = machine();
+    config.inverter.dead_time_s = 0.0;
+    config.inverter.v_switch_V = config.inverter.v_diode_V = 0.0;
+    Port port(config);
+    ASSERT_TRUE(hal_bridge_arm(&port.hal));
+    port.out.legs = pm_legs_of(PM_LEG_PWM, PM_LEG_LOW, PM_LEG_HIGH);
+    port.out.compare[0][0] = port.out.compare[0][1] = 1700; // on from 0.8 to 1.2 of half a period
+    for (int k = 0; k < 3; ++k) {
+        port.step();
+    }
+    const pm_measure_t &more = port.in.more;
+    int seen[2] = {0, 0};
+    for (int n = 0; n < more.captures; ++n) {
+        if (more.capture[n].leg == 0) {
+            const bool rising = more.capture[n].rising;
+            EXPECT_NEAR(more.capture[n].at, rising ? 0.8 * kCounts : 1.2 * kCounts, 2.0);
+            seen[rising ? 1 : 0]++;
+        }
+    }
+    EXPECT_EQ(seen[0], 1);
+    EXPECT_EQ(seen[1], 1);
+}
+
+// With a low-side shunt and an upper switch that is closed all the time there is no current to measure.
+TEST(SimChannels, ACurrentThatCannotBeMeasuredIsMarked)
+{
+    plant_config_t config = machine();
+    config.sensor.shunt = PLANT_LOW_SIDE;
+    Port port(config);
+    ASSERT_TRUE(hal_bridge_arm(&port.hal));
+    port.out.legs = pm_legs_of(PM_LEG_LOW, PM_LEG_HIGH, PM_LEG_LOW);
+    for (int k = 0; k < 3; ++k) {
+        port.step();
+    }
+    EXPECT_EQ(port.in.more.missing, 2);
+}
+
+} // namespace
