@@ -16,6 +16,10 @@
 #include "injection/initial_pulses.h"
 #include "observers/speed.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     int32_t i_trip_squared; /* Q24 */
     pm_q_t v_dc_min;
@@ -67,5 +71,9 @@ typedef struct {
 } drive_config_t;
 
 drive_result_t drive_configure(drive_config_t *config, const drive_params_t *params);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

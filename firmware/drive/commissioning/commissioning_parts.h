@@ -4,6 +4,10 @@
 
 #include "firmware/drive/drive_parts.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* What a period does with the bridge. */
 enum { KIND_VOLTAGE, KIND_CURRENT, KIND_SQUARE };
 
@@ -56,5 +60,9 @@ static inline pm_q_t commissioning_approach(pm_q_t x, pm_q_t target, pm_q_t step
 {
     return x + pm_clamp(target - x, -step, step);
 }
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

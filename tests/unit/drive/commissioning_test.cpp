@@ -8,13 +8,7 @@
 #include "tests/support/plants.h"
 #include "tests/unit/drive/direct.h"
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpedantic"
-#pragma GCC diagnostic ignored "-Wc++20-extensions"
-extern "C" {
 #include "hal/sim/sim_loop.h"
-}
-#pragma GCC diagnostic pop
 
 namespace
 {
