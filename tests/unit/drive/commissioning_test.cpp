@@ -179,7 +179,7 @@ TEST(Commissioning, FluxInertiaAndFriction)
     }
 }
 
-TEST(Commissioning, WhatIsLeftOutComesFromTheParameters)
+TEST(Commissioning, ValuesNotIdentifiedComeFromTheParameters)
 {
     drive_params_t p = direct::params(2); // the machine's own
     Bench x(plants::ipm_1000(), p);

@@ -149,7 +149,7 @@ TEST_F(Port, BreakIsReportedAndThenCleared)
     EXPECT_EQ(TIM1.SR, ~(TIM_SR_BIF | TIM_SR_SBIF));
 }
 
-TEST_F(Port, SlowInputsTakeTurns)
+TEST_F(Port, SlowInputsAlternate)
 {
     hal_slow_t slow = {};
     ADC1.ISR = ADC_ISR_EOC;
