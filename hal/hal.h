@@ -24,6 +24,10 @@
 #include "firmware/drive/drive.h"
 #include "hal/can_frame.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct hal hal_t; /* defined by the port in its port.h */
 typedef struct app app_t; /* defined by the application */
 
@@ -152,5 +156,9 @@ void hal_led(hal_t *hal, bool on);
 void app_control(app_t *app); /* control, after every current measurement */
 void app_monitor(app_t *app); /* monitor, every millisecond after hal_start() */
 void app_slow(app_t *app);    /* slow, after hal_pend_slow() */
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

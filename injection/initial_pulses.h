@@ -18,6 +18,10 @@
 #include "firmware/math/frames.h"
 #include "firmware/math/procedure.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     uint16_t periods;    /* length of a pulse */
     uint16_t timeout;    /* periods that the decay may take */
@@ -44,5 +48,9 @@ typedef struct {
 void initial_pulses_reset(initial_pulses_t *self);
 pm_procedure_t initial_pulses_step(initial_pulses_t *self, const initial_pulses_config_t *config, pm_ab_t i,
                                    initial_pulses_out_t *out);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

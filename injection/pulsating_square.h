@@ -28,6 +28,10 @@
 
 #include "firmware/math/estimate.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     pm_q_t v_h;
     pm_q_t lambda_1, lambda_2; /* a, b */
@@ -63,7 +67,12 @@ pm_q_t pulsating_square_misfit(const pulsating_square_t *self, const pulsating_s
 /* Current at k without the carrier, doubled; call before pulsating_square_demodulate(). */
 static inline pm_ab_t pulsating_square_fundamental_twice(const pulsating_square_t *self, pm_ab_t i)
 {
-    return (pm_ab_t){.alpha = i.alpha + self->i.alpha, .beta = i.beta + self->i.beta};
+    const pm_ab_t sum = {i.alpha + self->i.alpha, i.beta + self->i.beta};
+    return sum;
 }
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -31,6 +31,10 @@
 
 #include "observers/model.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     observer_model_t model;
     observer_resistance_t resistance;
@@ -69,5 +73,9 @@ void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, c
                       const obs_out_t *out, pm_q_t weight);
 
 void make_active_flux(maker_t *m, active_flux_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

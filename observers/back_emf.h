@@ -14,6 +14,10 @@
 
 #include "observers/emf.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef emf_config_t back_emf_config_t;
 typedef emf_t back_emf_t;
 
@@ -38,5 +42,9 @@ static inline void back_emf_tie(back_emf_t *self, const back_emf_config_t *confi
 }
 
 void make_back_emf(maker_t *m, back_emf_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

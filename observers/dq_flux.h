@@ -9,6 +9,10 @@
 
 #include "observers/model.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     pm_ab_t psi;              /* psi - R T_s / 2 i, Q28 */
     pm_dir_t dir;             /* frame of the last sample */
@@ -47,5 +51,9 @@ static inline void dq_flux_keep(dq_flux_t *self, pm_dq_t lambda, pm_dq_t magnet,
     self->psi = pm_park_inverse(psi, dir);
     self->dir = dir;
 }
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -39,6 +39,10 @@
 #include "firmware/math/kalman.h"
 #include "observers/dq_flux.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum { EKF_LAMBDA_D, EKF_LAMBDA_Q, EKF_OMEGA, EKF_DELTA, EKF_STATES };
 
 typedef struct {
@@ -65,5 +69,9 @@ void ekf_full_slow(ekf_full_t *self, const ekf_full_config_t *config, const obs_
                    const obs_out_t *out, pm_q_t weight);
 
 void make_ekf_full(maker_t *m, ekf_full_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

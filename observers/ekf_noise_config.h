@@ -4,6 +4,10 @@
 
 #include "firmware/params/maker.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Standard deviations. */
 typedef struct {
     pm_num_t current; /* of a sample, A */
@@ -18,5 +22,9 @@ ekf_noise_t ekf_noise(const maker_t *m);
 /* Variances (sigma / unit)^2, Q30, clamped to what keeps the covariance in range. */
 int32_t ekf_process(pm_num_t sigma, pm_num_t unit, int32_t least);
 int32_t ekf_measurement(pm_num_t sigma, pm_num_t unit);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

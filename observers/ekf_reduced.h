@@ -35,6 +35,10 @@
 #include "firmware/math/kalman.h"
 #include "observers/dq_flux.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum { EKF_REDUCED_OMEGA, EKF_REDUCED_DELTA, EKF_REDUCED_STATES };
 
 typedef struct {
@@ -64,5 +68,9 @@ void ekf_reduced_slow(ekf_reduced_t *self, const ekf_reduced_config_t *config, c
                       const obs_out_t *out, pm_q_t weight);
 
 void make_ekf_reduced(maker_t *m, ekf_reduced_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

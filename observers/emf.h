@@ -29,6 +29,10 @@
 #include "firmware/math/pair.h"
 #include "observers/model.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     observer_model_t model;
     observer_resistance_t resistance;
@@ -98,7 +102,8 @@ static inline pm_ab_t emf_pair(emf_t *self, pm_ab_t change)
 {
     const pm_ab_t past = pm_pair_ab(&self->change);
     self->change = change;
-    return (pm_ab_t){.alpha = change.alpha + past.alpha, .beta = change.beta + past.beta};
+    const pm_ab_t sum = {change.alpha + past.alpha, change.beta + past.beta};
+    return sum;
 }
 
 /* Turns e from the q-axis of its own instant into the present frame. */
@@ -125,5 +130,9 @@ static inline void emf_describe(const emf_t *self, pm_dq_t e, obs_out_t *out)
 }
 
 void make_emf(maker_t *m, emf_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

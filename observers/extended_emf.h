@@ -17,6 +17,10 @@
 
 #include "observers/emf.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef emf_config_t extended_emf_config_t;
 typedef emf_t extended_emf_t;
 
@@ -41,5 +45,9 @@ static inline void extended_emf_tie(extended_emf_t *self, const extended_emf_con
 }
 
 void make_extended_emf(maker_t *m, extended_emf_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

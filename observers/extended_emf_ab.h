@@ -16,6 +16,10 @@
 
 #include "observers/emf.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef emf_config_t extended_emf_ab_config_t;
 
 typedef struct {
@@ -41,5 +45,9 @@ static inline void extended_emf_ab_tie(extended_emf_ab_t *self, const extended_e
 }
 
 void make_extended_emf_ab(maker_t *m, extended_emf_ab_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -25,18 +25,20 @@ static inline void flux_keep(active_flux_t *self, pm_ab_t psi, pm_dq_t back, pm_
 {
     psi.alpha = pm_mulh_add(pm_mulh_add(psi.alpha, back.d, dir.cos), back.q, dir.sin);
     psi.beta = pm_mulh_sub(pm_mulh_add(psi.beta, back.d, dir.sin), back.q, dir.cos);
-    self->psi = (pm_ab_t){.alpha = pm_sat(psi.alpha, 29), .beta = pm_sat(psi.beta, 29)};
+    const pm_ab_t kept = {pm_sat(psi.alpha, 29), pm_sat(psi.beta, 29)};
+    self->psi = kept;
 }
 
 static inline pm_q_t flux_relative(const active_flux_t *self, int32_t flux)
 {
-    const int32_t bits = 25 + 26 - 32;
-    return pm_shl(pm_sat(pm_mulh(flux, self->inverse), 19), PM_Q_BITS - bits);
+    const unsigned lift = PM_Q_BITS - (25 + 26 - 32);
+    return pm_shl(pm_sat(pm_mulh(flux, self->inverse), 19), lift);
 }
 
 static inline void flux_describe(const active_flux_t *self, pm_dq_t active, obs_out_t *out)
 {
-    out->vector = (pm_dq_t){.d = pm_shl(active.d, 3), .q = pm_shl(active.q, 3)};
+    const pm_dq_t vector = {pm_shl(active.d, 3), pm_shl(active.q, 3)};
+    out->vector = vector;
     out->eps = flux_relative(self, active.q);
     out->misfit = flux_relative(self, self->reference - active.d);
 }

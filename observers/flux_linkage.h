@@ -19,6 +19,10 @@
 
 #include "observers/active_flux.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     active_flux_config_t flux; /* .g: here of the low-pass, T_s w_base g */
     pm_q_t g;                  /* w_c / |w| */
@@ -39,5 +43,9 @@ void flux_linkage_slow(flux_linkage_t *self, const flux_linkage_config_t *config
                        const obs_out_t *out, pm_q_t weight);
 
 void make_flux_linkage(maker_t *m, flux_linkage_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

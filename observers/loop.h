@@ -30,6 +30,10 @@
 #include "firmware/math/pll.h"
 #include "firmware/params/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum { LOOP_PLL, LOOP_ARCTANGENT, LOOP_SIMPLIFIED_EKF, LOOP_COUNT } loop_id_t;
 
 typedef struct {
@@ -58,5 +62,9 @@ void make_loop(maker_t *m, loop_config_t *c, pm_pll_config_t *low, pm_pll_config
 
 /* r / w_n of the simplified EKF, for makers. */
 #define LOOP_EKF_SHARE pm_num_ratio(7067, 10000)
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

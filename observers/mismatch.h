@@ -42,6 +42,10 @@
 #include "firmware/math/pll.h"
 #include "observers/model.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define MISMATCH_PERIODS 4U  /* of the injection in a window, after the first */
 #define MISMATCH_WINDOWS 64U /* learnt before the injection pauses */
 
@@ -99,5 +103,9 @@ void mismatch_slow(mismatch_t *self, mismatch_window_t *window, const mismatch_c
                    const observer_model_t *model, const mismatch_in_t *in);
 
 void make_mismatch(maker_t *m, mismatch_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -20,6 +20,10 @@
 #include "firmware/math/estimate.h"
 #include "firmware/params/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     pm_q_t R;
     pm_q_t L_d, L_q;
@@ -47,5 +51,9 @@ pm_q_t observer_amplitude(const observer_model_t *model, pm_dq_t i, pm_q_t refer
  * current. Between half and twice the parameter. */
 pm_q_t observer_resistance(const observer_resistance_t *config, const observer_model_t *model, pm_q_t R,
                            pm_q_t omega, pm_q_t lack);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -5,6 +5,10 @@
 #include "firmware/params/maker.h"
 #include "observers/model.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Rate at which the state is tied to the position while injection leads, rad/s. */
 #define OBSERVER_TIE pm_num(300)
 
@@ -15,5 +19,9 @@ void make_resistance(maker_t *m, observer_resistance_t *c, pm_num_t k);
 
 /* Refuses a machine whose L_q is more than an eighth above L_d. */
 void round_only(maker_t *m);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

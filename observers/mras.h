@@ -31,6 +31,10 @@
 
 #include "observers/model.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     observer_model_t model;
     pm_frac_t k;    /* bandwidth of the adapted quantity times T_s, Q32 */
@@ -69,5 +73,9 @@ static inline pm_q_t mras_relative(int32_t voltage, int32_t inverse)
 }
 
 void make_mras(maker_t *m, mras_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

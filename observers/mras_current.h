@@ -23,6 +23,10 @@
 
 #include "observers/mras.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef mras_config_t mras_current_config_t;
 
 typedef struct {
@@ -50,5 +54,9 @@ void mras_current_slow(mras_current_t *self, const mras_current_config_t *config
                        const obs_out_t *out, pm_q_t weight);
 
 void make_mras_current(maker_t *m, mras_current_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

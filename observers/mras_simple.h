@@ -20,6 +20,10 @@
 
 #include "observers/mras.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef mras_config_t mras_simple_config_t;
 
 typedef struct {
@@ -41,5 +45,9 @@ void mras_simple_slow(mras_simple_t *self, const mras_simple_config_t *config, c
                       const obs_out_t *out, pm_q_t weight);
 
 void make_mras_simple(maker_t *m, mras_simple_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -20,6 +20,10 @@
 
 #include "observers/mras.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef mras_config_t mras_voltage_config_t;
 
 typedef struct {
@@ -45,5 +49,9 @@ void mras_voltage_slow(mras_voltage_t *self, const mras_voltage_config_t *config
                        const obs_out_t *out, pm_q_t weight);
 
 void make_mras_voltage(maker_t *m, mras_voltage_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -34,6 +34,10 @@
 #include "observers/mras_voltage.h"
 #include "observers/sliding_mode.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum {
 #define PM_METHOD(name, help, traits, needs) OBSERVER_##name,
 #include "observers/observers.def"
@@ -82,5 +86,9 @@ static inline void observer_step(observer_t *self, const observer_config_t *conf
 }
 
 void make_observer(maker_t *m, observer_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

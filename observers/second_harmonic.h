@@ -29,6 +29,10 @@
 #include "firmware/math/frames.h"
 #include "firmware/params/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum {
     SECOND_HARMONIC_STAYS,
     SECOND_HARMONIC_NOTCH,
@@ -63,5 +67,9 @@ void second_harmonic_slow(second_harmonic_t *self, const second_harmonic_config_
                           pm_q_t weight);
 
 void make_second_harmonic(maker_t *m, second_harmonic_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

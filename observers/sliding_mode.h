@@ -39,6 +39,10 @@
 
 #include "observers/model.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum {
     SLIDING_MODE_SIGN,
     SLIDING_MODE_SATURATION,
@@ -87,5 +91,9 @@ void sliding_mode_slow(sliding_mode_t *self, const sliding_mode_config_t *config
                        const obs_out_t *out, pm_q_t weight);
 
 void make_sliding_mode(maker_t *m, sliding_mode_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

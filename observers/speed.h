@@ -21,6 +21,10 @@
 #include "firmware/math/frames.h"
 #include "firmware/params/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define SPEED_WINDOW 6U
 
 typedef enum { SPEED_LOOP, SPEED_DIFFERENCE, SPEED_EMF_RATIO, SPEED_COMBINED, SPEED_COUNT } speed_id_t;
@@ -64,5 +68,9 @@ static inline void speed_collect(speed_t *self, pm_q_t v_q)
 pm_q_t speed_step(speed_t *self, const speed_config_t *config, const speed_in_t *in);
 
 void make_speed(maker_t *m, speed_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -25,7 +25,7 @@ import matplotlib.pyplot as plt  # noqa: E402
 ROOT = Path(__file__).resolve().parent.parent
 PMSIM = ROOT / "out/build/host-release/tools/pmsim/pmsim"
 COST = ROOT / "out/build/stm32g431/tests/target/observers/observers_cost.elf"
-# SPM-400 is told to be round, whatever its inductances say; its open-loop start is against rated load
+# SPM-400 is parametrised as round, whatever its inductances; its open-loop start is against rated load
 START = {"IPM-1000": "", "SPM-400": ", start_method: 2, i_open_loop: 4.5"}
 MACHINES = {"IPM-1000": "ipm_1000.yaml", "SPM-400": "spm_400.yaml"}
 SPEEDS = [0.05, 0.1, 0.2, 0.5, 1.0]
@@ -133,30 +133,30 @@ def sections(machine):
     return f"inverter: {{dead_time_s: {dead}*$dead}}\nsensor: {{noise_lsb: $noise}}"
 
 
-def told(machine):
+def misestimated(machine):
     R, L_d, L_q, L_q_rated, psi, dead = {
         "IPM-1000": (6.0, 43e-3, 75e-3, 70.835e-3, 0.236, 2e-6),
         "SPM-400": (0.383, 3.0e-3, 3.3e-3, 3.2966e-3, 0.0776, 1e-6),
     }[machine]
-    return (f"{LIMITS}, R_s: {R}*$told_R, L_q: {L_q}*$told_L_q, L_q_rated: {L_q_rated}*$told_L_q, L_d: {L_d}*$told_L_d, "
-            f"psi_m: {psi}*$told_psi, dead_time: {dead}")
+    return (f"{LIMITS}, R_s: {R}*$set_R, L_q: {L_q}*$set_L_q, L_q_rated: {L_q_rated}*$set_L_q, L_d: {L_d}*$set_L_d, "
+            f"psi_m: {psi}*$set_psi, dead_time: {dead}")
 
 
 def other_machine(machine, change):
-    """The machine is not known better than this: what the drive is told is so much off."""
+    """Parameters of the drive that are wrong by the given factors."""
     values = {**half(machine), "R": 1, "L_d": 1, "L_q": 1, "psi": 1, "dead": 1, "noise": 0.5, **change}
-    return {**values, **{f"told_{key}": 1 / values.pop(key) for key in ("R", "L_d", "L_q", "psi")}}
+    return {**values, **{f"set_{key}": 1 / values.pop(key) for key in ("R", "L_d", "L_q", "psi")}}
 
 
 def errors(machine):
-    """Half speed, half load, the machine other than the drive believes by so much."""
+    """Half speed, half load, one parameter misestimated at a time."""
     wrong = [("exact", {}), ("R +20 %", {"R": 1.2}), ("R -20 %", {"R": 0.8}), ("L +20 %", {"L_d": 1.2, "L_q": 1.2}),
              ("L -20 %", {"L_d": 0.8, "L_q": 0.8}), ("psi +20 %", {"psi": 1.2}), ("psi -20 %", {"psi": 0.8}),
              ("dead time +20 %", {"dead": 1.2}), ("noise x 2", {"noise": 1})]
     cases = [(name, other_machine(machine, change)) for name, change in wrong]
     profile = """  - {t_s: 0.0, mode: speed, speed_rel: 0.5, enable: true}
   - {t_s: 1.4, load_rel: 0.5, ramp_s: 0.3}"""
-    return Study(machine, profile, cases, 2.5, 3.0, told(machine), sections(machine))
+    return Study(machine, profile, cases, 2.5, 3.0, misestimated(machine), sections(machine))
 
 
 def harmonics(machine):
@@ -190,7 +190,7 @@ def monte_carlo(machine, count, control, alike=False):
   - {t_s: 3.2, enable: false}"""
     extra = sections(machine).replace("noise_lsb: $noise", "noise_lsb: $noise, gain_error: [$ga, $gb, $gc], "
                                       "offset_A: [$oa, $ob, $oc]")
-    return Study(machine, profile, cases, 1.0, 2.0, told(machine), extra)
+    return Study(machine, profile, cases, 1.0, 2.0, misestimated(machine), extra)
 
 
 def cost():
@@ -265,13 +265,13 @@ def measure(machine, chosen, ids, count):
             own = studies | {"machines": monte_carlo(machine, count, 4, name in one_inductance),
                              "quick": monte_carlo(machine, count, 5, name in one_inductance)}
             got = dict(zip(own, pool.map(lambda study, n=ids[name]: study.run(n), own.values())))
-            if None not in got.values():  # the drive takes it for this machine
+            if None not in got.values():  # the drive accepts it for this machine
                 results[name] = got
                 print(f"{machine}: {name}", flush=True)
     return results, studies["errors"].names
 
 
-HEAD = """# The observers side by side
+HEAD = """# Comparison of the observers
 
 One set of scenarios over every observer of `observers/observers.def`, on the switching plant with dead time, converter and its
 noise, and the period of delay. Made by `tools/observer_report`; the same loops and limits for all: 25 Hz position loop and 5 Hz
@@ -279,10 +279,10 @@ speed control, below 30 % speed 10 and 3 Hz (SPM-400: 15 and 4); the observer al
 electrical degrees.
 
 **The drive's default is `active_flux`.** It runs salient and round machines alike, down to the lowest speed: it integrates, so noise
-and what is not known of the dead time weigh least there. Its model contains no speed, which the position loop would feed back, and
-only `mras_simple` costs less. An EMF observer answers a load step with less error; take it where the speed stays above 20 %. The
+and errors of the dead-time compensation matter least there. Its model contains no speed, which the position loop would feed back,
+and only `mras_simple` costs less. An EMF observer has a smaller error in a load step; use it where the speed stays above 20 %. The
 Kalman filter of full order is as good at low speed and better in a load step, at six times the instructions, but a wrong psi_m moves
-its angle; the reduced one may slip in an open-loop start where R is told too low.
+its angle; the reduced one may slip in an open-loop start if R is underestimated.
 """
 
 
@@ -316,7 +316,7 @@ def page(all_results, names, plots, counted, sizes, help_of, count):
             rows.append([f"`{name}`", *cells])
         text.append(table(["observer", *[f"{100 * s:.0f} %" for s in SPEEDS]], rows))
         text.append("At half speed: largest error of a load step 0 to 100 %, of a reversal, with 4 % of 5th and 1 % of 7th EMF "
-                    "harmonic; mean error at half load when the machine differs from what the drive was told"
+                    "harmonic; mean error at half load when the machine differs from the drive's parameters"
                     + ("" if machine == "IPM-1000" else ". The reversal passes zero on the vector of the open loop and is "
                        "measured from 0.15 s before the observer takes over again") + ":\n")
         rows = []
@@ -325,11 +325,11 @@ def page(all_results, names, plots, counted, sizes, help_of, count):
             rows.append([f"`{name}`", degrees(worst(r["load"])), degrees(worst(r["reversal"])),
                          degrees(worst(r["harmonics"])), *means])
         text.append(table(["observer", "load step", "reversal", "harmonics", *names], rows))
-    text.append(f"The {count} machines differ from what the drive was told by up to 20 % in R, L_d, L_q, psi and dead "
+    text.append(f"The {count} machines differ from the drive's parameters by up to 20 % in R, L_d, L_q, psi and dead "
                 "time, each for itself (L_d and L_q alike for observers that know one L_s), 1 % in the gain and 20 mA in the "
-                "offset of each current channel; each starts, takes half load at 60 % speed, turns round and stops. Lost: a "
-                "fault, or 60 degrees of error between 1 and 2 s; with the drive's preset of the speed control, 4 Hz, in brackets "
-                "with 5 Hz: with an L that is believed a fifth too large, angle and speed control excite each other.\n")
+                "offset of each current channel; each starts, runs at 60 % speed with half load, reverses and stops. Lost: a "
+                "fault, or 60 degrees of error between 1 and 2 s; with the drive's default of the speed control, 4 Hz, in brackets "
+                "with 5 Hz: if L_q is overestimated by 20 %, angle and speed control excite each other.\n")
     return "\n".join(text)
 
 

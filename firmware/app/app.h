@@ -27,6 +27,10 @@
 #include "firmware/params/parameters.h"
 #include "hal/hal.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* 8 kB: four signals, 20 kHz, 50 ms */
 #define APP_TRACE_NUMBERS 4000U
 
@@ -104,5 +108,9 @@ void app_boot(app_t *app, hal_t *hal);
 void app_turn(app_t *app);
 
 app_ready_t app_ready(const app_t *app);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -4,6 +4,10 @@
 
 #include "firmware/app/app.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* app.c */
 hal_config_t app_hal_config(const drive_params_t *params, uint16_t can_kbit_s);
 void app_trip(app_t *app, drive_fault_t fault);
@@ -37,5 +41,9 @@ void app_give_parameters(app_t *app); /* the present set again: it may be good f
 bool app_stored_value(const hal_t *hal, uint16_t index, uint8_t sub, int32_t *value);
 bool app_store_group(app_t *app, uint32_t group, bool keep); /* keep: the present values; else none */
 void app_recall(app_t *app, od_kind_t kind);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

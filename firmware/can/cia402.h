@@ -17,6 +17,10 @@
 
 #include "firmware/can/dictionary.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum {
     CIA402_NOT_READY,
     CIA402_SWITCH_ON_DISABLED,
@@ -77,5 +81,9 @@ bool cia402_on(const cia402_t *self); /* the drive is on, or about to be */
 /* Objects of the profile by slot (OD_LIVE_...). False: not one of these. */
 bool cia402_get(const cia402_t *self, uint16_t slot, int32_t *value);
 bool cia402_put(cia402_t *self, uint16_t slot, int32_t value, uint32_t *code);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -9,6 +9,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Data types of CiA 301 that are used */
 typedef enum {
     OD_I8 = 0x02,
@@ -81,5 +85,9 @@ static inline const od_values_t *od_values_of(const od_entry_t *entry)
 /* NULL: no such object, or with *has_index no such sub-index. Binary search. */
 const od_entry_t *od_find(uint16_t index, uint8_t sub, bool *has_index);
 uint8_t od_size(const od_entry_t *entry); /* bytes of a number; 0: string or domain */
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -52,7 +52,7 @@ static void queue(node_t *node, node_error_t source, uint32_t info)
         node->emcy[node->emcy_count] =
             (node_emcy_t){.code = node->error[source], .error_register = update_register(node), .info = info};
         node->emcy_count++;
-        node->told[source] = node->error[source];
+        node->reported[source] = node->error[source];
     }
 }
 
@@ -60,7 +60,7 @@ static void queue(node_t *node, node_error_t source, uint32_t info)
 static void catch_up(node_t *node)
 {
     for (uint32_t source = 0; source < (uint32_t)NODE_ERRORS; source++) {
-        if (node->told[source] != node->error[source]) {
+        if (node->reported[source] != node->error[source]) {
             queue(node, (node_error_t)source, 0);
         }
     }
@@ -70,7 +70,7 @@ void emcy_forget(node_t *node)
 {
     node->emcy_count = 0;
     for (uint32_t source = 0; source < (uint32_t)NODE_ERRORS; source++) {
-        node->told[source] = node->error[source];
+        node->reported[source] = node->error[source];
     }
 }
 

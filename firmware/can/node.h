@@ -26,6 +26,10 @@
 
 #include "firmware/can/dictionary.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Classic frame, 11-bit identifier */
 typedef struct {
     uint16_t id;
@@ -110,5 +114,9 @@ int32_t node_stored(const node_t *node, const od_entry_t *entry);
 
 node_nmt_t node_nmt(const node_t *node);
 uint8_t node_id(const node_t *node);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

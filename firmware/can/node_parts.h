@@ -4,6 +4,10 @@
 
 #include "firmware/can/node_state.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define NODE_NO_ID 255U
 
 /* Indices of CiA 301 */
@@ -113,5 +117,9 @@ void sdo_block_run(node_t *node);
 
 /* lss.c */
 void lss_receive(node_t *node, const node_frame_t *frame);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

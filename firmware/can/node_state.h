@@ -83,9 +83,9 @@ struct node {
     uint32_t heartbeat_last_us;
     node_consumer_t consumer[NODE_CONSUMERS];
 
-    uint16_t error[NODE_ERRORS]; /* code that is there; 0: none */
-    uint16_t told[NODE_ERRORS];  /* the same, as last sent in a message */
-    node_emcy_t emcy[NODE_EMCY]; /* to be sent */
+    uint16_t error[NODE_ERRORS];    /* code that is there; 0: none */
+    uint16_t reported[NODE_ERRORS]; /* the same, as last sent in a message */
+    node_emcy_t emcy[NODE_EMCY];    /* to be sent */
     uint8_t emcy_count;
     uint32_t emcy_last_us;
     node_bus_t bus;

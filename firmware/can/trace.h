@@ -20,6 +20,10 @@
 
 #include "firmware/can/dictionary.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define TRACE_SIGNALS 8U
 
 typedef enum {
@@ -95,5 +99,9 @@ bool trace_put(trace_t *trace, uint16_t slot, int32_t value, uint32_t *code);
 
 uint32_t trace_size(const trace_t *trace); /* bytes of the data; 0: there is none yet */
 void trace_read(const trace_t *trace, uint32_t offset, uint8_t bytes[], uint32_t count);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -18,6 +18,10 @@
 #include "firmware/math/pi.h"
 #include "firmware/params/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     pm_pi_config_t d, q;
     pm_q_t L_q; /* per-unit, decoupling; |L i| < 8 */
@@ -42,5 +46,9 @@ void current_control_step(current_control_t *self, const current_control_config_
                           pm_dq_t i_ref, pm_q_t omega, pm_q_t v_max, current_control_out_t *out);
 
 void make_current_control(maker_t *m, current_control_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -10,6 +10,10 @@
 #include "firmware/math/frames.h"
 #include "firmware/params/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     pm_frac_t k;  /* Q32, per call */
     pm_q_t i_max; /* largest demagnetising current; 0: off */
@@ -23,5 +27,9 @@ pm_q_t field_weakening_step(field_weakening_t *self, const field_weakening_confi
                             pm_q_t v_top);
 
 void make_field_weakening(maker_t *m, field_weakening_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

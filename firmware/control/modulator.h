@@ -19,6 +19,10 @@
 #include "firmware/math/root.h"
 #include "firmware/params/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     int32_t counts;     /* timer counts of half a period */
     int32_t zone_alpha; /* pm_mulh(zone / 4, zone_alpha) = 2^PM_ZONE_BITS */
@@ -46,5 +50,9 @@ void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t
                     pm_ab_t i_quarter, modulator_out_t *out);
 
 void make_modulator(maker_t *m, modulator_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -10,6 +10,10 @@
 #include "firmware/math/frames.h"
 #include "firmware/params/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     pm_q_t h; /* psi_m / (2 (L_q - L_d)), a current; 0: i_d = 0 */
 } mtpa_config_t;
@@ -17,5 +21,9 @@ typedef struct {
 pm_q_t mtpa_i_d(const mtpa_config_t *config, pm_q_t i_q);
 
 void make_mtpa(maker_t *m, mtpa_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

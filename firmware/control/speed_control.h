@@ -12,6 +12,10 @@
 #include "firmware/math/pi.h"
 #include "firmware/params/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     pm_pi_config_t pi;  /* speed error -> i_q */
     pm_q_t slope;       /* change of the reference per call */
@@ -30,5 +34,9 @@ pm_q_t speed_control_step(speed_control_t *self, const speed_control_config_t *c
                           pm_q_t omega, pm_q_t i_min, pm_q_t i_max, bool *limited);
 
 void make_speed_control(maker_t *m, speed_control_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

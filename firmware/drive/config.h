@@ -16,6 +16,10 @@
 #include "injection/initial_pulses.h"
 #include "observers/speed.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     int32_t i_trip_squared; /* Q24 */
     pm_q_t v_dc_min;
@@ -68,5 +72,9 @@ typedef struct {
 
 /* channels: what the board has, hal_channels(). */
 drive_result_t drive_configure(drive_config_t *config, const drive_params_t *params, uint32_t channels);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

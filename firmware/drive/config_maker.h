@@ -5,9 +5,17 @@
 #include "firmware/drive/config.h"
 #include "firmware/params/maker.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* config_position.c */
 bool salient(const maker_t *m);
 void make_position(maker_t *m, position_config_t *c, bool injection);
 void make_pulses(maker_t *m, initial_pulses_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -27,6 +27,10 @@
 #include "firmware/math/legs.h"
 #include "firmware/math/measure.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define DRIVE_LEGS PM_LEGS
 
 /* What every board measures, then what methods may need beside it (measure.h). */
@@ -140,5 +144,9 @@ void drive_trip(drive_t *drive, drive_fault_t fault);
 bool drive_clear_fault(drive_t *drive); /* false: the cause is still there, or enable is still set */
 const drive_status_t *drive_status(const drive_t *drive);
 const drive_fault_record_t *drive_fault_record(const drive_t *drive); /* values at the moment of the fault */
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -4,6 +4,10 @@
 
 #include "firmware/drive/drive_state.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Each period while the bridge is driven: currents and DC link within their limits. */
 static inline bool protection_currents_passed(const drive_t *drive)
 {
@@ -51,5 +55,9 @@ void commissioning_start(drive_t *drive);
 void commissioning_slow(drive_t *drive);
 void commissioning_abort(drive_t *drive);                  /* it has not come to its end */
 void commissioning_step(drive_t *drive, drive_out_t *out); /* bridge.c: one period */
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -24,6 +24,20 @@ typedef struct {
     uint16_t count; /* periods taken */
 } calibration_t;
 
+/* Before the position is estimated: the loop stays as it was. */
+typedef struct {
+    pm_pll_t pll;
+    union {
+        calibration_t calibration;
+        initial_pulses_t pulses;
+    };
+} drive_start_t;
+
+typedef struct {
+    pm_pll_t pll;
+    commissioning_t work;
+} drive_identify_t;
+
 struct drive {
     drive_config_t config;
     drive_status_t status;
@@ -49,17 +63,8 @@ struct drive {
 
     union { /* as long as nothing estimates the position, what comes before; its loop stays as it was */
         position_t position;
-        struct {
-            pm_pll_t pll;
-            union {
-                calibration_t calibration;
-                initial_pulses_t pulses;
-            };
-        } start;
-        struct {
-            pm_pll_t pll;
-            commissioning_t work;
-        } identify;
+        drive_start_t start;
+        drive_identify_t identify;
     };
     pm_procedure_t pulses_state;
     current_control_t current;

@@ -5,6 +5,10 @@
 
 #include "firmware/math/frames.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum {
     DRIVE_FAULT_NONE,
 #define PM_FAULT(name, text) DRIVE_FAULT_##name,
@@ -24,5 +28,9 @@ typedef struct {
 } drive_fault_record_t;
 
 const char *drive_fault_text(drive_fault_t fault);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -17,6 +17,10 @@
 #include "observers/observer.h"
 #include "observers/second_harmonic.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     observer_config_t observer;
     pulsating_square_config_t square;
@@ -84,5 +88,9 @@ static inline pm_q_t position_injected(const position_t *self)
 /* At 1 kHz, with the current of the last step and the same in its frame: weight, carrier, loop gains,
  * quality. */
 void position_slow(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -44,6 +44,8 @@ int64_t pm_quotient(int64_t num, int32_t den);
 }
 #endif
 
-#define PM_NUM_TWO_PI ((pm_num_t){.m = 1686629713, .e = -28})
+#define PM_NUM_TWO_PI_M 1686629713
+#define PM_NUM_TWO_PI_E (-28)
+#define PM_NUM_TWO_PI   ((pm_num_t){.m = PM_NUM_TWO_PI_M, .e = PM_NUM_TWO_PI_E})
 
 #endif

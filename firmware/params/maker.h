@@ -34,7 +34,8 @@ struct maker {
 static inline void refuse(maker_t *m, drive_param_id_t id, const char *reason)
 {
     if (m->result.ok) {
-        m->result = (drive_result_t){.ok = false, .param = id, .reason = reason};
+        const drive_result_t refusal = {false, id, reason};
+        m->result = refusal;
     }
 }
 
@@ -105,7 +106,8 @@ static inline pm_q_t speed(maker_t *m, drive_param_id_t id)
 
 static inline pm_num_t angular(const maker_t *m, drive_param_id_t id)
 {
-    return pm_num_mul(PM_NUM_TWO_PI, si(m, id));
+    const pm_num_t two_pi = {PM_NUM_TWO_PI_M, PM_NUM_TWO_PI_E};
+    return pm_num_mul(two_pi, si(m, id));
 }
 
 #endif

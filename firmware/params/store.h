@@ -18,6 +18,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     uint32_t id;
     int32_t value;
@@ -49,5 +53,9 @@ void store_begin(store_writer_t *writer, uint32_t sequence, uint32_t schema, uin
                  uint32_t words[STORE_HEADER]);
 void store_put(store_writer_t *writer, store_pair_t pair, uint32_t words[2]);
 void store_end(const store_writer_t *writer, uint32_t words[2]);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -16,6 +16,10 @@
 
 #include "hal/linux/gpio_line.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define BOARD_HOLD_MS 20 /* of NRST; the processor needs 0.3 us, a supervisor on the board more */
 #define BOARD_START_MS                                                                                       \
     100 /* NRST rises (100 nF at 40 kOhm: 20 ms), BOOT0 is read, the ROM begins to listen */
@@ -33,5 +37,9 @@ void board_lines_close(board_lines_t *lines);
 /* These block for 120 ms. False: a line could not be set; both are then off, as far as possible. */
 bool board_lines_boot(const board_lines_t *lines); /* resets into the boot loader */
 bool board_lines_run(const board_lines_t *lines);  /* resets into the flashed image */
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -4,6 +4,10 @@
 
 #include "hal/linux/can_link.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define CAN_TEXT_MOST 128 /* of one message of a text protocol */
 
 typedef struct {
@@ -36,5 +40,9 @@ size_t can_put_hex(char *at, uint32_t value, int digits);
 bool can_gather(can_link_t *link, int fd, char last, bool *closed);
 
 double can_now_s(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -16,6 +16,10 @@
 
 #include "hal/can_frame.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct can_link can_link_t;
 
 /* NULL and an error text that says how to solve it. */
@@ -26,5 +30,9 @@ bool can_link_receive(can_link_t *link, hal_can_frame_t *frame);    /* false: no
 bool can_link_send(can_link_t *link, const hal_can_frame_t *frame); /* false: no room, or nobody listens */
 hal_can_state_t can_link_state(const can_link_t *link);
 const char *can_link_where(const can_link_t *link); /* where a peer finds it */
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -4,6 +4,10 @@
 
 #include "hal/linux/gpio_line.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Of "CHIP:OFFSET[!]" */
 typedef struct {
     char chip[64];
@@ -14,5 +18,9 @@ bool gpio_name_parse(const char *name, gpio_name_t *parsed, char *error, size_t 
 
 /* NULL: errno says why. */
 gpio_line_t *gpio_backend_request(const gpio_name_t *name, gpio_use_t use);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

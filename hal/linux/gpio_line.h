@@ -13,6 +13,10 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum {
     GPIO_INPUT,
     GPIO_EDGES, /* an input whose rising and falling edges the kernel queues: 16 of them */
@@ -31,5 +35,9 @@ void gpio_line_close(gpio_line_t *line);
 bool gpio_line_set(gpio_line_t *line, bool active); /* false: failed */
 int gpio_line_get(gpio_line_t *line);               /* 0, 1, or -1: failed */
 int gpio_line_edges(gpio_line_t *line);             /* number of edges removed from the queue; -1: failed */
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

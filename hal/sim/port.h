@@ -11,6 +11,10 @@
 #include "hal/hal.h"
 #include "sim_plant/plant.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define SIM_FRAMES  32 /* 1 Mbit/s brings at most 21 in a millisecond */
 #define SIM_CONSOLE 4096
 
@@ -54,5 +58,9 @@ void sim_hal_init(hal_t *hal, plant_t *plant);
 
 bool sim_queue_put(sim_queue_t *queue, const hal_can_frame_t *frame); /* false: full */
 bool sim_queue_take(sim_queue_t *queue, hal_can_frame_t *frame);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -5,6 +5,10 @@
 #include "firmware/app/app.h"
 #include "hal/sim/port.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     app_t app;
     hal_t hal;
@@ -19,5 +23,9 @@ drive_result_t sim_loop_init(sim_loop_t *loop, plant_t *plant, const drive_param
 void sim_loop_boot(sim_loop_t *loop);
 
 void sim_loop_step(sim_loop_t *loop);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

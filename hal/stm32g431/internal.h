@@ -5,6 +5,10 @@
 #include "hal/stm32g431/port.h"
 #include "hal/stm32g431/registers/fdcan.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define PORT_CLOCK_HZ 170000000U
 /* Of the upper four bits. Faults are at 0. */
 #define PORT_PRIO_CONTROL 0x10U
@@ -57,5 +61,9 @@ void port_reset(void) __attribute__((noreturn));
 void port_fault(const uint32_t *frame, uint32_t exception);
 void port_nmi(void);
 void port_bury(const hal_last_words_t *words); /* does not return on a processor */
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

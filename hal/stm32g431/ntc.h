@@ -9,7 +9,15 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* From a code of 12 bits to 0.1 degC. False, and the highest temperature: broken off or shorted. */
 bool ntc_temperature(uint32_t code, int32_t *temperature_dC);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -8,6 +8,10 @@
 
 #include "hal/hal.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 struct hal {
     app_t *app;   /* from hal_start(), for the interrupts */
     bool refused; /* by hal_init(): the bridge must not be armed */
@@ -17,5 +21,9 @@ struct hal {
 void port_control(void);
 void port_monitor(void);
 void port_slow(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -128,7 +128,7 @@ TEST_F(BoardLines, AnotherMayHoldNrst)
     EXPECT_TRUE(gpio_sim::pulled_level(kNrst, true));
 }
 
-TEST_F(BoardLines, ATakenLineIsRefusedAndTheOtherGivenBack)
+TEST_F(BoardLines, ALineInUseIsRefusedAndTheOtherReleased)
 {
     char error[200] = "";
     board_lines_t second;

@@ -231,7 +231,7 @@ TEST_F(CanLink, AnInterfaceThatIsDownIsSilent)
     EXPECT_EQ(frame.id, 0x201);
 }
 
-TEST_F(CanLink, AnInterfaceThatIsTakenAwayIsBusOff)
+TEST_F(CanLink, ARemovedInterfaceIsBusOff)
 {
     ip("del vcan7");
     const hal_can_frame_t put = {0x181, 0, {}};

@@ -123,7 +123,7 @@ TEST(GpioLine, AStormOfEdges)
     EXPECT_EQ(gpio_line_edges(line.get()), 1);
 }
 
-TEST(GpioLine, ATakenLineIsRefusedUntilItIsClosed)
+TEST(GpioLine, ALineInUseIsRefusedUntilItIsClosed)
 {
     char error[200] = "";
     auto line = open(name(6), GPIO_OUTPUT_OFF);

@@ -22,17 +22,12 @@
 #include "tools/pmsim/loop.h"
 #include "tools/pmsim/scenario_file.h"
 
-// C11, whose compound literals -Wpedantic refuses in C++.
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpedantic"
-#pragma GCC diagnostic ignored "-Wc++20-extensions"
-extern "C" {
 #include "firmware/drive/config.h"
 #include "firmware/math/trig.h"
 #include "firmware/params/parameters.h"
+extern "C" {
 #include "tools/pmsim/rig_drive.h"
 }
-#pragma GCC diagnostic pop
 
 namespace
 {

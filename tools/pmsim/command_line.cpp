@@ -58,7 +58,7 @@ bool Option::empty() const
     return option->empty();
 }
 
-Command::Command(std::shared_ptr<CLI::App> app) : app(std::move(app))
+Command::Command(std::shared_ptr<CLI::App> wrapped) : app(std::move(wrapped))
 {
 }
 

@@ -30,7 +30,7 @@ namespace pmsim
 class Option
 {
   public:
-    explicit Option(CLI::Option *option) : option(option)
+    explicit Option(CLI::Option *wrapped) : option(wrapped)
     {
     }
 
@@ -52,7 +52,7 @@ class Option
 class Command
 {
   public:
-    explicit Command(std::shared_ptr<CLI::App> app);
+    explicit Command(std::shared_ptr<CLI::App> wrapped);
     Command(const Command &) = delete;
     Command &operator=(const Command &) = delete;
 

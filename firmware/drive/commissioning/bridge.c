@@ -14,12 +14,12 @@ void commissioning_clear_sums(commissioning_t *self)
     for (uint32_t n = 0; n < sizeof self->sum / sizeof self->sum[0]; n++) {
         self->sum[n] = 0;
     }
-    self->taken = 0;
+    self->samples = 0;
 }
 
 pm_q_t commissioning_mean(const commissioning_t *self, uint32_t n)
 {
-    return (pm_q_t)pm_quotient(self->sum[n], self->taken);
+    return (pm_q_t)pm_quotient(self->sum[n], self->samples);
 }
 
 void commissioning_start_current(drive_t *drive)
@@ -106,7 +106,7 @@ static inline pm_abc_t turn(drive_t *drive)
     self->sum[1] += u.q;
     self->sum[2] += i.d;
     self->sum[3] += i.q;
-    self->taken++;
+    self->samples++;
     const pm_half_dir_t ahead = pm_dir_sum(dir, drive->ahead);
     const pm_ab_t v = pm_park_inverse_quarter((pm_dq_t){.d = pm_shl(u.d, 2), .q = pm_shl(u.q, 2)}, ahead);
     self->v = v;
@@ -119,7 +119,7 @@ static void hold_voltage(drive_t *drive)
     self->sum[0] += drive->i_ab.alpha;
     self->sum[1] += drive->i_ab.beta;
     self->sum[2] += drive->v_acting.alpha;
-    self->taken++;
+    self->samples++;
     drive->status.i = (pm_dq_t){.d = drive->i_ab.alpha, .q = drive->i_ab.beta};
 }
 

@@ -92,7 +92,7 @@ typedef struct {
 /* At work; shares its place with the estimators of the position. */
 typedef struct {
     int64_t sum[5];
-    int32_t taken;
+    int32_t samples; /* in the sums */
     pm_ab_t v;       /* what the bridge is to give next */
     int32_t rest[3]; /* of the timer's counts, 128ths */
     pm_pi_config_t pi;

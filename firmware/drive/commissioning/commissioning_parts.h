@@ -4,6 +4,10 @@
 
 #include "firmware/drive/drive_parts.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* What a period does with the bridge. */
 enum { KIND_VOLTAGE, KIND_CURRENT, KIND_SQUARE };
 
@@ -11,7 +15,7 @@ enum { KIND_VOLTAGE, KIND_CURRENT, KIND_SQUARE };
 void commissioning_start_current(drive_t *drive); /* current control in the frame of theta_open */
 void commissioning_set_gains(drive_t *drive);     /* by R and L_d */
 void commissioning_clear_sums(commissioning_t *self);
-pm_q_t commissioning_mean(const commissioning_t *self, uint32_t n); /* of sum n over what was taken */
+pm_q_t commissioning_mean(const commissioning_t *self, uint32_t n); /* of sum n over the samples */
 
 /* square.c: one period of the square wave. Sums, s the sign of the voltage, w = v_d - R i_d - lost:
  *   SUM_CURRENT   s i            i: mean of the currents at both ends of the period
@@ -56,5 +60,9 @@ static inline pm_q_t commissioning_approach(pm_q_t x, pm_q_t target, pm_q_t step
 {
     return x + pm_clamp(target - x, -step, step);
 }
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -80,7 +80,7 @@ void inductance_enter(drive_t *drive, bool on_q, bool rated)
 /* Products of two signals have twice their fractional bits. */
 static pm_q_t mean_product(const commissioning_t *self, uint32_t n)
 {
-    return (pm_q_t)pm_quotient(self->sum[n] / FINE, self->taken);
+    return (pm_q_t)pm_quotient(self->sum[n] / FINE, self->samples);
 }
 
 /* Flux per T_s: the voltage, whose amplitude is the same in all periods, less R i and lost voltage. */
@@ -88,7 +88,7 @@ static pm_q_t per_unit(const drive_t *drive)
 {
     const commissioning_t *self = &drive->identify.work;
     const square_t *square = &self->of.square;
-    const pm_q_t edges = (pm_q_t)pm_quotient((int64_t)square->negative * PM_ONE, self->taken);
+    const pm_q_t edges = (pm_q_t)pm_quotient((int64_t)square->negative * PM_ONE, self->samples);
     const pm_q_t lost =
         pm_mul(pm_mul(edges, self->lost), square->on_q ? PM_Q(0.577350269) : PM_Q(0.333333333));
     const pm_q_t w = square->voltage - pm_mul(self->R, commissioning_mean(self, SUM_CURRENT)) - lost;

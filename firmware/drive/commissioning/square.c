@@ -32,7 +32,7 @@ static inline void sum_axis(commissioning_t *self, pm_q_t i, pm_q_t di, int32_t 
     self->sum[SUM_CURRENT] += positive ? i : -i;
     self->sum[SUM_CHANGE] += positive ? di : -di;
     self->of.square.negative += positive ? negative : -negative;
-    self->taken++;
+    self->samples++;
 }
 
 /* The sums of full products stay below 16 i^4. */

@@ -80,7 +80,7 @@ TEST(BoardFault, BreakInputOpensAndBarsArming)
     EXPECT_EQ(board_resets(b.board), 0u);
 }
 
-TEST(BoardFault, BusOffIsAFaultAndTheBusComesBack)
+TEST(BoardFault, BusOffIsAFaultAndTheBusRecovers)
 {
     Bench b;
     b.running();

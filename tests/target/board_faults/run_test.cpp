@@ -9,7 +9,7 @@ namespace
 using bench::Bench;
 using testing::HasSubstr;
 
-TEST(BoardRun, BootsAndSaysSo)
+TEST(BoardRun, SendsBootUp)
 {
     Bench b;
     b.store(0, bench::params(), 1);
@@ -85,7 +85,7 @@ TEST(BoardRun, TemperatureDialAndButton)
     EXPECT_TRUE(b.watched()->slow.button);
 }
 
-TEST(BoardRun, TellsItsStateOnTheBus)
+TEST(BoardRun, SendsItsStateOnTheBus)
 {
     Bench b;
     b.running();

@@ -179,7 +179,7 @@ plant_break_t comparators(double level_A)
 }
 
 // Between two runs of the firmware: what it learns afterwards has happened already.
-TEST(App, OverCurrentComparatorsSwitchTheBridgeOffBeforeTheFirmwareKnows)
+TEST(App, OverCurrentComparatorsSwitchTheBridgeOffBeforeTheFirmwareReacts)
 {
     const double level_A = 3.0; // the firmware's own limit is 9 A
     Bench x;

@@ -292,7 +292,7 @@ TEST(BusStore, PowerLostAtEveryByteLeavesAWholeSet)
     EXPECT_EQ(lost, 4 * (6 + 2 * newer.size())); // header and end, and the pairs between
 }
 
-TEST(BusStore, AFlashThatFailsIsTold)
+TEST(BusStore, AFlashErrorIsReported)
 {
     Bench x;
     const drive_params_t params = defaults();
@@ -302,7 +302,7 @@ TEST(BusStore, AFlashThatFailsIsTold)
     EXPECT_EQ(x.set(0x1010, 1, save), HARDWARE);
 }
 
-TEST(BusReaction, FaultsOfTheDriveAreTold)
+TEST(BusReaction, FaultsOfTheDriveAreReported)
 {
     Running x;
     x.take(0);

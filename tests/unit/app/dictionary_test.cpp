@@ -200,7 +200,7 @@ TEST(Dictionary, NumbersAreRead)
     EXPECT_EQ(tried, count(is_number));
 }
 
-TEST(Dictionary, BothLimitsAreTaken)
+TEST(Dictionary, BothLimitsAreAccepted)
 {
     const int tried = for_rows([](const od_entry_t &entry) {
         if (!is_writable(entry) || is_routine(entry)) {

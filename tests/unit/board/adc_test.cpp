@@ -45,7 +45,7 @@ TEST_F(Adc, StartUpHasAnOrder)
     EXPECT_NE(c.take_error().find("without calibration"), std::string::npos);
 }
 
-TEST_F(Adc, CalibrationAndReadyTakeTheirTime)
+TEST_F(Adc, CalibrationAndReadyHaveTheirDelays)
 {
     c.supply_clocks();
     c.clock_170MHz();

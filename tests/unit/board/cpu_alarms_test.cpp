@@ -83,7 +83,7 @@ TEST_F(Alarms, MayBeSetFromWithin)
     EXPECT_EQ(calls, (std::vector<uint64_t>{10, 20, 30, 40}));
 }
 
-TEST_F(Alarms, SaysWhenThereAreTooMany)
+TEST_F(Alarms, ReportsTooMany)
 {
     std::vector<Owner> owners(ALARMS_MOST + 1);
     for (size_t i = 0; i < size_t(ALARMS_MOST); i++) {

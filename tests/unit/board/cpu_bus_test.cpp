@@ -71,7 +71,7 @@ TEST_F(Bus, PartsOfAWordAreWrittenWithTheirMask)
     EXPECT_EQ(first.word, 7U);
 }
 
-TEST_F(Bus, TellsAMissingDeviceFromAMissingRegister)
+TEST_F(Bus, DistinguishesAMissingDeviceFromAMissingRegister)
 {
     uint32_t value;
     EXPECT_EQ(bus_read(&bus, 0x40000800, 4, &value), BUS_NO_DEVICE);

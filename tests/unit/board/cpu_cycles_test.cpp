@@ -49,7 +49,7 @@ TEST(CpuCycles, Stores)
     expect({0x5088}, 1, 1, 2, 2); /* with an index register */
 }
 
-TEST(CpuCycles, SeveralWordsTakeOneMoreThanWords)
+TEST(CpuCycles, SeveralWordsCostOneCycleMoreThanWords)
 {
     expect({0xB5F0}, 1, 6, 6, 6);         /* push {r4-r7, lr} */
     expect({0xE9D1, 0x2300}, 1, 3, 3, 3); /* ldrd */

@@ -36,7 +36,7 @@ constexpr uint16_t cmp_r0(int value)
 
 constexpr uint16_t bne_back_2 = 0xD1FC; /* to two instructions before it */
 
-TEST_F(CpuDebug, StopsInTheMidstOfABlockAndGoesOn)
+TEST_F(CpuDebug, StopsWithinABlockAndContinues)
 {
     start({movs(0, 1), movs(1, 2), movs(2, 3), movs(3, 4), here});
     attach();
@@ -71,7 +71,7 @@ TEST_F(CpuDebug, StopsAtTheFirstInstructionOfABlockOnceARound)
     EXPECT_EQ(stops, (std::vector<uint32_t>{2, 2, 2}));
 }
 
-TEST_F(CpuDebug, ABreakThatIsTakenAwayStopsNoMore)
+TEST_F(CpuDebug, ARemovedBreakpointNoLongerStops)
 {
     start({movs(0, 0), adds(0, 1), cmp_r0(9), bne_back_2, here});
     attach();
@@ -138,7 +138,7 @@ TEST_F(CpuDebug, StepsGoIntoAnInterrupt)
     EXPECT_EQ(stops[1], flash + 0x800 + 0x20U * 19U - main_code);
 }
 
-TEST_F(CpuDebug, TimeStandsAndRegistersCanBeChanged)
+TEST_F(CpuDebug, TimeStopsAndRegistersCanBeChanged)
 {
     start({movs(0, 1), movs(1, 2), here});
     attach();

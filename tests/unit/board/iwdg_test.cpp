@@ -46,7 +46,7 @@ TEST(Iwdg, FeedingPutsItOff)
     EXPECT_FALSE(c.chip->iwdg.expired);
 }
 
-TEST(Iwdg, GoesByTheSlowClockWhateverTheProcessorDoes)
+TEST(Iwdg, RunsFromTheSlowClockIndependentOfTheProcessor)
 {
     Chip c;
     start(&c);

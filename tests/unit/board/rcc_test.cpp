@@ -20,7 +20,7 @@ TEST(Rcc, StartsOnHsi)
     EXPECT_EQ(c.read(cfgr), 0x5u);
 }
 
-TEST(Rcc, CrystalAndPllTakeTheirTime)
+TEST(Rcc, CrystalAndPllHaveTheirStartUpTimes)
 {
     Chip c;
     c.supply_clocks();
@@ -122,7 +122,7 @@ TEST(Rcc, FewerWaitStatesAtFullSpeed)
     EXPECT_EQ(c.take_error(), "FLASH_ACR: 3 wait states are too few for 170.0 MHz");
 }
 
-TEST(Rcc, ClockSecurityTakesOverAndSaysSo)
+TEST(Rcc, ClockSecuritySwitchesToTheInternalClockAndSetsItsFlag)
 {
     Chip c;
     c.all();

@@ -39,7 +39,7 @@ TEST(Tim2, ThePrescalerWaitsForTheUpdate)
     EXPECT_EQ(c.read(cnt), 10u);
 }
 
-TEST(Tim2, StopsAndGoesOn)
+TEST(Tim2, StopsAndContinues)
 {
     Chip c;
     c.supply_clocks();

@@ -81,7 +81,7 @@ TEST(Dictionary, FindsNothingElse)
     EXPECT_GT(found, 0U);
 }
 
-TEST(Dictionary, EveryEntryReadsAsItsAccessSays)
+TEST(Dictionary, EveryEntryReadsAccordingToItsAccess)
 {
     Bench x;
     for (const od_entry_t *e : numbers()) {
@@ -106,7 +106,7 @@ TEST(Dictionary, WhatIsReadOnlyRefusesWrites)
 }
 
 // Values that the application keeps: at both limits, and one beyond where the type has room for it.
-TEST(Dictionary, EveryValueIsTakenAtItsLimitsAndRefusedBeyond)
+TEST(Dictionary, EveryValueIsAcceptedAtItsLimitsAndRefusedBeyond)
 {
     uint32_t checked = 0, beyond = 0;
     for (const od_entry_t *e : numbers()) {

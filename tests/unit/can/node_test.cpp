@@ -143,7 +143,7 @@ TEST(Heartbeat, IsWatchedFromTheFirstOn)
     EXPECT_EQ(x.alarms.size(), 2U);
 }
 
-TEST(Heartbeat, LossDoesAs1029Says)
+TEST(Heartbeat, LossFollowsObject1029)
 {
     const node_nmt_t expected[] = {NODE_PRE_OPERATIONAL, NODE_OPERATIONAL, NODE_STOPPED};
     for (uint32_t behaviour = 0; behaviour < 3; ++behaviour) {
@@ -223,7 +223,7 @@ TEST(Namesake, DoesNotStopWhatRuns)
     EXPECT_EQ(node_nmt(&x.node), NODE_PRE_OPERATIONAL);
 }
 
-TEST(Namesake, IsNobodyElse)
+TEST(Namesake, IgnoresFramesOfOtherNodesAndRequests)
 {
     Bench x(9);
     x.give(0x708, {5});
@@ -235,7 +235,7 @@ TEST(Namesake, IsNobodyElse)
     EXPECT_EQ(x.value(0x1001), 0U);
 }
 
-TEST(Emcy, TellsErrorsAndTheirEnd)
+TEST(Emcy, ReportsErrorsAndTheirEnd)
 {
     Bench x;
     x.set(0x1015, 0, 0);
@@ -282,7 +282,7 @@ TEST(Emcy, TheLastWordIsTrue)
     }
 }
 
-TEST(Emcy, RegisterSaysTheClass)
+TEST(Emcy, ErrorRegisterShowsTheClass)
 {
     const std::vector<std::pair<int, uint32_t>> all = {
         {0x1000, 0x01}, {0x2320, 0x03}, {0x3210, 0x05}, {0x4310, 0x09}, {0x5210, 0x81},
@@ -351,7 +351,7 @@ TEST(Emcy, WaitsWhileStoppedAndCanBeSwitchedOff)
     EXPECT_EQ(x.set(0x1014, 0, 0x000000A1), 0x06090030U); // not while it is in use
 }
 
-TEST(Bus, OffIsAnAlarmAndIsToldAfterwards)
+TEST(Bus, BusOffIsAnAlarmAndIsReportedAfterwards)
 {
     Bench x;
     x.operational();
@@ -494,7 +494,7 @@ TEST(LssSlave, SwitchesByIdentity)
     EXPECT_EQ(x.tell({0x5E}), none);
 }
 
-TEST(LssSlave, TellsItsIdentity)
+TEST(LssSlave, AnswersWithItsIdentity)
 {
     Lss x;
     x.tell({0x04, 1});

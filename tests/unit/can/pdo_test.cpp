@@ -75,7 +75,7 @@ TEST(Rpdo, OnlyWhileOperational)
     EXPECT_EQ(x.taken.size(), 3U);
 }
 
-TEST(Rpdo, TooShortIsIgnoredAndTooLongIsTaken)
+TEST(Rpdo, TooShortIsIgnoredAndTooLongIsAccepted)
 {
     Bench x;
     x.operational();
@@ -184,7 +184,7 @@ TEST(Mapping, ChangesOnlyWhileOff)
     EXPECT_EQ(x.set(0x1600, 0, 3), LENGTH); // 4 + 1 + 4 bytes
 }
 
-TEST(Communication, RefusesIdentifiersThatAreTaken)
+TEST(Communication, RefusesIdentifiersInUse)
 {
     Bench x;
     for (const uint32_t id : {0x0U, 0x1U, 0x7FU, 0x101U, 0x180U, 0x581U, 0x5FFU, 0x601U, 0x67FU, 0x6E0U,

@@ -165,7 +165,7 @@ TEST(Sdo, StructuralWritesOnlyWhileOff)
     EXPECT_EQ(x.groups_stored, std::vector<uint32_t>{NODE_GROUP_ALL});
 }
 
-TEST(Sdo, StoreAndRestoreWantTheSignatureAndTakeTheGroup)
+TEST(Sdo, StoreAndRestoreRequireTheSignatureAndSelectTheGroup)
 {
     Bench x;
     EXPECT_EQ(x.value(0x1010, 0), 4U);

@@ -331,7 +331,7 @@ TEST(CurrentControl, CircleHoldsAtItsEdge)
     }
 }
 
-TEST(CurrentControl, FluxComesBeforeTorque)
+TEST(CurrentControl, FluxHasPriorityOverTorque)
 {
     const current_control_config_t c = config(kIpm);
     current_control_t self = {};

@@ -179,7 +179,7 @@ TEST(SpeedControl, LoadStepIsAHump)
 }
 
 // Against a current limit for long, then released: no overshoot beyond that of the model without a limit.
-TEST(SpeedControl, ComesBackFromTheLimit)
+TEST(SpeedControl, RecoversFromTheLimit)
 {
     const speed_control_config_t c = config();
     speed_control_t self = {};

@@ -8,13 +8,7 @@
 #include "tests/support/plants.h"
 #include "tests/unit/drive/direct.h"
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpedantic"
-#pragma GCC diagnostic ignored "-Wc++20-extensions"
-extern "C" {
 #include "hal/sim/sim_loop.h"
-}
-#pragma GCC diagnostic pop
 
 namespace
 {
@@ -185,7 +179,7 @@ TEST(Commissioning, FluxInertiaAndFriction)
     }
 }
 
-TEST(Commissioning, WhatIsLeftOutComesFromTheParameters)
+TEST(Commissioning, ValuesNotIdentifiedComeFromTheParameters)
 {
     drive_params_t p = direct::params(2); // the machine's own
     Bench x(plants::ipm_1000(), p);

@@ -87,7 +87,7 @@ class Closed
     std::unique_ptr<plant_t, void (*)(plant_t *)> plant_;
 };
 
-TEST(Drive, GoesThroughItsStates)
+TEST(Drive, PassesThroughItsStates)
 {
     drive_params_t p = direct::params();
     p.speed_bandwidth = 6000; // how far the stop swings over is the speed control's
@@ -130,7 +130,7 @@ TEST(Drive, WhatIsNotKnownWithTheBridgeOffIsZero)
     EXPECT_NE(drive_fault_record(&x.loop.app.drive)->omega, 0); // of the moment, as it was
 }
 
-TEST(Drive, EnableTakenBackStopsTheStart)
+TEST(Drive, WithdrawnEnableStopsTheStart)
 {
     for (const int after_ms : {50, 108, 130, 150}) { // while calibrating, in the pulses, settling
         Closed x;
@@ -143,7 +143,7 @@ TEST(Drive, EnableTakenBackStopsTheStart)
     }
 }
 
-TEST(Drive, ModeIsTakenWhenOffOnly)
+TEST(Drive, ModeIsLatchedOnlyWhenOff)
 {
     Drive x;
     x.start_current_mode();

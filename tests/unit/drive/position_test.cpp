@@ -113,7 +113,7 @@ TEST(Position, WithoutInjectionTheFluxLeadsAlways)
     }
 }
 
-TEST(Position, ResetStandsAtTheAngleGiven)
+TEST(Position, ResetStartsAtTheGivenAngle)
 {
     const position_config_t c = config();
     position_t self;
@@ -213,7 +213,7 @@ TEST(Position, QualityFallsWithoutAVoltageOrACurrentThatFits)
     EXPECT_LE(ms, 3 * kLost_ms);
 }
 
-TEST(Position, QualityFallsWhenTheCarrierIsGone)
+TEST(Position, QualityFallsWithoutTheCarrier)
 {
     const position_config_t c = config();
     position_t self = started(c);
@@ -228,7 +228,7 @@ TEST(Position, QualityFallsWhenTheCarrierIsGone)
     EXPECT_LE(ms, kLost_ms);
 }
 
-TEST(Position, AnImposedAngleIsTaken)
+TEST(Position, ImposedAngleReplacesTheEstimate)
 {
     Running r(0.6);
     const pm_pll_t imposed = {PM_TURN(0.4), fixed(0.6, 28)};

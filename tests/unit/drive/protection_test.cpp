@@ -227,7 +227,7 @@ TEST(Protection, OffsetsOutOfRangeAreFound)
     }
 }
 
-TEST(Protection, OffsetsWithinRangeAreTakenOff)
+TEST(Protection, OffsetsWithinRangeAreSubtracted)
 {
     Drive x;
     x.in.i_leg[0] = current_code(0.02);

@@ -251,7 +251,7 @@ TEST(InitialPulses, TakesTheCurrentAtTheEndOfThePulse)
     EXPECT_NEAR(self.y.alpha, kStep * (c.periods + 1), 2);
 }
 
-TEST(InitialPulses, SaysWhenThereIsNoSaliency)
+TEST(InitialPulses, FailsWithoutSaliency)
 {
     Rig r = ipm();
     r.plant.machine.L_q0_H = r.plant.machine.L_d0_H = 50e-3;
@@ -261,7 +261,7 @@ TEST(InitialPulses, SaysWhenThereIsNoSaliency)
     }
 }
 
-TEST(InitialPulses, SaysWhenThereIsNoPolarity)
+TEST(InitialPulses, FailsWithoutPolarity)
 {
     Rig r = ipm();
     r.plant.machine = {6.0, 43e-3, 75e-3, 0.0, 0.236, 3}; // salient, not saturating
@@ -271,7 +271,7 @@ TEST(InitialPulses, SaysWhenThereIsNoPolarity)
 }
 
 // A current that does not end: a stuck sensor, a short circuit.
-TEST(InitialPulses, SaysWhenTheCurrentDoesNotFall)
+TEST(InitialPulses, FailsWhenTheCurrentDoesNotFall)
 {
     const initial_pulses_config_t c = config(ipm());
     initial_pulses_t self;
@@ -303,7 +303,7 @@ TEST(InitialPulses, FindsNothingWithoutCurrent)
 }
 
 // initial_pulses.h: "fails with a reason when the current does not rise or fall in time". It says SALIENCY.
-TEST(InitialPulses, SaysWhenTheCurrentDoesNotRise)
+TEST(InitialPulses, FailsWhenTheCurrentDoesNotRise)
 {
     Rig r = ipm();
     r.plant.machine.L_d0_H *= 1e4;

@@ -207,7 +207,7 @@ TEST(MathBiquad, NotchStopsItsFrequency)
     }
 }
 
-TEST(MathBiquad, SaturatesAndComesBack)
+TEST(MathBiquad, SaturatesAndRecovers)
 {
     const pm_biquad_config_t config = fixed({0.5, 0, 0, -0.6, 0.1}); // dc gain 1
     pm_biquad_t state = {};

@@ -470,7 +470,7 @@ TEST(ActiveFlux, TiedFluxKeepsToThePosition)
 }
 
 // A position 0.1 rad behind: tied, the flux is drawn to it within 1/300 s; leading, it stays with the rotor.
-TEST(ActiveFlux, OnlyTheTiedFluxBelievesThePosition)
+TEST(ActiveFlux, OnlyTheTiedFluxFollowsThePosition)
 {
     const Fixture f = ipm_linear();
     for (const pm_q_t weight : {0, PM_ONE / 2, PM_ONE}) {

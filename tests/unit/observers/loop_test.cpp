@@ -7,12 +7,7 @@
 #include "tests/contract/bench.h"
 #include "tests/unit/math/samples.h"
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpedantic"
-extern "C" {
 #include "observers/loop.h"
-}
-#pragma GCC diagnostic pop
 
 namespace
 {

@@ -7,12 +7,7 @@
 
 #include "tests/contract/bench.h"
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpedantic"
-extern "C" {
 #include "observers/mismatch.h"
-}
-#pragma GCC diagnostic pop
 
 namespace
 {

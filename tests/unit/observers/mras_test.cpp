@@ -519,7 +519,7 @@ TYPED_TEST(MrasWithModel, TheLagOfTheSpeedKeepsItStable)
 }
 
 // A carrier at half the sampling rate, of which the current says nothing here, is gone after two periods.
-TEST(MrasSimple, ASquareWaveCarrierIsGone)
+TEST(MrasSimple, ASquareWaveCarrierCancels)
 {
     const Fixture f = ipm();
     Rotation rotation(f.machine, f.base, 0.3, {-1, 3});

@@ -7,12 +7,7 @@
 
 #include "tests/contract/bench.h"
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpedantic"
-extern "C" {
 #include "observers/second_harmonic.h"
-}
-#pragma GCC diagnostic pop
 
 namespace
 {
@@ -105,7 +100,7 @@ class Closed
     int periods_ = 0;
 };
 
-TEST(SecondHarmonic, IsGoneWithinHalfASecond)
+TEST(SecondHarmonic, HarmonicIsSuppressedWithinHalfASecond)
 {
     for (const second_harmonic_id_t id : {SECOND_HARMONIC_NOTCH, SECOND_HARMONIC_RESONATOR}) {
         // 2 omega at 0.74, 1.4, 2.8 and 7 times w_n
@@ -156,7 +151,7 @@ TEST(SecondHarmonic, SettlesAtTheRateGiven) // 2 T / (mu |S|)
     }
 }
 
-TEST(SecondHarmonic, TheNotchKeepsWhatItKnowsThroughAChangeOfSpeed)
+TEST(SecondHarmonic, NotchKeepsItsEstimateThroughAChangeOfSpeed)
 {
     Closed closed(SECOND_HARMONIC_NOTCH, 0.5);
     closed.run(1.0);

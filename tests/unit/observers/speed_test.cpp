@@ -6,12 +6,7 @@
 #include "tests/contract/bench.h"
 #include "tests/unit/math/samples.h"
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpedantic"
-extern "C" {
 #include "observers/speed.h"
-}
-#pragma GCC diagnostic pop
 
 namespace
 {

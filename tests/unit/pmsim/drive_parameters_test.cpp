@@ -37,7 +37,7 @@ TEST(DriveParameters, SiBecomesTheStoredInteger)
 }
 
 // What pmsim params prints can be put back.
-TEST(DriveParameters, EveryLimitAndDefaultGoesThereAndBack)
+TEST(DriveParameters, EveryLimitAndDefaultSurvivesARoundTrip)
 {
     for (int i = 0; i < DRIVE_PARAM_COUNT; ++i) {
         const auto id = static_cast<drive_param_id_t>(i);

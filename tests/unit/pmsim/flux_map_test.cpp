@@ -233,7 +233,7 @@ TEST_F(FluxMapTable, RefusalsNameFileAndLine)
     EXPECT_THAT(error_of([&] { read("table: none.csv"); }), StartsWith("none.csv: cannot be read"));
 }
 
-TEST_F(FluxMapTable, SaysOrRefusesWhatIsNotReciprocal)
+TEST_F(FluxMapTable, ReportsOrRefusesDataThatAreNotReciprocal)
 {
     const auto turning = [](double a) {
         return Flux([a](double i_d, double i_q, double) {

@@ -150,7 +150,7 @@ TEST_P(DriveFiles, RatedPointLiesWithinTheVoltage)
     EXPECT_LT(v_V, 0.95 * setup.rated.v_dc_V / std::sqrt(3.0));
 }
 
-TEST_P(DriveFiles, DriveKnowsTheMachine)
+TEST_P(DriveFiles, DriveParametersDescribeTheMachine)
 {
     const pmsim::Setup setup = load_machine_file(GetParam());
     const plant_machine_t &m = setup.plant.machine;

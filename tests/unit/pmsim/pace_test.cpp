@@ -26,7 +26,7 @@ TEST(Pace, CatchesUpAfterADelay)
     EXPECT_EQ(pace.lost_s(), 0.0);
 }
 
-TEST(Pace, GivesUpALongDelayAndSaysHowLong)
+TEST(Pace, SkipsALongDelayAndReportsIt)
 {
     Pace pace;
     EXPECT_NEAR(pace.at(1.0, 1.5).lost_s, 0.5, 1e-12);

@@ -160,7 +160,7 @@ TEST(Record, ReplayGivesTheSameBits)
     EXPECT_EQ(different, 0U);
 }
 
-TEST(Record, FileHasTheSizeAndHeaderThatTheFormatSays)
+TEST(Record, FileHasTheSizeAndHeaderOfTheFormat)
 {
     const tests::TemporaryFile file("recording");
     write_recording(record_scenario(load(small_scenario()), 100), file.path());

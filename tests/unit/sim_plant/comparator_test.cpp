@@ -143,7 +143,7 @@ TEST(PlantWithin, TripActsAtItsInstant)
     EXPECT_EQ(plant.truth().i_A[0], 0.0);
 }
 
-TEST(PlantWithin, LegsChangeWhereTheyAreToldTo)
+TEST(PlantWithin, LegsChangeAtTheGivenInstant)
 {
     plant_pwm_t later = rig::pwm(1, 0, 0);
     later.driven_after_s = 25e-6;

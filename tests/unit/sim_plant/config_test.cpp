@@ -180,7 +180,7 @@ const Garbage garbage[] = {
 INSTANTIATE_TEST_SUITE_P(Config, Refused, testing::ValuesIn(garbage));
 
 // The same value makes sense beside others.
-TEST(Config, WhatBelongsTogetherIsTaken)
+TEST(Config, RelatedValuesAreAcceptedTogether)
 {
     plant_config_t config = rig::ipm_1000_real();
     config.machine.pole_pairs = 4;
@@ -200,7 +200,7 @@ TEST(Config, WhatBelongsTogetherIsTaken)
     plant_destroy(plant);
 }
 
-TEST(Config, SoundValuesAreTakenAndTheAngleMustBeFinite)
+TEST(Config, ValidValuesAreAcceptedAndTheAngleMustBeFinite)
 {
     plant_config_t config = rig::ipm_1000_real();
     const char *error = "?";

@@ -309,7 +309,7 @@ class FailedSwitch : public Gates, public testing::WithParamInterface<Fault>
 {
 };
 
-TEST_P(FailedSwitch, ConductsOrNotWhateverItsGateSays)
+TEST_P(FailedSwitch, FaultySwitchIgnoresItsGate)
 {
     const Fault &f = GetParam();
     gates.leg[1].fault = f.fault;

@@ -278,7 +278,7 @@ TEST(MapTable, CrossFluxesStayMonotoneAlongGridLines)
     }
 }
 
-TEST(MapTable, MakesDataReciprocalAndSaysByHowMuch)
+TEST(MapTable, MakesDataReciprocalAndReportsTheDeviation)
 {
     // A turning part of known size: psi = grad W' + (-a i_q, a i_d), with dpsi_d/di_q - dpsi_q/di_d = -2a
     const double a = 1e-3, L_d = 40e-3, L_q = 60e-3, i_max = 5.0;
@@ -362,7 +362,7 @@ TEST(MapTable, ReportsHarmonicsThatItLeavesOut)
     EXPECT_NEAR(report.neglected_Wb, amplitude, 1e-9);
 }
 
-TEST(MapTable, GoesOnSmoothlyBeyondTheGrid)
+TEST(MapTable, ContinuesSmoothlyBeyondTheGrid)
 {
     const Map mean = create(ipm_table(17)),
               ripple = create(sample(grid(-8, 8, 17), grid(-8, 8, 17), rippling(1e-3, 5e-3), 8, 6));

@@ -328,7 +328,7 @@ TEST(Plant, GeneralWayAgreesForSixLegs)
 }
 
 // A short that comes and goes leaves nothing behind in what the symmetrical way reads.
-TEST(Plant, ShortThatIsGoneLeavesTheSymmetricalWay)
+TEST(Plant, RemovedShortCircuitReturnsToTheSymmetricalSolver)
 {
     plant_config_t config = six_legs(), general = config;
     config.winding.connection = general.winding.connection = PLANT_OPEN;

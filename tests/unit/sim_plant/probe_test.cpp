@@ -481,7 +481,7 @@ TEST_F(Probe, OverflowKeepsTheEarliestAndCountsTheRest)
 }
 
 // One place left and three edges: leg 0 after 0.8 of the step, leg 1 after 0.2, leg 2 after 0.5.
-TEST_F(Probe, OverflowWithinAStepGoesByTime)
+TEST_F(Probe, OverflowWithinAStepIsPlacedByItsTime)
 {
     sensor.capture_s = 1e-7;
     init();

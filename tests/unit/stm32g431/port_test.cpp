@@ -7,10 +7,6 @@
 
 #include <gtest/gtest.h>
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpedantic"
-#pragma GCC diagnostic ignored "-Wc++20-extensions"
-extern "C" {
 #include "hal/stm32g431/internal.h"
 #include "hal/stm32g431/ntc.h"
 #include "hal/stm32g431/registers/analog.h"
@@ -18,8 +14,6 @@ extern "C" {
 #include "hal/stm32g431/registers/gpio.h"
 #include "hal/stm32g431/registers/tim.h"
 #include "hal/stm32g431/registers/usart.h"
-}
-#pragma GCC diagnostic pop
 
 namespace
 {
@@ -181,7 +175,7 @@ TEST_F(Port, BreakIsReportedAndThenCleared)
     EXPECT_EQ(TIM1.SR, ~(TIM_SR_BIF | TIM_SR_SBIF));
 }
 
-TEST_F(Port, SlowInputsTakeTurns)
+TEST_F(Port, SlowInputsAlternate)
 {
     hal_slow_t slow = {};
     ADC1.ISR = ADC_ISR_EOC;
