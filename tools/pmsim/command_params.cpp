@@ -46,7 +46,7 @@ void write_page(const PageOptions &options)
     uint32_t words[STORE_WORDS];
     const char *refused = nullptr;
     const char *reason = nullptr;
-    const uint32_t used = parameter_page(&setup.params, words, &refused, &reason);
+    const uint32_t used = parameter_page(setup.params.get(), words, &refused, &reason);
     if (used == 0) {
         throw InputError(options.machine + ": drive refuses parameter " + refused + ": " + reason);
     }
