@@ -50,12 +50,12 @@ inline ObserverCase observer_case(observer_id_t id, const char *name, const Mach
     drive_params_t p = parameters(m, b);
     p.observer = static_cast<int32_t>(id);
     drive_config_t config = {};
-    if (!drive_configure(&config, &p).ok) {
+    if (!drive_configure(&config, &p, PM_CHANNELS).ok) {
         p.L_d = p.L_q;
         p.L_dh_rated = p.L_qh_rated;
         p.start_method = 2;
     }
-    const drive_result_t result = drive_configure(&config, &p);
+    const drive_result_t result = drive_configure(&config, &p, PM_CHANNELS);
     return {result.ok ? name : name + (": " + std::string(drive_param_table[result.param].name)),
             result.ok ? config.position.observer : observer_config_t{OBSERVER_COUNT, {}}};
 }
