@@ -69,7 +69,7 @@ def main():
     parser.add_argument("--times", action="store_true", help="print how long each file took")
     parser.add_argument("--all", action="store_true", help="also the files that were clean and have not changed")
     parser.add_argument("--tests", action="store_true",
-                        help="also tests/, which take most of the time and are read by two compilers with sanitizers")
+                        help="also tests/, which take most of the time and are read by two compilers")
     parser.add_argument("files", nargs="*", type=Path, help="only these (default: all but tests)")
     options = parser.parse_args()
 

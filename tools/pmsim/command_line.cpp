@@ -58,7 +58,7 @@ bool Option::empty() const
     return option->empty();
 }
 
-Command::Command(std::shared_ptr<CLI::App> wrapped) : app(std::move(wrapped))
+Command::Command(std::shared_ptr<CLI::App> cli_app) : app(std::move(cli_app))
 {
 }
 
@@ -69,9 +69,9 @@ Command *Command::add_subcommand(const std::string &name, const std::string &des
     return commands.back().get();
 }
 
-Option *Command::own(CLI::Option *option)
+Option *Command::own(CLI::Option *cli_option)
 {
-    options.push_back(std::make_unique<Option>(option));
+    options.push_back(std::make_unique<Option>(cli_option));
     return options.back().get();
 }
 

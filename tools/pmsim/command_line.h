@@ -30,7 +30,7 @@ namespace pmsim
 class Option
 {
   public:
-    explicit Option(CLI::Option *wrapped) : option(wrapped)
+    explicit Option(CLI::Option *cli_option) : option(cli_option)
     {
     }
 
@@ -52,7 +52,7 @@ class Option
 class Command
 {
   public:
-    explicit Command(std::shared_ptr<CLI::App> wrapped);
+    explicit Command(std::shared_ptr<CLI::App> cli_app);
     Command(const Command &) = delete;
     Command &operator=(const Command &) = delete;
 
@@ -76,7 +76,7 @@ class Command
     std::shared_ptr<CLI::App> app;
 
   private:
-    Option *own(CLI::Option *option);
+    Option *own(CLI::Option *cli_option);
 
     std::vector<std::unique_ptr<Option>> options;
     std::vector<std::unique_ptr<Command>> commands;
