@@ -59,6 +59,7 @@ void bridge_init(bridge_t *bridge, const plant_config_t *config, int legs)
         .r_on_ohm = config->inverter.r_on_ohm,
         .c_leg_F = config->inverter.c_leg_F,
         .inv_c_leg_1_F = config->inverter.c_leg_F > 0.0 ? 1.0 / config->inverter.c_leg_F : 0.0,
+        .g_winding_S = config->winding.r_winding_ohm > 0.0 ? 1.0 / config->winding.r_winding_ohm : 0.0,
         .zone_A = ZONE * config->sensor.i_full_scale_A,
         .no_current_A = NO_CURRENT * config->sensor.i_full_scale_A,
         .switched_1_A = 1.0 / (ZONE * config->sensor.i_full_scale_A),

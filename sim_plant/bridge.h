@@ -32,6 +32,7 @@ typedef struct {
     double v_diode_V;
     double r_on_ohm;
     double c_leg_F, inv_c_leg_1_F;
+    double g_winding_S; /* of the resistors across the windings */
     double zone_A;
     double switched_1_A; /* 1 / zone_A */
     double no_current_A; /* what counts as none */

@@ -54,7 +54,9 @@ static void find_calm(circuit_t *c)
                          c->machine.pole_pairs * fabs(c->now.x[OMEGA_MECH]) + oscillation_1_s(c, inv_J) +
                          CALM / DAMPED * damping_1_s(c, inv_J);
     c->calm_s = c->calm / fastest_1_s;
-    c->calm_swing_s = c->calm / (fastest_1_s + SWING_SHARE * sqrt(gamma_1_H * c->bridge.inv_c_leg_1_F));
+    double swing_1_s = sqrt(gamma_1_H * c->bridge.inv_c_leg_1_F);
+    double damping = c->bridge.g_winding_S * c->bridge.inv_c_leg_1_F;
+    c->calm_swing_s = c->calm / (fastest_1_s + SWING_SHARE * (swing_1_s + damping));
 }
 
 void circuit_align(circuit_t *c)

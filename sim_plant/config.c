@@ -78,6 +78,7 @@ static const char *winding_fault(const plant_winding_t *w, double R_s_ohm)
     REQUIRE(not_negative(w->L_eddy_d_H) && not_negative(w->L_eddy_q_H),
             "winding.L_eddy_d_H and L_eddy_q_H must be finite and not negative")
     REQUIRE(not_negative(w->R_eddy_ohm), "winding.R_eddy_ohm must be finite and not negative")
+    REQUIRE(not_negative(w->r_winding_ohm), "winding.r_winding_ohm must be finite and not negative")
     REQUIRE(isfinite(w->alpha_R_1_K) && isfinite(w->alpha_psi_1_K), "winding.alpha must be finite")
     return phases_fault(w, R_s_ohm);
 }
@@ -183,6 +184,9 @@ const char *config_fault(const plant_config_t *config)
     fault = fault ? fault : inverter_fault(&config->inverter);
     fault = fault ? fault : dclink_fault(&config->dclink);
     fault = fault ? fault : config_sensor_fault(&config->sensor, 1.0 / config->inverter.f_pwm_Hz);
+    if (!fault && config->winding.r_winding_ohm > 0.0 && config->inverter.c_leg_F == 0.0) {
+        fault = "winding.r_winding_ohm needs inverter.c_leg_F: without it nothing rings";
+    }
     double tolerance = config->tolerance;
     if (!fault && tolerance != 0.0 && !(tolerance >= 1e-12 && tolerance <= 1e-2)) {
         fault = "tolerance must be 0 (default) or between 1e-12 and 0.01";

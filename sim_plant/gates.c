@@ -7,6 +7,7 @@ void gates_init(gates_t *gates, const plant_inverter_t *inverter, int legs)
     *gates = (gates_t){
         .period_s = 1.0 / inverter->f_pwm_Hz,
         .closing_s = inverter->dead_time_s + inverter->turn_on_s,
+        .turn_on_s = inverter->turn_on_s,
         .turn_off_s = inverter->turn_off_s,
         .coincident_s = 1e-9 / inverter->f_pwm_Hz,
         .timer_counts = inverter->timer_counts,
@@ -28,16 +29,18 @@ void gates_load(gates_t *gates, const plant_pwm_t *pwm)
         gates->leg[k].fall_s = (1.0 + duty(gates, pwm->compare[k][1])) * half_s;
         gates->leg[k].on_s -= gates->period_s;
         gates->leg[k].off_s -= gates->period_s;
+        gates->leg[k].clear_s -= gates->period_s;
     }
-    gates_drive(gates, pwm->driven, pwm->driven_after_s);
+    gates_drive(gates, pwm->driven, pwm->state, pwm->driven_after_s);
 }
 
-void gates_drive(gates_t *gates, const bool driven[], double t_s)
+void gates_drive(gates_t *gates, const bool driven[], const plant_leg_state_t state[], double t_s)
 {
     gates->drive_s = t_s;
     gates->next_s = -1.0;
     for (int k = 0; k < gates->legs; k++) {
         gates->leg[k].to_drive = driven[k];
+        gates->leg[k].to_state = state ? state[k] : gates->leg[k].to_state;
         gates->leg[k].next_s = -1.0;
     }
 }
@@ -60,7 +63,38 @@ static gate_t command_at(const gates_t *gates, int k, double late_s)
     if (!gates->leg[k].driven) {
         return GATE_OFF;
     }
-    return late_s >= gates->leg[k].rise_s && late_s < gates->leg[k].fall_s ? GATE_HIGH : GATE_LOW;
+    bool high = late_s >= gates->leg[k].rise_s && late_s < gates->leg[k].fall_s;
+    switch (gates->leg[k].state) {
+    case PLANT_LEG_HIGH:
+        return GATE_HIGH;
+    case PLANT_LEG_LOW:
+        return GATE_LOW;
+    case PLANT_LEG_UPPER:
+        return high ? GATE_HIGH : GATE_OFF;
+    case PLANT_LEG_LOWER:
+        return high ? GATE_OFF : GATE_LOW;
+    default:
+        return high ? GATE_HIGH : GATE_LOW;
+    }
+}
+
+/* When a switch that is commanded at time t closes. */
+static double closing_at_s(gates_t *gates, int k, gate_t command, double t_s)
+{
+    plant_leg_state_t state = gates->leg[k].state;
+    bool alone = state == PLANT_LEG_UPPER || state == PLANT_LEG_LOWER;
+    if (command == GATE_OFF) {
+        return t_s + gates->closing_s;
+    }
+    if (!alone || command != gates->leg[k].last) {
+        gates->leg[k].last = command;
+        gates->leg[k].clear_s = t_s + gates->closing_s;
+    }
+    if (!alone) {
+        return gates->leg[k].clear_s;
+    }
+    double on_s = fmax(t_s + gates->turn_on_s, gates->leg[k].clear_s);
+    return gates->leg[k].opening ? fmax(on_s, gates->leg[k].off_s) : on_s;
 }
 
 /* The next instant after that one at which something happens to a leg. */
@@ -75,7 +109,9 @@ static double leg_next_s(const gates_t *gates, int k, double after_s)
     if (gates->leg[k].driven && fall_s > after_s && fall_s < next_s) {
         next_s = fall_s;
     }
-    if (gates->leg[k].driven != gates->leg[k].to_drive && gates->drive_s < next_s) {
+    bool changes =
+        gates->leg[k].driven != gates->leg[k].to_drive || gates->leg[k].state != gates->leg[k].to_state;
+    if (changes && gates->drive_s < next_s) {
         next_s = gates->drive_s;
     }
     if (gates->leg[k].opening && gates->leg[k].off_s < next_s) {
@@ -93,11 +129,12 @@ static bool update_leg(gates_t *gates, int k, double t_s)
     gate_t before = gates->leg[k].gate;
     if (late_s >= gates->drive_s) {
         gates->leg[k].driven = gates->leg[k].to_drive;
+        gates->leg[k].state = gates->leg[k].to_state;
     }
     gate_t command = command_at(gates, k, late_s);
     if (command != gates->leg[k].command) {
         gates->leg[k].command = command;
-        gates->leg[k].on_s = t_s + gates->closing_s;
+        gates->leg[k].on_s = closing_at_s(gates, k, command, t_s);
         if (before != GATE_OFF && !gates->leg[k].opening) {
             gates->leg[k].opening = true;
             gates->leg[k].off_s = t_s + gates->turn_off_s;

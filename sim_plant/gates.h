@@ -9,6 +9,10 @@
  * its switch, as in a timer with a dead-time generator. A leg that becomes driven also waits. Which legs are
  * driven changes once in a period, by default at its start.
  *
+ * A leg of which one switch is chopped alone (plant_leg_state_t) opens both for the rest. That switch closes
+ * turn_on_s after its edge, as the other one is off; where the leg's other switch was the last one on, its
+ * first closing waits for the dead time too.
+ *
  * A faulty switch keeps its state whatever its gate. Edges closer than 1e-9 T are one event. Times are
  * relative to the start of the period. Tests: gates_test.cpp. */
 #ifndef PLANT_GATES_H
@@ -22,17 +26,21 @@ typedef enum { GATE_OFF, GATE_LOW, GATE_HIGH, GATE_BOTH } gate_t;
 typedef struct {
     double period_s;
     double closing_s; /* dead time and turn-on delay */
+    double turn_on_s;
     double turn_off_s;
     double coincident_s;
     uint32_t timer_counts;
     int legs;
     double edge_s;  /* the last change of any gate */
-    double drive_s; /* when `driven` becomes `to_drive` */
+    double drive_s; /* when `driven` becomes `to_drive`, `state` `to_state` */
     double next_s;  /* nothing happens to any leg between the last update and this */
     struct {
         bool driven, to_drive;
+        plant_leg_state_t state, to_state;
         double rise_s, fall_s; /* command edges of this period */
         gate_t command;        /* before dead time */
+        gate_t last;           /* the last command that was not off, */
+        double clear_s;        /* and when the other switch was off for the dead time */
         gate_t gate;           /* of healthy switches */
         bool opening;          /* the conducting switch opens at off_s */
         double off_s;
@@ -50,8 +58,8 @@ void gates_load(gates_t *gates, const plant_pwm_t *pwm);
 /* All switches open, now. */
 void gates_off(gates_t *gates);
 
-/* From time t on these legs are driven. */
-void gates_drive(gates_t *gates, const bool driven[], double t_s);
+/* From time t on these legs are driven, in these states; NULL: as they are. */
+void gates_drive(gates_t *gates, const bool driven[], const plant_leg_state_t state[], double t_s);
 
 /* Brings the gates to time t; the legs of which one has changed, bit k for leg k. */
 unsigned gates_update(gates_t *gates, double t_s);

@@ -46,6 +46,34 @@ INLINE void add_leg(const circuit_t *c, const point_t *p, int k, shape_t shape, 
     }
 }
 
+/* The resistors across the windings, which every leg feeds but those that float. */
+INLINE void add_resistors(const circuit_t *c, double v_dc_V, shape_t shape, circuit_legs_t *legs)
+{
+    const bridge_t *b = &c->bridge;
+    for (int k = 0; k < shape.legs; k++) {
+        double i_A = 0.0;
+        for (int a = first_of_leg(shape, k); a < end_of_leg(shape, k); a++) {
+            i_A += c->machine.winding.axis[k][a] * b->g_winding_S * legs->v_V[a];
+        }
+        if (b->leg[k] == LEG_SOURCE) {
+            legs->in_W += legs->v_leg_V[k] * i_A;
+        } else if (b->leg[k] != LEG_FLOATING && b->leg[k] != LEG_SWINGING) {
+            legs->i_dc_A += b->upper[k] * i_A;
+            legs->device_W += (b->upper[k] * v_dc_V - legs->v_leg_V[k]) * i_A;
+        }
+        legs->i_leg_A[k] += i_A;
+    }
+}
+
+INLINE double resistors_W(const circuit_t *c, const circuit_legs_t *legs, int n)
+{
+    double loss_W = 0.0;
+    for (int a = 0; a < n; a++) {
+        loss_W += c->machine.winding.weight[a] * c->bridge.g_winding_S * legs->v_V[a] * legs->v_V[a];
+    }
+    return loss_W;
+}
+
 INLINE void legs_n(const circuit_t *c, const point_t *p, shape_t shape, circuit_legs_t *legs)
 {
     double v_dc_V = p->x[V_DC];
@@ -53,6 +81,9 @@ INLINE void legs_n(const circuit_t *c, const point_t *p, shape_t shape, circuit_
                              .device_W = c->bridge.g_through_S * v_dc_V * v_dc_V};
     for (int k = 0; k < shape.legs; k++) {
         add_leg(c, p, k, shape, legs);
+    }
+    if (c->bridge.g_winding_S > 0.0) {
+        add_resistors(c, v_dc_V, shape, legs);
     }
     legs->in_W += v_dc_V * legs->i_dc_A;
 }
@@ -137,6 +168,9 @@ INLINE void general_n(const circuit_t *c, double t_s, point_t *p, shape_t shape,
     rate[INT_V_BETA] = legs.v_V[1];
     rate[INT_IN] = legs.in_W;
     rate[INT_COPPER] = copper_W(m, &state, point.i_A, shape.active);
+    if (c->bridge.g_winding_S > 0.0) {
+        rate[INT_COPPER] += resistors_W(c, &legs, shape.active);
+    }
     rate[INT_DEVICE] = legs.device_W;
     rate[INT_MECH] = p->torque_Nm * p->x[OMEGA_MECH];
 }

@@ -24,12 +24,24 @@
 extern "C" {
 #endif
 
-/* What the timer is told for one period. Compare values are counts of the half carrier: the high side
+/* How the timer drives a leg. The share of the period at the upper rail is compare/timer_counts, as long as
+ * the current keeps the diode of the switch that is off conducting. */
+typedef enum {
+    PLANT_LEG_PWM,   /* both switches, one the complement of the other, with dead time */
+    PLANT_LEG_UPPER, /* the upper switch is on for that share, the lower one off: freewheeling through its
+                        diode */
+    PLANT_LEG_LOWER, /* the lower switch is on for the rest, the upper one off */
+    PLANT_LEG_HIGH,  /* held at the upper rail whatever compare says, */
+    PLANT_LEG_LOW    /* at the lower rail */
+} plant_leg_state_t;
+
+/* The timer's settings for one period. Compare values are counts of the half carrier: the high side
  * is on while the carrier is below compare, so compare/timer_counts is the duty of that half. */
 typedef struct {
-    uint32_t compare[PLANT_LEGS][2]; /* rising-edge half, falling-edge half */
-    bool driven[PLANT_LEGS];         /* false: both switches of the leg off */
-    double driven_after_s;           /* they take effect so long after the period's start */
+    uint32_t compare[PLANT_LEGS][2];     /* rising-edge half, falling-edge half */
+    bool driven[PLANT_LEGS];             /* false: both switches of the leg off, whatever its state */
+    double driven_after_s;               /* driven and state take effect so long after the period's start */
+    plant_leg_state_t state[PLANT_LEGS]; /* of driven legs */
 } plant_pwm_t;
 
 /* Converter codes, left-aligned to 16 bits as the MCU delivers them; mid-scale is zero current. */
@@ -123,7 +135,9 @@ void plant_run_period(plant_t *plant);
 void plant_move(plant_t *plant, double after_s);
 void plant_sample_at(plant_t *plant, double after_s, plant_adc_t *adc);
 void plant_drive(plant_t *plant,
-                 const bool driven[]); /* the legs change now, until the next PWM takes effect */
+                 const bool driven[]); /* the legs change now, until the next PWM takes effect; */
+void plant_drive_legs(plant_t *plant, const bool driven[],
+                      const plant_leg_state_t state[]); /* and their state */
 
 /* Comparators that trip like plant_trip() at their instant, found to 0.05 us; NULL: none. A period
  * costs a quarter more. */

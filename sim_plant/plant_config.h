@@ -50,7 +50,11 @@ typedef struct {
     double emf_shift_rad[PLANT_LEGS]; /* and its electrical angle */
     double L_eddy_d_H, L_eddy_q_H; /* E19: shorted circuit on each axis that takes the inductance from L at */
     double R_eddy_ohm;             /* low frequency to L || L_eddy at high, with loss between; 0: none */
-    double alpha_R_1_K;            /* E14: R = R_s (1 + alpha_R (T - 25 degC)), psi_m alike */
+    /* Resistor across each phase winding, for what damps its ringing with c_leg_F: with the other legs tied a
+     * floating one has Q = 1.5 r_winding / sqrt(1.5 L / c_leg). Its current is in link and losses, not in the
+     * currents that shunts and diodes see. 0: none */
+    double r_winding_ohm;
+    double alpha_R_1_K; /* E14: R = R_s (1 + alpha_R (T - 25 degC)), psi_m alike */
     double alpha_psi_1_K;
 } plant_winding_t;
 

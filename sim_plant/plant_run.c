@@ -141,7 +141,12 @@ void plant_trip(plant_t *plant)
 
 void plant_drive(plant_t *plant, const bool driven[])
 {
-    gates_drive(&plant->gates, driven, plant->t_s);
+    gates_drive(&plant->gates, driven, NULL, plant->t_s);
+}
+
+void plant_drive_legs(plant_t *plant, const bool driven[], const plant_leg_state_t state[])
+{
+    gates_drive(&plant->gates, driven, state, plant->t_s);
 }
 
 void plant_move(plant_t *plant, double after_s)

@@ -189,14 +189,17 @@ INLINE double arrival_s(const circuit_t *c, const start_t *s, int k, double h)
 /* What swinging terminals allow. */
 INLINE double swing_s(const circuit_t *c, const start_t *s, double h)
 {
-    double bend = 0.0;
+    double bend = 0.0, jerk = 0.0;
     for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
         int k = bridge_first(legs);
         h = arrival_s(c, s, k, h);
         bend = larger(bend, fabs(s->bend.leg_V_s[k]));
+        jerk = larger(jerk, fabs(s->leg_V_s3[k]));
     }
+    double damping = c->bridge.g_winding_S * c->bridge.inv_c_leg_1_F;
     double square = c->machine.gamma_leg_1_H * c->bridge.inv_c_leg_1_F; /* of the angular frequency */
-    double error = bend * square * h * h * h * h * (c->inv_v_scale_1_V * c->inv_tolerance / 24.0);
+    double fourth_V = damping > 0.0 ? bend * square + jerk * damping : bend * square;
+    double error = fourth_V * h * h * h * h * (c->inv_v_scale_1_V * c->inv_tolerance / 24.0);
     return error > 0.5 ? h * sqrt(sqrt(0.5 / error)) : h;
 }
 

@@ -101,6 +101,12 @@ INLINE void find_drops(const circuit_t *c, const field_t *f, shape_t shape, tied
     }
 }
 
+/* Current of leg k into the resistors across the windings, under these voltages; or how it moves. */
+INLINE double resistor_A(const bridge_t *b, const winding_t *w, shape_t shape, int k, const pair_t v_V[])
+{
+    return b->g_winding_S * along(w, shape, k, v_V);
+}
+
 /* steady: drops of closed switches are known already. */
 INLINE void tied_at(const circuit_t *c, const field_t *f, const double x[], shape_t shape, bool swings,
                     bool steady, tied_t *t)
@@ -136,7 +142,8 @@ INLINE void rates_at(const circuit_t *c, rotor_t rotor, const field_t *f, const 
     const bridge_t *b = &c->bridge;
     double omega = x[OMEGA_MECH], v_dc = x[V_DC];
     double omega_e = m->pole_pairs * omega;
-    pair_t in_W = {0.0}, copper = {0.0}, device_W = {0.0};
+    const winding_t *w = &m->winding;
+    pair_t in_W = {0.0}, copper = {0.0}, device_W = {0.0}, resistor_W = {0.0};
     tied_at(c, f, x, shape, swings, steady, t);
     for (int p = 0; p < pairs(shape); p++) {
         pair_t power = weights(shape, p) * f->i_A[p];
@@ -151,15 +158,28 @@ INLINE void rates_at(const circuit_t *c, rotor_t rotor, const field_t *f, const 
         rate->flux_V[0] += open_V;
         t->v_V[0] += open_V;
     }
+    for (int p = 0; p < pairs(shape) && b->g_winding_S > 0.0; p++) {
+        pair_t power = weights(shape, p) * both(b->g_winding_S) * t->v_V[p];
+        in_W = b->sources ? in_W + power * pair_at(&b->source_V[2 * p]) : in_W;
+        t->i_dc_A += total(power * pair_at(&b->rail[2 * p]));
+        resistor_W += power * t->v_V[p];
+        device_W += power * t->drop_V[p];
+    }
     for (unsigned legs = b->swinging; swings && legs != 0u; legs &= legs - 1u) {
         int k = bridge_first(legs);
         rate->leg_V_s[k] = -t->i_leg_A[k] * b->inv_c_leg_1_F;
+        if (b->g_winding_S > 0.0) {
+            rate->leg_V_s[k] -= resistor_A(b, w, shape, k, t->v_V) * b->inv_c_leg_1_F;
+        }
     }
     rate->follow[MOTION] =
         (pair_t){mechanics_rate(&c->mech, omega, f->torque_Nm), dclink_plain_rate(&c->link, v_dc, t->i_dc_A)};
     rate->follow[POWER] = (pair_t){v_dc, f->torque_Nm} * (pair_t){t->i_dc_A, omega};
     rate->follow[POWER][0] += b->sources ? total(in_W) : 0.0;
     rate->follow[LOSS] = totals(copper, device_W) * (pair_t){m->R_s_ohm, 1.0};
+    if (b->g_winding_S > 0.0) {
+        rate->follow[LOSS][0] += total(resistor_W);
+    }
     rate->follow[VOLTS] = t->v_V[0];
 }
 
@@ -191,6 +211,10 @@ INLINE void tied_bends(const circuit_t *c, const pair_t i_A_s[], shape_t shape, 
         v_V_s[p] = pair_at(&b->rail[2 * p]) * both(s->rate.follow[MOTION][1]) - drop_V_s[p];
         v_V_s[p] = swings ? v_V_s[p] + swing_V_s[p] : v_V_s[p];
     }
+    for (unsigned legs = b->swinging; swings && b->g_winding_S > 0.0 && legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        s->bend.leg_V_s[k] -= resistor_A(b, w, shape, k, v_V_s) * b->inv_c_leg_1_F;
+    }
 }
 
 /* Second derivatives of link and rotor, with those of torque and link current. */
@@ -217,6 +241,7 @@ INLINE void bends_at(const circuit_t *c, const pair_t i_A_s[], shape_t shape, bo
     const bridge_t *b = &c->bridge;
     pair_t drop_V_s[PAIRS], v_V_s[PAIRS];
     pair_t i_dc_A_s = {0.0}, source_W_s = {0.0}, copper = {0.0}, device_W_s = {0.0}, harmonic = {0.0};
+    pair_t resistor_W_s = {0.0};
     double omega_e = s->omega_e, omega_e_s = m->pole_pairs * s->rate.follow[MOTION][0];
     double product = 0.0;
     tied_bends(c, i_A_s, shape, swings, s, drop_V_s, v_V_s);
@@ -231,6 +256,14 @@ INLINE void bends_at(const circuit_t *c, const pair_t i_A_s[], shape_t shape, bo
         copper += i * i_A_s[p];
         device_W_s += i * drop_V_s[p] + moves * s->tied.drop_V[p];
         harmonic += moves * f->slope_Wb[p] + i * turning;
+        if (b->g_winding_S > 0.0) {
+            pair_t power = weights(shape, p) * both(b->g_winding_S);
+            i_dc_A_s += power * v_V_s[p] * pair_at(&b->rail[2 * p]);
+            source_W_s =
+                b->sources ? source_W_s + power * v_V_s[p] * pair_at(&b->source_V[2 * p]) : source_W_s;
+            resistor_W_s += both(2.0) * power * s->tied.v_V[p] * v_V_s[p];
+            device_W_s += power * (v_V_s[p] * s->tied.drop_V[p] + s->tied.v_V[p] * drop_V_s[p]);
+        }
     }
     for (int set = 0; set < shape.sets; set++) {
         product += cross(s->rate.flux_V[set], f->i_A[set]) + cross(f->flux[set], i_A_s[set]);
@@ -238,6 +271,9 @@ INLINE void bends_at(const circuit_t *c, const pair_t i_A_s[], shape_t shape, bo
     other_bends(c, m->torque_gain * product + m->pole_pairs * total(harmonic), total(i_dc_A_s), s);
     s->bend.follow[POWER][0] += b->sources ? total(source_W_s) : 0.0;
     s->bend.follow[LOSS] = totals(copper, device_W_s) * (pair_t){2.0 * m->R_s_ohm, 1.0};
+    if (b->g_winding_S > 0.0) {
+        s->bend.follow[LOSS][0] += total(resistor_W_s);
+    }
     s->bend.follow[VOLTS] = v_V_s[0];
     if (floats) {
         s->bend.flux_V[0] = two_phase_part(c, s->bend.flux_V[0]);
@@ -259,6 +295,10 @@ INLINE void swing_bends(const circuit_t *c, shape_t shape, start_t *s)
         int k = bridge_first(legs);
         s->leg_V_s3[k] = -along(&m->winding, shape, k, i_A_s2) * c->bridge.inv_c_leg_1_F;
         spread(&m->winding, shape, k, s->bend.leg_V_s[k], s->v_V_s2);
+    }
+    for (unsigned legs = c->bridge.swinging; c->bridge.g_winding_S > 0.0 && legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        s->leg_V_s3[k] -= resistor_A(&c->bridge, &m->winding, shape, k, s->v_V_s2) * c->bridge.inv_c_leg_1_F;
     }
     for (int p = 0; p < pairs(shape); p++) {
         s->flux_V_s2[p] = of_state(m, shape, p, s->v_V_s2[p] - both(m->R_s_ohm) * i_A_s2[p]);

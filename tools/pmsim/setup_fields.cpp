@@ -45,6 +45,7 @@ const std::vector<Field> &setup_fields()
         PM_FIELD("winding", "L_eddy_d_H", 0, 10, optional, plant.winding.L_eddy_d_H),
         PM_FIELD("winding", "L_eddy_q_H", 0, 10, optional, plant.winding.L_eddy_q_H),
         PM_FIELD("winding", "R_eddy_ohm", 0, 1e6, optional, plant.winding.R_eddy_ohm),
+        PM_FIELD("winding", "r_winding_ohm", 0, 1e9, optional, plant.winding.r_winding_ohm),
         PM_FIELD("winding", "alpha_R_1_K", 0, 0.02, optional, plant.winding.alpha_R_1_K),
         PM_FIELD("winding", "alpha_psi_1_K", -0.02, 0.02, optional, plant.winding.alpha_psi_1_K),
 

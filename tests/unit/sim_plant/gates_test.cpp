@@ -300,6 +300,94 @@ TEST_F(SixLegs, NeverOverlapNorMissAnInstant)
     EXPECT_GT(closings, 10000);
 }
 
+// One switch chopped: both are off for the rest, and it closes without dead time but for the first time.
+TEST_F(SlowSwitches, OneSwitchChoppedClosesWithoutDeadTime)
+{
+    run(0, 0);
+    pwm.state[0] = PLANT_LEG_UPPER;
+    expect(run(600, 200), {{off, GATE_OFF}, {20e-6 + closing, GATE_HIGH}, {60e-6 + off, GATE_OFF}});
+    expect(run(600, 200), {{20e-6 + on, GATE_HIGH}, {60e-6 + off, GATE_OFF}});
+    pwm.state[0] = PLANT_LEG_LOWER;
+    expect(run(600, 200), {{closing, GATE_LOW}, {20e-6 + off, GATE_OFF}, {60e-6 + on, GATE_LOW}});
+    expect(run(600, 200), {{20e-6 + off, GATE_OFF}, {60e-6 + on, GATE_LOW}});
+}
+
+TEST_F(Gates, HeldLegsIgnoreTheCarrier)
+{
+    run(0, 0);
+    pwm.state[0] = PLANT_LEG_HIGH;
+    expect(run(600, 200), {{0.0, GATE_OFF}, {dead, GATE_HIGH}});
+    EXPECT_TRUE(run(600, 200).empty());
+    pwm.state[0] = PLANT_LEG_LOW;
+    expect(run(600, 200), {{0.0, GATE_OFF}, {dead, GATE_LOW}});
+    EXPECT_TRUE(run(600, 200).empty());
+    expect(run(600, 200, false), {{0.0, GATE_OFF}}); // not driven: off, whatever its state
+}
+
+TEST_F(Gates, StateChangesWithinThePeriod)
+{
+    run(0, 0);
+    run(0, 0);
+    const bool driven[PLANT_LEGS] = {true, true, true};
+    const plant_leg_state_t high[PLANT_LEGS] = {PLANT_LEG_HIGH};
+    gates_drive(&gates, driven, high, 30e-6);
+    std::vector<Change> changes;
+    for (double t = 0.0; t < T; t = gates_next_s(&gates, t)) {
+        gate_t before = gates.leg[0].gate;
+        gates_update(&gates, t);
+        if (gates.leg[0].gate != before) {
+            changes.push_back({t, gates.leg[0].gate});
+        }
+    }
+    expect(changes, {{30e-6, GATE_OFF}, {30e-6 + dead, GATE_HIGH}});
+}
+
+// In any sequence of states a switch closes only after the other one has been open for the dead time and the
+// difference of the delays.
+TEST_F(SixLegs, StatesNeverOverlap)
+{
+    std::mt19937 random(2);
+    double opened[PLANT_LEGS][2] = {};
+    int closings[PLANT_LEG_LOW + 1] = {};
+    for (int period = 0; period < 3000; period++) {
+        for (int k = 0; k < PLANT_LEGS; k++) {
+            for (uint32_t &compare : pwm.compare[k]) {
+                compare = static_cast<uint32_t>(random() % (random() % 4 == 0 ? 60 : counts));
+            }
+            pwm.driven[k] = random() % 16 != 0;
+            pwm.state[k] = static_cast<plant_leg_state_t>(random() % (PLANT_LEG_LOW + 1));
+        }
+        pwm.driven_after_s = random() % 3 == 0 ? 1e-9 * static_cast<double>(random() % 100000) : 0.0;
+        gates_load(&gates, &pwm);
+        double start = period * T;
+        for (double t = 0.0; t < T; t = gates_next_s(&gates, t)) {
+            gate_t before[PLANT_LEGS];
+            for (int k = 0; k < PLANT_LEGS; k++) {
+                before[k] = gates.leg[k].gate;
+            }
+            gates_update(&gates, t);
+            for (int k = 0; k < PLANT_LEGS; k++) {
+                gate_t gate = gates.leg[k].gate;
+                if (gate == before[k]) {
+                    continue;
+                }
+                ASSERT_TRUE(gate == GATE_OFF || before[k] == GATE_OFF) << period << " leg " << k;
+                if (gate == GATE_OFF) {
+                    opened[k][before[k] == GATE_HIGH] = start + t;
+                } else {
+                    closings[gates.leg[k].state]++;
+                    ASSERT_GE(start + t - opened[k][gate == GATE_LOW],
+                              2.7e-6 - 1.1e-6 - 2.0 * gates.coincident_s)
+                        << period << " leg " << k;
+                }
+            }
+        }
+    }
+    for (int count : closings) {
+        EXPECT_GT(count, 1000);
+    }
+}
+
 struct Fault {
     plant_leg_fault_t fault;
     gate_t off, low, high; // what conducts with that gate
