@@ -8,6 +8,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "tools/pmsim/input_files.h"
 #include "tools/pmsim/node_command.h"
 #include "tools/pmsim/run_command.h"
 #include "tools/pmsim/yaml_reader.h"
@@ -68,6 +69,10 @@ int run(RunOptions options, const BoardOptions &board, NodeOptions node)
     if (options.scenario.empty()) {
         throw InputError("a scenario is wanted, or --console SECONDS");
     }
+    note_input(board.image);
+    if (!board.figures.empty()) {
+        refuse_input_as_output(board.figures); // before the work, so that it is not lost
+    }
     rig_board_image(board.image.c_str(), !node.can.empty());
     rig_board_bus_load(board.load);
     if (board.busy) {
@@ -86,6 +91,7 @@ int run(RunOptions options, const BoardOptions &board, NodeOptions node)
         std::cout << figure_table(figures);
     }
     if (!board.figures.empty()) {
+        refuse_input_as_output(board.figures);
         std::ofstream file(board.figures);
         file << figure_json(figures);
         if (!file.flush()) {
