@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <stdlib.h>
 
 /* Comparisons are written so that NaN fails them. */
 static bool positive(double x)
@@ -35,10 +36,26 @@ static const char *core_fault(const plant_config_t *config)
     return NULL;
 }
 
+#define ORDER_MOST 1000
+
 static bool sound_harmonics(const plant_harmonic_t harmonic[], int count)
 {
     for (int n = 0; n < count; n++) {
-        if (harmonic[n].order < 0 || harmonic[n].order > 1000 || !isfinite(harmonic[n].amplitude) ||
+        if (harmonic[n].order < 0 || harmonic[n].order > ORDER_MOST || !isfinite(harmonic[n].amplitude) ||
+            !isfinite(harmonic[n].phase_rad)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Those of winding.h, or none */
+static bool sound_saliency(const plant_harmonic_t harmonic[])
+{
+    for (int n = 0; n < PLANT_HARMONICS; n++) {
+        int order = harmonic[n].order;
+        bool possible = order == 0 || (order > 0 ? order % 3 == 2 : -order % 3 == 1);
+        if (!possible || abs(order) > ORDER_MOST || !isfinite(harmonic[n].amplitude) ||
             !isfinite(harmonic[n].phase_rad)) {
             return false;
         }
@@ -71,8 +88,12 @@ static const char *winding_fault(const plant_winding_t *w, double R_s_ohm)
     REQUIRE(isfinite(w->dL_0_H) && isfinite(w->L_c0_H), "winding.dL_0_H and L_c0_H must be finite")
     REQUIRE(sound_harmonics(w->emf, PLANT_HARMONICS),
             "winding.emf must have finite values and orders to 1000")
-    REQUIRE(sound_harmonics(w->saliency, PLANT_HARMONICS),
-            "winding.saliency must have finite values and orders to 1000")
+    REQUIRE(sound_saliency(w->saliency),
+            "winding.saliency must have finite values, and of the orders to 1000 those that three equal "
+            "phases can have: 2, 5, 8, 11 ... and -1, -4, -7, -10 ...")
+    REQUIRE(sound_saliency(w->zero_saliency),
+            "winding.zero_saliency must have finite values, and of the orders to 1000 those that three equal "
+            "phases can have: 2, 5, 8, 11 ... and -1, -4, -7, -10 ...")
     REQUIRE(sound_harmonics(w->cogging, PLANT_HARMONICS),
             "winding.cogging must have finite values and orders to 1000")
     REQUIRE(not_negative(w->L_eddy_d_H) && not_negative(w->L_eddy_q_H),

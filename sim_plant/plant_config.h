@@ -23,7 +23,7 @@ typedef struct {
 } plant_machine_t;
 
 typedef struct {
-    int order;        /* 0: unused */
+    int order;        /* 0: unused; negative of a saliency only */
     double amplitude; /* unit of the list it stands in */
     double phase_rad;
 } plant_harmonic_t;
@@ -39,8 +39,10 @@ typedef struct {
     double L_0_H;                  /* of the zero sequence; must be positive for an open winding */
     double dL_0_H, L_c0_H;         /* E3: L_s2 - M_s2 and its cross-coupling counterpart */
     plant_harmonic_t emf[PLANT_HARMONICS]; /* E5: flux linkage of phase A, psi_n cos(n theta + phase), Wb */
+    /* E3, x = n theta + phase, L in H; orders n = 2, 5, 8, 11 ... and -1, -4, -7, -10 ... (winding.h): */
+    plant_harmonic_t saliency[PLANT_HARMONICS]; /* psi_ab = L [cos x, sin x; sin x, -cos x] i_ab */
     plant_harmonic_t
-        saliency[PLANT_HARMONICS]; /* E3: L [cos x, sin x; sin x, -cos x], x = n theta + phase, H */
+        zero_saliency[PLANT_HARMONICS]; /* psi_0 = L/2 (i_alpha cos x - i_beta sin x), reciprocal */
     plant_harmonic_t
         cogging[PLANT_HARMONICS];     /* E15: T sin(n theta + phase), Nm; order per electrical turn */
     double dR_ohm[PLANT_LEGS];        /* E4, per phase: added resistance, */

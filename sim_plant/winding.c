@@ -118,6 +118,7 @@ static bool all_alike(const plant_winding_t *p)
     }
     for (int n = 0; n < PLANT_HARMONICS; n++) {
         alike = alike && p->saliency[n].order == 0;
+        alike = alike && (p->connection == PLANT_STAR || p->zero_saliency[n].order == 0);
     }
     return alike;
 }

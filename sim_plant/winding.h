@@ -10,8 +10,25 @@
  *   psi   = psi_core(i) + L(theta) i + psi_x(theta)
  *
  * A star connection is the constraint that its zero coordinate carries no current: it is not among the active
- * coordinates, and its voltage is that of the neutral. An open winding keeps it. L and psi_x are Fourier
- * series; L is symmetric in the weighted sense. Tests: winding_test.cpp. */
+ * coordinates, and its voltage is that of the neutral. An open winding keeps it.
+ *
+ * L and psi_x are Fourier series; L is symmetric in the weighted sense. A saliency of order n, which may be
+ * negative, with x = n theta + phase and i = i_alpha + j i_beta, is
+ *
+ *   psi   = L e^{jx} conj(i)      saliency
+ *   psi_0 = L/2 Re(e^{jx} i)      zero_saliency, with
+ *   psi   = L e^{-jx} i_0
+ *
+ * dL_0 and L_c0 are a zero_saliency of order 2 with L e^{j phase} = -dL_0 + j L_c0. Of three equal phases
+ * only n = 2, 5, 8, 11 ... and -1, -4, -7, -10 ... are possible; config.c refuses others. A harmonic of phase
+ * inductances
+ *
+ *   L_AA = L_m cos(m theta + phase)
+ *   M_BC = M_m cos(m theta + phase)
+ *
+ * with those of the other phases a third of a turn on, is saliency L_m/2 + M_m and zero_saliency L_m - M_m of
+ * order m and the same phase where m = 2 mod 3, of order -m and -phase where m = 1 mod 3; of m = 3, 6, 9
+ * nothing is left. Tests: winding_test.cpp, validation_hf_test.cpp. */
 #ifndef PLANT_WINDING_H
 #define PLANT_WINDING_H
 
@@ -22,7 +39,7 @@
 #define ACTIVE 5 /* most that carry current: two stars and the fault branch */
 
 #define FLUX_TERMS       (PLANT_HARMONICS + 1)
-#define INDUCTANCE_TERMS (PLANT_HARMONICS + 2)
+#define INDUCTANCE_TERMS (2 * PLANT_HARMONICS + 2)
 
 typedef struct {
     int order;

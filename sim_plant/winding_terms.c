@@ -1,6 +1,7 @@
 #include "sim_plant/winding_terms.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 #define PI 3.14159265358979323846
 
@@ -80,20 +81,52 @@ static void add_constant(winding_t *w, const plant_winding_t *p)
     }
 }
 
-/* psi_row += L e^{jx} conj(i_column), x = order theta + phase */
-static void add_salient(winding_t *w, int order, int row, int column, double L_H, double phase_rad)
+/* L cos x and L sin x, x = order theta + phase, by the cosine and the sine of |order| theta */
+typedef struct {
+    inductance_term_t *term;
+    double cos_by_cos, cos_by_sin, sin_by_cos, sin_by_sin;
+} wave_t;
+
+static wave_t wave_of(winding_t *w, int order, double L_H, double phase_rad)
 {
-    inductance_term_t *term = winding_inductance(w, order);
     double c = L_H * cos(phase_rad);
     double s = L_H * sin(phase_rad);
-    term->cosine[row][column] += c;
-    term->cosine[row][column + 1] += s;
-    term->cosine[row + 1][column] += s;
-    term->cosine[row + 1][column + 1] -= c;
-    term->sine[row][column] -= s;
-    term->sine[row][column + 1] += c;
-    term->sine[row + 1][column] += c;
-    term->sine[row + 1][column + 1] += s;
+    double turn = order < 0 ? -1.0 : 1.0;
+    return (wave_t){winding_inductance(w, abs(order)), c, -turn * s, s, turn * c};
+}
+
+static void add_cosine(const wave_t *wave, int row, int column, double share)
+{
+    wave->term->cosine[row][column] += share * wave->cos_by_cos;
+    wave->term->sine[row][column] += share * wave->cos_by_sin;
+}
+
+static void add_sine(const wave_t *wave, int row, int column, double share)
+{
+    wave->term->cosine[row][column] += share * wave->sin_by_cos;
+    wave->term->sine[row][column] += share * wave->sin_by_sin;
+}
+
+/* psi_row += L e^{jx} conj(i_column) */
+static void add_salient(winding_t *w, int order, int row, int column, double L_H, double phase_rad)
+{
+    wave_t wave = wave_of(w, order, L_H, phase_rad);
+    add_cosine(&wave, row, column, 1.0);
+    add_sine(&wave, row, column + 1, 1.0);
+    add_sine(&wave, row + 1, column, 1.0);
+    add_cosine(&wave, row + 1, column + 1, -1.0);
+}
+
+/* psi_0 += L/2 Re(e^{jx} i) of a set, and psi += L e^{-jx} i_0: reciprocal, as the zero sequence weighs twice
+ */
+static void add_zero_salient(winding_t *w, int order, int set, double L_H, double phase_rad)
+{
+    wave_t wave = wave_of(w, order, L_H, phase_rad);
+    int alpha = 3 * set, beta = alpha + 1, zero = alpha + 2;
+    add_cosine(&wave, zero, alpha, 0.5);
+    add_sine(&wave, zero, beta, -0.5);
+    add_cosine(&wave, alpha, zero, 1.0);
+    add_sine(&wave, beta, zero, -1.0);
 }
 
 /* x [cos; sin] of (2 theta - 3 gamma) between alpha (or beta) and zero of a set, reciprocal */
@@ -116,9 +149,14 @@ static void add_turning(winding_t *w, const plant_winding_t *p)
         double gamma = phase_angle(3 * set);
         for (int n = 0; n < PLANT_HARMONICS; n++) {
             const plant_harmonic_t *h = &p->saliency[n];
-            if (h->order > 0) {
+            if (h->order != 0) {
                 double phase_rad = h->phase_rad + (2.0 - h->order) * gamma;
                 add_salient(w, h->order, 3 * set, 3 * set, h->amplitude, phase_rad);
+            }
+            h = &p->zero_saliency[n];
+            if (h->order != 0) {
+                double phase_rad = h->phase_rad - (1.0 + h->order) * gamma;
+                add_zero_salient(w, h->order, set, h->amplitude, phase_rad);
             }
         }
         if (p->dL_0_H != 0.0 || p->L_c0_H != 0.0) {

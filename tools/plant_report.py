@@ -43,6 +43,7 @@ ROWS = [
     ("negative sequence of unlike phases", r"asymmetry_"),
     ("torque of a table against virtual work", r"torque_table_"),
     ("HF admittance against the tangent of the map", r"hf_admittance"),
+    ("saliency of orders -4, 8, -10, 14: error of the axis found", r"saliency_order_"),
     ("impedance with eddy circuits, 30 to 1000 Hz", r"hf_eddy_"),
     ("pulse response at rated peak", r"pulse_(ipm|spm)_(max|rms)"),
     ("pulse response, second order alone", r"pulse_ipm_second_order"),

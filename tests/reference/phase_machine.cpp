@@ -65,6 +65,11 @@ double PhaseMachine::self_or_mutual_H(int k, int j, double theta, double *by_the
         value += 2.0 / 3.0 * h.amplitude * std::cos(y);
         *by_theta -= 2.0 / 3.0 * h.amplitude * h.order * std::sin(y);
     }
+    for (const Harmonic &h : p_.zero_saliency) {
+        double y = h.order * (theta - set_rad) + h.phase_rad - set_rad;
+        value += h.amplitude / 3.0 * (std::cos(y + axis_rad(k)) + std::cos(y + axis_rad(j)));
+        *by_theta -= h.order * h.amplitude / 3.0 * (std::sin(y + axis_rad(k)) + std::sin(y + axis_rad(j)));
+    }
     return value;
 }
 

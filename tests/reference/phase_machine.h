@@ -42,11 +42,12 @@ struct PhaseParameters {
     double M_d_H = 0, M_q_H = 0; // between the sets
     Vector R_ohm, emf_gain, emf_shift_rad;
     Matrix L_added_H;
-    std::vector<Harmonic> magnet;   // psi_n cos(n (theta - gamma_k - shift_k) + phase), Wb
-    std::vector<Harmonic> saliency; // 2/3 L cos(x - gamma_k - gamma_j), x = n theta + phase, H
-    std::vector<Harmonic> cogging;  // T sin(n theta + phase), Nm
-    std::optional<FluxMap> core;    // saturating part of each set with its fundamental magnet flux; ...
-    double core_psi_m_Wb = 0;       // ... of this amplitude: what emf_gain and emf_shift act on
+    std::vector<Harmonic> magnet;        // psi_n cos(n (theta - gamma_k - shift_k) + phase), Wb
+    std::vector<Harmonic> saliency;      // 2/3 L cos(x - gamma_k - gamma_j), x = n theta + phase, H
+    std::vector<Harmonic> zero_saliency; // L/3 (cos(x + gamma_k) + cos(x + gamma_j)), H
+    std::vector<Harmonic> cogging;       // T sin(n theta + phase), Nm
+    std::optional<FluxMap> core;         // saturating part of each set with its fundamental magnet flux; ...
+    double core_psi_m_Wb = 0;            // ... of this amplitude: what emf_gain and emf_shift act on
     double L_eddy_d_H = 0, L_eddy_q_H = 0, R_eddy_ohm = 0; // with a core; 0: none
     double J_kgm2 = 0, B_Nms = 0;
 };

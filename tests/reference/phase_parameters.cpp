@@ -65,6 +65,7 @@ PhaseParameters phase_parameters(const plant_config_t &config, std::optional<Flu
     p.M_q_H = w.M_q_H;
     p.magnet = listed(w.emf, PLANT_HARMONICS);
     p.saliency = listed(w.saliency, PLANT_HARMONICS);
+    p.zero_saliency = listed(w.zero_saliency, PLANT_HARMONICS);
     p.cogging = listed(w.cogging, PLANT_HARMONICS);
     if (core) {
         set_inductances(p, 0.0, 0.0, w);

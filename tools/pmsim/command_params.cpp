@@ -6,6 +6,7 @@
 #include "tools/pmsim/command_line.h"
 #include "tools/pmsim/commands.h"
 #include "tools/pmsim/drive_parameters.h"
+#include "tools/pmsim/input_files.h"
 #include "tools/pmsim/machine_file.h"
 #include "tools/pmsim/metrics.h"
 #include "tools/pmsim/settings_option.h"
@@ -50,6 +51,7 @@ void write_page(const PageOptions &options)
     if (used == 0) {
         throw InputError(options.machine + ": drive refuses parameter " + refused + ": " + reason);
     }
+    refuse_input_as_output(options.page);
     std::ofstream file(options.page, std::ios::binary);
     file.write(reinterpret_cast<const char *>(words), std::streamsize(used * sizeof words[0]));
     if (!file.flush()) {

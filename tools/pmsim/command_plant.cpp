@@ -7,6 +7,7 @@
 
 #include "tools/pmsim/command_line.h"
 #include "tools/pmsim/commands.h"
+#include "tools/pmsim/input_files.h"
 #include "tools/pmsim/notes.h"
 #include "tools/pmsim/plant_run.h"
 #include "tools/pmsim/settings_option.h"
@@ -62,9 +63,7 @@ void check_out(const Options &options)
         throw InputError(options.out + ": cannot be written: " +
                          (fs::is_directory(out, none) ? "it is a folder" : "there is no such folder"));
     }
-    if (fs::equivalent(out, options.input, none)) {
-        throw InputError(options.out + ": is the input too");
-    }
+    refuse_input_as_output(options.out);
 }
 
 void write_all(const std::string &path, const std::string &text)
@@ -85,8 +84,8 @@ void write_all(const std::string &path, const std::string &text)
 void run(const Options &options)
 {
     const PlantFile file = load_plant_file(options.machine, parse_settings(options.settings));
-    check_out(options);
     const Csv input = load_plant_input(options.input, file.setup);
+    check_out(options);
     PlantOutput output;
     if (isatty(STDERR_FILENO) != 0) {
         ProgressLine line;

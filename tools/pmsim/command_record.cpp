@@ -2,6 +2,7 @@
 
 #include "tools/pmsim/command_line.h"
 #include "tools/pmsim/commands.h"
+#include "tools/pmsim/input_files.h"
 #include "tools/pmsim/loop.h"
 #include "tools/pmsim/notes.h"
 #include "tools/pmsim/record_file.h"
@@ -26,6 +27,7 @@ void record(const Options &options)
                          " runs; choose one with --set");
     }
     const Scenario scenario = file.scenario(file.runs().front());
+    refuse_input_as_output(options.out); // before the work, so that it is not lost
     print_notes(scenario.setup);
     const Recording recording = record_scenario(scenario, options.periods);
     write_recording(recording, options.out);

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "tools/pmsim/input_files.h"
 #include "tools/pmsim/text.h"
 
 namespace pmsim
@@ -70,6 +71,7 @@ Csv Csv::from_file(const std::string &path, const CsvColumns &known)
     if (!in || !(text << in.rdbuf())) { // a directory opens but cannot be read, and an empty file too
         throw InputError(path + ": cannot be read, or is empty");
     }
+    note_input(path);
     return from_text(text.str(), path, known);
 }
 

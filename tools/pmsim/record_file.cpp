@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include "firmware/params/parameters.h"
+#include "tools/pmsim/input_files.h"
 #include "tools/pmsim/loop.h"
 #include "tools/pmsim/rig.h"
 
@@ -100,6 +101,7 @@ void write_recording(const Recording &recording, const std::string &path)
     for (const record_period_t &period : recording.periods) {
         put_period(bytes, period);
     }
+    refuse_input_as_output(path);
     std::ofstream file(path, std::ios::binary);
     file << bytes.text();
     if (!file.flush()) {

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "tools/pmsim/command_line.h"
+#include "tools/pmsim/input_files.h"
 #include "tools/pmsim/notes.h"
 #include "tools/pmsim/report.h"
 #include "tools/pmsim/settings_option.h"
@@ -19,12 +20,24 @@ namespace pmsim
 namespace
 {
 
+const char trace_name[] = "trace.csv", summary_name[] = "summary.txt", runs_name[] = "runs.csv";
+
 void write_file(const std::filesystem::path &path, const std::string &text)
 {
     std::ofstream file(path, std::ios::binary);
     file << text;
     if (!file.flush()) {
         throw InputError(path.string() + ": cannot be written");
+    }
+}
+
+// Of all files that a run leaves in its folder.
+void check_out(const ScenarioFile &file, const std::filesystem::path &out)
+{
+    refuse_input_as_output((out / trace_name).string());
+    refuse_input_as_output((out / summary_name).string());
+    if (file.runs().size() > 1) {
+        refuse_input_as_output((out / runs_name).string());
     }
 }
 
@@ -69,6 +82,7 @@ int run_and_report(const RunOptions &options)
     print_notes(file.scenario(file.runs().front()).setup);
     const std::filesystem::path out = options.out;
     if (!options.out.empty()) {
+        check_out(file, out); // before the work, so that it is not lost
         std::filesystem::create_directories(out);
     }
     const auto start = std::chrono::steady_clock::now();
@@ -82,13 +96,14 @@ int run_and_report(const RunOptions &options)
     const std::vector<Verdict> list = verdicts(file, result);
     const std::string lines = verdict_lines(file, list);
     if (!options.out.empty()) {
+        check_out(file, out); // each run of a sweep may have read a machine of its own
         const Run &shown = file.runs()[worst_run(list)];
-        write_trace(file, shown, out / "trace.csv", options.decimate);
+        write_trace(file, shown, out / trace_name, options.decimate);
         const std::string traced = shown.name.empty() ? "" : "trace.csv: " + shown.name + "\n";
-        write_file(out / "summary.txt",
+        write_file(out / summary_name,
                    file.title() + "\n" + lines + timing_line(file, simulated_s, 0.0) + traced);
         if (file.runs().size() > 1) {
-            write_file(out / "runs.csv", runs_csv(file, result));
+            write_file(out / runs_name, runs_csv(file, result));
         }
     }
     if (options.json) {

@@ -24,6 +24,8 @@ struct List {
     Per per;
 };
 
+constexpr int orders_of_saliency = 0; // as min_order: those that three equal phases can have (winding.h)
+
 struct Harmonics {
     plant_harmonic_t *first;
     int room, min_order;

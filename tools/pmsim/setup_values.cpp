@@ -63,6 +63,20 @@ void read_list(Setup &setup, const Field &field, const List &list, const Value &
     }
 }
 
+// sim_plant/winding.h: n = 2 mod 3. What a phase inductance has of order 4 is -4 of the saliency.
+int read_saliency_order(const Value &value)
+{
+    const int order = static_cast<int>(value.integer(-max_order, max_order));
+    const auto possible = [](int n) { return (n % 3 + 3) % 3 == 2; };
+    if (!possible(order)) {
+        value.fail(std::to_string(order) +
+                   " is no order of a winding of three equal phases: it can have 2, 5, 8, 11 ... and -1, -4, "
+                   "-7, -10 ..." +
+                   (possible(-order) ? "; did you mean " + std::to_string(-order) + "?" : ""));
+    }
+    return order;
+}
+
 void read_harmonics(const Field &field, const Harmonics &harmonics, const Value &value)
 {
     const std::vector<Value> items = value.list();
@@ -73,7 +87,9 @@ void read_harmonics(const Field &field, const Harmonics &harmonics, const Value 
     for (const Value &item : items) {
         const Map map(item, {"order", harmonics.amplitude_key, "phase_deg"});
         plant_harmonic_t h{};
-        h.order = static_cast<int>(map.at("order").integer(harmonics.min_order, max_order));
+        h.order = harmonics.min_order == orders_of_saliency
+                      ? read_saliency_order(map.at("order"))
+                      : static_cast<int>(map.at("order").integer(harmonics.min_order, max_order));
         h.amplitude = map.at(harmonics.amplitude_key).number(field.min, field.max);
         if (const auto phase = map.find("phase_deg")) {
             h.phase_rad = phase->number(-360, 360) * degree;

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "tools/pmsim/input_files.h"
 #include "tools/pmsim/text.h"
 
 namespace pmsim
@@ -58,6 +59,7 @@ Value Value::from_file(const std::string &path, const Variables *variables)
     if (!in || !(text << in.rdbuf())) {
         throw InputError(path + ": cannot be read");
     }
+    note_input(path);
     return from_text(text.str(), path, variables);
 }
 

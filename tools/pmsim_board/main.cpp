@@ -7,6 +7,7 @@
 #include <map>
 
 #include "tools/pmsim/command_line.h"
+#include "tools/pmsim/input_files.h"
 #include "tools/pmsim/node_command.h"
 #include "tools/pmsim/run_command.h"
 #include "tools/pmsim/yaml_reader.h"
@@ -67,6 +68,10 @@ int run(RunOptions options, const BoardOptions &board, NodeOptions node)
     if (options.scenario.empty()) {
         throw InputError("a scenario is wanted, or --console SECONDS");
     }
+    note_input(board.image);
+    if (!board.figures.empty()) {
+        refuse_input_as_output(board.figures); // before the work, so that it is not lost
+    }
     rig_board_image(board.image.c_str(), !node.can.empty());
     rig_board_bus_load(static_cast<bus_noise_kind_t>(board.load));
     if (board.busy) {
@@ -85,6 +90,7 @@ int run(RunOptions options, const BoardOptions &board, NodeOptions node)
         std::cout << figure_table(figures);
     }
     if (!board.figures.empty()) {
+        refuse_input_as_output(board.figures);
         std::ofstream file(board.figures);
         file << figure_json(figures);
         if (!file.flush()) {

@@ -75,6 +75,40 @@ def check_refusals(folder, scenario):
     expect_exit(2, "record", scenario, "--out", folder / "x.rec")
 
 
+def check_inputs_are_safe(folder, scenario):
+    """Neither trace.csv, summary.txt nor runs.csv lands on the scenario or the machine."""
+    text = scenario.read_text()
+    machine = folder / "machine.yaml"
+    machine.write_text(pathlib.Path("sim_plant/machines/ipm_1000.yaml").read_text())
+    for name in ("trace.csv", "summary.txt", "runs.csv"):
+        for kind in ("scenario", "machine", "link"):
+            out = folder / f"safe_{kind}_{name}"
+            out.mkdir()
+            target = out / name
+            given = scenario
+            if kind == "scenario":
+                target.write_text(text)
+                given = target
+            elif kind == "machine":
+                target.write_bytes(machine.read_bytes())
+                given = out / "s.yaml"
+                given.write_text(text.replace(str(pathlib.Path("sim_plant/machines/ipm_1000.yaml").resolve()), name))
+            else:
+                target.symlink_to(scenario)
+            before = sorted(path.name for path in out.iterdir())
+            message = expect_exit(2, "run", given, "--out", out).stderr
+            assert f"{target}: would overwrite an input" in message, message
+            assert sorted(path.name for path in out.iterdir()) == before, "something was written"
+            assert target.read_bytes() == (machine.read_bytes() if kind == "machine" else text.encode())
+    # one run writes no runs.csv
+    expect_exit(0, "run", folder / "safe_scenario_runs.csv" / "runs.csv", "--set", "angle=30", "--out",
+                folder / "safe_scenario_runs.csv")
+    message = expect_exit(2, "record", scenario, "--set", "angle=30", "--periods", 5, "--out", scenario).stderr
+    assert "would overwrite an input" in message and scenario.read_text() == text, message
+    message = expect_exit(2, "params", "--machine", machine, "--page", machine).stderr
+    assert "would overwrite an input" in message, message
+
+
 def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
@@ -84,6 +118,7 @@ def main():
         check_tables()
         check_run(folder, scenario)
         check_refusals(folder, scenario)
+        check_inputs_are_safe(folder, scenario)
         record = folder / "small.rec"
         expect_exit(0, "record", scenario, "--set", "angle=30", "--periods", 50, "--out", record)
         assert record.read_bytes().startswith(b"PMREC002")

@@ -82,8 +82,33 @@ def check_other_errors(folder):
     result = expect_exit(2, "plant", MACHINE, "--input", folder.input, "--out", nowhere)
     assert "there is no such folder" in result.stderr, result.stderr
     result = expect_exit(2, "plant", MACHINE, "--input", folder.input, "--out", folder.input)
-    assert "is the input too" in result.stderr and folder.input.read_text() == ROWS, result.stderr
+    assert "would overwrite an input" in result.stderr and folder.input.read_text() == ROWS, result.stderr
     expect_exit(2, "plant", MACHINE, "--input", folder.input)
+
+
+def check_inputs_are_safe(folder):
+    """No output lands on a file that was read: machine, table, input, by whatever path."""
+    place = folder.out.parent
+    table, machine = place / "map.csv", place / "m.yaml"
+    points = [(i_d, i_q) for i_d in (-2, -1, 0, 1) for i_q in (-2, -1, 0, 1)]
+    table.write_text("i_d_A,i_q_A,psi_d_Vs,psi_q_Vs\n" +
+                     "".join(f"{d},{q},{0.1 + 0.004 * d},{0.006 * q}\n" for d, q in points))
+    machine.write_text("name: m\nelectrical: {R_s_ohm: 1, pole_pairs: 4}\nmechanics: {J_kgm2: 1.0e-5}\n"
+                       "flux_map: {table: map.csv}\n")
+    folder.input.write_text(ROWS)
+    link, hard = place / "link.csv", place / "hard.csv"
+    link.symlink_to(table)
+    hard.hardlink_to(folder.input)
+    indirect = place / ".." / place.name
+    for out, read in ((folder.input, folder.input), (indirect / "in.csv", folder.input), (hard, folder.input),
+                      (machine, machine), (table, table), (link, table)):
+        before = read.read_bytes()
+        message = expect_exit(2, "plant", machine, "--input", folder.input, "--out", out).stderr
+        assert f"{out}: would overwrite an input" in message, message
+        assert read.read_bytes() == before and link.is_symlink(), out
+    link.unlink()
+    hard.unlink()
+    expect_exit(0, "plant", machine, "--input", folder.input, "--out", folder.out)
 
 
 def check_run_refuses(folder):
@@ -105,6 +130,7 @@ def main():
         check_runs(folder)
         check_table_errors(folder)
         check_other_errors(folder)
+        check_inputs_are_safe(folder)
         check_run_refuses(folder)
 
 

@@ -55,7 +55,8 @@ TEST(WindingSection, ValuesReachThePlant)
         machine("winding:\n"
                 "  emf: [{order: 5, psi_Wb: 2.0e-4, phase_deg: 180}, {order: 3, psi_Wb: 3.0e-4}]\n"
                 "  cogging: [{order: 6, T_Nm: -0.01, phase_deg: 90}]\n"
-                "  saliency: [{order: 4, L_H: 1.0e-5}]\n"
+                "  saliency: [{order: -4, L_H: 1.0e-5}]\n"
+                "  zero_saliency: [{order: 5, L_H: 2.0e-5, phase_deg: -90}]\n"
                 "  dR_ohm: [0.1, 0, -0.2]\n"
                 "  dM_H: [0, 1.0e-6, 0]\n"
                 "  emf_shift_deg: [0, 0, 90]\n"
@@ -69,7 +70,10 @@ TEST(WindingSection, ValuesReachThePlant)
     EXPECT_EQ(plant.winding.emf[1].order, 3);
     EXPECT_EQ(plant.winding.emf[2].order, 0);
     EXPECT_EQ(plant.winding.cogging[0].amplitude, -0.01);
-    EXPECT_EQ(plant.winding.saliency[0].order, 4);
+    EXPECT_EQ(plant.winding.saliency[0].order, -4);
+    EXPECT_EQ(plant.winding.zero_saliency[0].order, 5);
+    EXPECT_EQ(plant.winding.zero_saliency[0].amplitude, 2.0e-5);
+    EXPECT_NEAR(plant.winding.zero_saliency[0].phase_rad, -pi / 2, 1e-15);
     EXPECT_EQ(plant.winding.dR_ohm[2], -0.2);
     EXPECT_EQ(plant.winding.dM_H[0][1], 1.0e-6);
     EXPECT_NEAR(plant.winding.emf_shift_rad[2], pi / 2, 1e-15);
@@ -78,6 +82,29 @@ TEST(WindingSection, ValuesReachThePlant)
     EXPECT_EQ(plant.sensor.divider_error[0], 0.01);
     EXPECT_EQ(plant.sensor.divider_error[PLANT_LEGS], 0.02);
     EXPECT_EQ(plant.dclink.ripple_Hz, 300.0);
+}
+
+// METHODS-ADDENDUM.md E2.
+TEST(WindingSection, RefusesOrdersThatThreeEqualPhasesCannotHave)
+{
+    const auto error = [](const char *list, const char *order) {
+        return error_with(std::string("winding: {") + list + ": [{order: " + order + ", L_H: 1.0e-5}]}\n");
+    };
+    for (const char *order : {"2", "5", "8", "11", "-1", "-4", "-7", "-10", "998"}) {
+        EXPECT_EQ(error("saliency", order), "no error") << order;
+        EXPECT_EQ(error("zero_saliency", order), "no error") << order;
+    }
+    EXPECT_EQ(
+        error("saliency", "4"),
+        "m.yaml:4:30: 4 is no order of a winding of three equal phases: it can have 2, 5, 8, 11 ... and "
+        "-1, -4, -7, -10 ...; did you mean -4?");
+    EXPECT_EQ(
+        error("zero_saliency", "6"),
+        "m.yaml:4:35: 6 is no order of a winding of three equal phases: it can have 2, 5, 8, 11 ... and "
+        "-1, -4, -7, -10 ...");
+    EXPECT_THAT(error("saliency", "-2"), HasSubstr("did you mean 2?"));
+    EXPECT_THAT(error("saliency", "0"), HasSubstr("0 is no order"));
+    EXPECT_THAT(error("saliency", "-1000"), HasSubstr("out of range"));
 }
 
 // A list is as long as the machine has phases or legs, wherever `sets` stands in the file.

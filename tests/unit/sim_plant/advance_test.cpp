@@ -199,7 +199,7 @@ plant_config_t random_machine(Random &random)
     if (random.chance(0.3)) {
         w.dL_H[static_cast<int>(6.0 * random())] = 0.1 * L;
         w.dR_ohm[static_cast<int>(6.0 * random())] = 0.2 * c.machine.R_s_ohm;
-        w.saliency[0] = {4, 0.03 * L, 1.0};
+        w.saliency[0] = {-4, 0.03 * L, 1.0};
     }
     if (random.chance(0.2)) {
         w.L_eddy_d_H = w.L_eddy_q_H = 3.0 * L;

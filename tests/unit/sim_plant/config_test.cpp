@@ -70,7 +70,15 @@ const Garbage garbage[] = {
     {"L_c0_H", [](plant_config_t &c) { c.winding.L_c0_H = nan; }},
     {"winding.emf must", [](plant_config_t &c) { c.winding.emf[3] = {5, nan, 0.0}; }},
     {"winding.emf must", [](plant_config_t &c) { c.winding.emf[0] = {1001, 0.01, 0.0}; }},
-    {"saliency must", [](plant_config_t &c) { c.winding.saliency[0] = {-4, 1e-3, 0.0}; }},
+    {"winding.saliency must", [](plant_config_t &c) { c.winding.saliency[0] = {4, 1e-3, 0.0}; }},
+    {"winding.saliency must", [](plant_config_t &c) { c.winding.saliency[3] = {-2, 1e-3, 0.0}; }},
+    {"winding.saliency must", [](plant_config_t &c) { c.winding.saliency[0] = {6, 1e-3, 0.0}; }},
+    {"winding.saliency must", [](plant_config_t &c) { c.winding.saliency[0] = {1001, 1e-3, 0.0}; }},
+    {"2, 5, 8, 11 ... and -1, -4, -7, -10 ...",
+     [](plant_config_t &c) { c.winding.saliency[0] = {-6, 1e-3, 0.0}; }},
+    {"winding.saliency must", [](plant_config_t &c) { c.winding.saliency[0] = {-4, 1e-3, nan}; }},
+    {"winding.zero_saliency must", [](plant_config_t &c) { c.winding.zero_saliency[15] = {3, 1e-3, 0.0}; }},
+    {"winding.zero_saliency must", [](plant_config_t &c) { c.winding.zero_saliency[0] = {8, inf, 0.0}; }},
     {"cogging must", [](plant_config_t &c) { c.winding.cogging[15] = {6, 0.1, inf}; }},
     {"L_eddy_d_H", [](plant_config_t &c) { c.winding.L_eddy_d_H = -0.1; }},
     {"L_eddy_q_H", [](plant_config_t &c) { c.winding.L_eddy_q_H = nan; }},
@@ -78,9 +86,9 @@ const Garbage garbage[] = {
     {"winding.alpha", [](plant_config_t &c) { c.winding.alpha_R_1_K = nan; }},
     {"winding.alpha", [](plant_config_t &c) { c.winding.alpha_psi_1_K = inf; }},
     {"inductance is not positive", [](plant_config_t &c) { c.winding.dL_H[0] = -80e-3; }},
-    {"inductance is not positive", [](plant_config_t &c) { c.winding.saliency[0] = {4, 80e-3, 0.0}; }},
-    {"inductance is not positive", // at 7.5 degrees, where no phase axis lies
-     [](plant_config_t &c) { c.winding.saliency[0] = {24, 44e-3, 0.0}; }},
+    {"inductance is not positive", [](plant_config_t &c) { c.winding.saliency[0] = {-4, 80e-3, 0.0}; }},
+    {"inductance is not positive", // at 8.6 degrees, where no phase axis lies
+     [](plant_config_t &c) { c.winding.saliency[0] = {23, 44e-3, 0.0}; }},
     {"inductance is not positive",
      [](plant_config_t &c) {
          c.winding.sets = 2;

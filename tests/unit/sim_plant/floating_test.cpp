@@ -38,7 +38,7 @@ plant_config_t config_of(Machine kind)
     if (kind != plain_star) {
         c.winding.dR_ohm[1] = 0.7;
         c.winding.dL_H[0] = 2e-3;
-        c.winding.saliency[0] = {4, 3e-3, 0.4};
+        c.winding.saliency[0] = {-4, 3e-3, -0.4};
         c.winding.emf[0] = {5, 5e-3, 0.0};
     }
     if (kind == eddy_star) {
@@ -214,6 +214,7 @@ TEST(Bridge, ShootThroughIsADivider)
 
 TEST_P(Floating, VoltagesKeepTheCurrentAsItIs)
 {
+    double fastest = 0.0;
     for (int n = 0; n < 20; n++) {
         at_random();
         solve();
@@ -221,7 +222,6 @@ TEST_P(Floating, VoltagesKeepTheCurrentAsItIs)
         act(v_leg, false, v_V); // anew from all legs
         machine_rate_t with{};
         machine_rates(&machine, &state, &point, omega_e, v_V, &with);
-        double fastest = 0.0;
         for (int k = 0; k < w->legs; k++) {
             fastest = std::fmax(fastest, std::fabs(along(k, with.i_A_s)));
             if (bridge.leg[k] == LEG_FLOATING) {
@@ -232,10 +232,8 @@ TEST_P(Floating, VoltagesKeepTheCurrentAsItIs)
             EXPECT_NEAR(rate.u[a], with.u[a], slope_A_s) << "the rates are those of the voltages";
             EXPECT_NEAR(rate.i_A_s[a], with.i_A_s[a], slope_A_s);
         }
-        if (GetParam().floating.size() < static_cast<size_t>(w->legs)) {
-            EXPECT_TRUE(fastest > 100.0 || GetParam().floating.size() > 1);
-        }
     }
+    EXPECT_TRUE(fastest > 100.0 || GetParam().floating.size() > 1);
 }
 
 TEST_P(Floating, FreeGroupsLieEvenlyBetweenTheRails)

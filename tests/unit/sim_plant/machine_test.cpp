@@ -193,7 +193,7 @@ void asymmetric(plant_config_t &c)
     c.winding.dM_H[0][2] = -2e-3;
     c.winding.emf_gain[0] = 0.05;
     c.winding.emf_shift_rad[1] = 0.03;
-    c.winding.saliency[0] = {4, 2e-3, 0.5};
+    c.winding.saliency[0] = {-4, 2e-3, 0.5};
     c.winding.emf[0] = {5, 8e-3, 0.1};
     c.winding.emf[1] = {7, -3e-3, 0.0};
 }
@@ -681,8 +681,8 @@ TEST(Machine, IsNotSoundWithANegativeInductance)
     // L_d = 43 mH and L_q = 75 mH without current; what a phase adds counts two thirds of it along its axis
     EXPECT_TRUE(sound(saturating, [](plant_config_t &c) { c.winding.dL_H[0] = -60e-3; }));
     EXPECT_FALSE(sound(saturating, [](plant_config_t &c) { c.winding.dL_H[0] = -70e-3; }));
-    EXPECT_TRUE(sound(saturating, [](plant_config_t &c) { c.winding.saliency[0] = {4, 40e-3, 0.0}; }));
-    EXPECT_FALSE(sound(saturating, [](plant_config_t &c) { c.winding.saliency[0] = {4, 46e-3, 0.0}; }));
+    EXPECT_TRUE(sound(saturating, [](plant_config_t &c) { c.winding.saliency[0] = {-4, 40e-3, 0.0}; }));
+    EXPECT_FALSE(sound(saturating, [](plant_config_t &c) { c.winding.saliency[0] = {-4, 46e-3, 0.0}; }));
     EXPECT_TRUE(sound(two_sets, [](plant_config_t &c) { c.winding.M_d_H = 40e-3; }));
     EXPECT_FALSE(sound(two_sets, [](plant_config_t &c) { c.winding.M_d_H = 46e-3; }));
     EXPECT_FALSE(sound(two_sets, [](plant_config_t &c) { c.winding.M_q_H = -78e-3; }));

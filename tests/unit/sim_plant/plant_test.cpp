@@ -184,7 +184,7 @@ plant_config_t everything_on()
     c.winding.emf_gain[0] = 0.02;
     c.winding.emf[0] = {5, 5e-3, 0.0};
     c.winding.emf[1] = {7, -2e-3, 0.0};
-    c.winding.saliency[0] = {4, 1e-3, 0.0};
+    c.winding.saliency[0] = {-4, 1e-3, 0.0};
     c.winding.cogging[0] = {6, 0.05, 0.0};
     c.winding.L_eddy_d_H = 0.4;
     c.winding.L_eddy_q_H = 0.6;
@@ -239,7 +239,7 @@ TEST(EnergyBalance, OfASecondMassAndAFan)
 TEST(Plant, GeneralWayAgreesWithThePlainOne)
 {
     plant_config_t plain = rig::ipm_1000_real(), general = plain;
-    general.winding.saliency[0] = {4, 1e-18, 0.0};
+    general.winding.saliency[0] = {-4, 1e-18, 0.0};
     rig::Plant a(plain), b(general);
     rig::CurrentControl control(plain);
     for (int k = 0; k < 3000; k++) {
@@ -261,7 +261,7 @@ void expect_agreement(plant_config_t config, double amplitude)
 {
     config.tolerance = 1e-8;
     plant_config_t general = config;
-    general.winding.saliency[0] = {4, 1e-18, 0.0};
+    general.winding.saliency[0] = {-4, 1e-18, 0.0};
     bool open = config.winding.connection == PLANT_OPEN;
     rig::Plant a(config), b(general);
     plant_set_speed(a, 20.0);
@@ -332,7 +332,7 @@ TEST(Plant, RemovedShortCircuitReturnsToTheSymmetricalSolver)
 {
     plant_config_t config = six_legs(), general = config;
     config.winding.connection = general.winding.connection = PLANT_OPEN;
-    general.winding.saliency[0] = {4, 1e-18, 0.0};
+    general.winding.saliency[0] = {-4, 1e-18, 0.0};
     rig::Plant a(config), b(general);
     for (plant_t *plant : {static_cast<plant_t *>(a), static_cast<plant_t *>(b)}) {
         plant_pwm_t pwm = rig::pwm(0.55, 0.48, 0.47);

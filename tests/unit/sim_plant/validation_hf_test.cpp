@@ -132,6 +132,58 @@ TEST(Hf, AdmittanceIsTheTangentOfATable)
     }
 }
 
+// Direction that a saliency method finds: that of the anisotropy of the currents' response to two short
+// pulses, from rest.
+double found_axis_rad(const plant_config_t &config, double theta)
+{
+    constexpr double pulse_s = 1e-6; // R takes less than 1e-4 of it
+    Complex along, across;
+    for (Complex *i_A : {&along, &across}) {
+        rig::Plant plant(config, theta);
+        hold(plant, legs(30.0 * (i_A == &along ? Complex(1.0) : j)), pulse_s);
+        *i_A = current(plant.truth());
+    }
+    double cross = 0.5 * (along.imag() + across.real());
+    return 0.5 *
+           std::arg(Complex(0.5 * (along.real() - across.imag()), cross) * std::polar(1.0, -2.0 * theta));
+}
+
+// METHODS-ADDENDUM.md 5.4: a saliency of order k, a tenth of the second, misleads by 1/2 0.1 sin((k - 2)
+// theta + phase): the 6th order for -4 and 8, the 12th for -10 and 14.
+TEST(Hf, SaliencyHarmonicsMisleadByTheOrderOfTheBook)
+{
+    constexpr double ratio = 0.1, phase = 0.3;
+    constexpr int angles = 96;
+    for (int order : {-4, 8, -10, 14}) {
+        plant_config_t config = ipm_linear();
+        config.machine.psi_m_Wb = 0.0;
+        config.mech.locked = true;
+        config.winding.saliency[0] = {order, 0.5 * ratio * (config.machine.L_q0_H - config.machine.L_d0_H),
+                                      phase};
+        Fourier own, other[3];
+        int others[3] = {2, 4, std::abs(order - 2) == 6 ? 12 : 6};
+        double worst_rad = 0.0;
+        for (int n = 0; n < angles; n++) {
+            double theta = 2.0 * rig::pi * n / angles;
+            double error_rad = found_axis_rad(config, theta);
+            // the magnet's anisotropy is -K e^{j 2 theta}
+            double expected_rad = 0.5 * std::arg(1.0 - std::polar(ratio, (order - 2) * theta + phase));
+            worst_rad = std::max(worst_rad, std::fabs(error_rad - expected_rad));
+            own.add(2.0 * error_rad, std::abs(order - 2) * theta);
+            for (int k = 0; k < 3; k++) {
+                other[k].add(2.0 * error_rad, others[k] * theta);
+            }
+        }
+        measured("saliency_order_" + std::to_string(order), worst_rad / (0.5 * ratio), 0.002, "of_peak",
+                 "5.4");
+        EXPECT_NEAR(std::abs(own.value()) / deg, 2.865, 0.01) << order;
+        for (int k = 0; k < 3; k++) { // the square of the ratio makes the double order: a quarter of it
+            EXPECT_LT(std::abs(other[k].value()) / deg, others[k] == 2 * std::abs(order - 2) ? 0.15 : 0.01)
+                << order << " " << others[k];
+        }
+    }
+}
+
 TEST(Hf, AdmittanceIsIndependentOfTolerance)
 {
     plant_config_t config = ipm_saturating();

@@ -24,8 +24,10 @@ void add_all_effects(plant_config_t &c)
     w.emf[0] = {3, 0.03 * psi_Wb, 0.1};
     w.emf[1] = {5, 0.02 * psi_Wb, -0.2};
     w.emf[2] = {7, 0.01 * psi_Wb, 0.3};
-    w.saliency[0] = {4, 0.03 * L_H, 0.4};
-    w.saliency[1] = {6, 0.02 * L_H, -0.5};
+    w.saliency[0] = {-4, 0.03 * L_H, 0.4};
+    w.saliency[1] = {8, 0.02 * L_H, -0.5};
+    w.zero_saliency[0] = {-4, 0.05 * L_H, -0.7};
+    w.zero_saliency[1] = {5, 0.02 * L_H, 0.8};
     w.cogging[0] = {6, 0.05, 0.6};
     for (int k = 0; k < PLANT_LEGS; k++) {
         double unlike = 0.01 * (k * k % 5 - 2);

@@ -46,9 +46,13 @@ plant_winding_t everything(int sets, plant_connection_t connection)
     p.emf[2] = {0, 1.0, 0.0}; // unused: skipped
     p.emf[3] = {7, 1e-3, -0.4};
     p.saliency[0] = {0, 1.0, 0.0};
-    p.saliency[1] = {4, 0.2e-3, 0.3};
-    p.saliency[2] = {6, 0.1e-3, -1.0};
+    p.saliency[1] = {-4, 0.2e-3, 0.3};
+    p.saliency[2] = {8, 0.1e-3, -1.0};
     p.saliency[3] = {2, 0.05e-3, 0.7};
+    p.saliency[4] = {-10, 0.07e-3, 0.4};
+    p.zero_saliency[0] = {-4, 0.3e-3, -0.6};
+    p.zero_saliency[1] = {0, 1.0, 0.0};
+    p.zero_saliency[2] = {5, -0.1e-3, 0.2};
     for (int k = 0; k < PLANT_LEGS; k++) {
         p.dR_ohm[k] = 0.02 * std::sin(1.0 + 2.0 * k);
         p.dL_H[k] = 0.1e-3 * std::cos(3.0 * k);
@@ -73,7 +77,7 @@ class Phases
         for (int set = 0; set < sets; set++) {
             double own = theta - pi / 6 * set; // seen from phase A or X
             MatrixXd block = MatrixXd::Constant(3, 3, p.L_0_H / 3.0);
-            block += second_harmonic(own) + saliency(own);
+            block += second_harmonic(own) + saliency(own) + zero_saliency(own);
             for (int k = 0; k < 3; k++) {
                 int next = (k + 1) % 3;
                 block(k, k) += p.dL_H[3 * set + k];
@@ -157,6 +161,23 @@ class Phases
             in_ab += h.order == 0 ? 0.0 * turned : h.amplitude * turned;
         }
         return axes * in_ab * clarke;
+    }
+
+    // Every phase has psi_0 = L/2 Re(e^{jx} i) of all three currents, and what a current makes in the others'
+    // flux they make in its own: each phase answers i_0 = sum/3 with L Re(e^{-jx} e^{-j gamma}).
+    MatrixXd zero_saliency(double own) const
+    {
+        MatrixXd L = MatrixXd::Zero(3, 3);
+        for (const plant_harmonic_t &h : p.zero_saliency) {
+            double x = h.order * own + h.phase_rad;
+            for (int a = 0; a < 3; a++) {
+                for (int b = 0; b < 3; b++) {
+                    double by_phase = h.order == 0 ? 0.0 : h.amplitude / 3.0;
+                    L(a, b) += by_phase * (std::cos(x + 2 * pi / 3 * a) + std::cos(x + 2 * pi / 3 * b));
+                }
+            }
+        }
+        return L;
     }
 
     // The rotor's axes carry M_d and M_q from the currents of X, Y, Z to the phases A, B, C
@@ -411,6 +432,94 @@ TEST(PlainWinding, CoggingIsTheSlopeOfItsEnergy)
                         winding_cogging_J(&w, rotor(theta - step_rad))) /
                        (2 * step_rad);
         EXPECT_NEAR(slope, -torque, difference);
+    }
+}
+
+// METHODS-ADDENDUM.md E2, from three equal phases: self-inductance L_m cos(m theta + phase) of A, mutual
+// inductance M_m cos(m theta + phase) of B and C, and the others a third of a turn on.
+MatrixXd equal_phases(int m, double L_m, double M_m, double phase, double theta)
+{
+    MatrixXd L(3, 3);
+    for (int a = 0; a < 3; a++) {
+        for (int b = 0; b < 3; b++) {
+            int third = (6 - a - b) % 3; // the phase that a pair leaves out
+            L(a, b) = a == b ? L_m * std::cos(m * (theta - 2 * pi / 3 * a) + phase)
+                             : M_m * std::cos(m * (theta - 2 * pi / 3 * third) + phase);
+        }
+    }
+    return L;
+}
+
+// In coordinates alpha, beta, zero
+MatrixXd clarke_of(const MatrixXd &phases)
+{
+    MatrixXd from(3, 3);
+    for (int k = 0; k < 3; k++) {
+        from.row(k) << std::cos(2 * pi / 3 * k), std::sin(2 * pi / 3 * k), 1.0;
+    }
+    return from.inverse() * phases * from;
+}
+
+TEST(SaliencyOrder, IsThatOfEqualPhases)
+{
+    constexpr double L_m = 0.3e-3, M_m = -0.04e-3, phase = 0.7;
+    for (int m : {1, 2, 4, 5, 7, 8, 10, 11}) {
+        int order = m % 3 == 2 ? m : -m;
+        double own_phase = m % 3 == 2 ? phase : -phase;
+        plant_winding_t p{};
+        p.connection = PLANT_OPEN; // so that the zero sequence shows
+        p.saliency[0] = {order, 0.5 * L_m + M_m, own_phase};
+        p.zero_saliency[0] = {order, L_m - M_m, own_phase};
+        winding_t w;
+        winding_init(&w, &p, R_s, psi_m, psi_m, 1.0);
+        for (double theta : angles) {
+            MatrixXd expected = clarke_of(equal_phases(m, L_m, M_m, phase, theta));
+            winding_point_t point{};
+            winding_at(&w, rotor_t{std::cos(theta), std::sin(theta)}, w.active, &point);
+            for (int a = 0; a < 3; a++) {
+                for (int b = 0; b < 3; b++) {
+                    EXPECT_NEAR(point.L[a][b], expected(a, b), rounding) << m << " " << a << b;
+                }
+            }
+        }
+    }
+}
+
+// What orders 3, 6, 9 of the phases make is alike in every direction, and does not reach the zero sequence.
+TEST(SaliencyOrder, OfThreeIsNone)
+{
+    for (int m : {3, 6, 9}) {
+        for (double theta : angles) {
+            MatrixXd L = clarke_of(equal_phases(m, 0.3e-3, -0.04e-3, 0.7, theta));
+            EXPECT_NEAR(L(0, 0), L(1, 1), rounding);
+            EXPECT_NEAR(L(0, 1), 0.0, rounding);
+            EXPECT_NEAR(L.row(2).head(2).norm() + L.col(2).head(2).norm(), 0.0, rounding);
+        }
+    }
+}
+
+// dL_0 and L_c0 are the second order of the list, with the signs of METHODS.md E3.
+TEST(SaliencyOrder, SecondOfTheZeroSequenceIsThatOfTheBook)
+{
+    for (int sets : {1, 2}) {
+        plant_winding_t book{}, list{};
+        book.sets = list.sets = sets;
+        book.connection = list.connection = sets == 1 ? PLANT_OPEN : PLANT_STAR;
+        book.dL_0_H = 0.4e-3;
+        book.L_c0_H = -0.15e-3;
+        list.zero_saliency[0] = {2, std::hypot(0.4e-3, 0.15e-3), std::atan2(-0.15e-3, -0.4e-3)};
+        winding_t one, other;
+        winding_init(&one, &book, R_s, psi_m, psi_m, 1.0);
+        winding_init(&other, &list, R_s, psi_m, psi_m, 1.0);
+        const double i_A[ACTIVE] = {3.0, -2.0, 1.0, 0.5}, i_A_s[ACTIVE] = {700.0, 900.0, -400.0, 100.0};
+        for (double theta : angles) {
+            for (int set = 0; set < sets; set++) {
+                rotor_t rotor = {std::cos(theta), std::sin(theta)};
+                double v_V = winding_zero_V(&one, rotor, 200.0, i_A, i_A_s, set);
+                EXPECT_GT(std::fabs(v_V), 1e-3);
+                EXPECT_NEAR(winding_zero_V(&other, rotor, 200.0, i_A, i_A_s, set), v_V, 1e-12);
+            }
+        }
     }
 }
 
