@@ -143,7 +143,7 @@ class Bench
         return set(entry_of(id)->index, entry_of(id)->sub, uint32_t(value));
     }
 
-    int32_t get(drive_param_id_t id)
+    int32_t parameter(drive_param_id_t id)
     {
         return int32_t(get(entry_of(id)->index, entry_of(id)->sub));
     }

@@ -25,10 +25,10 @@ TEST(BusParameters, AreReadAndWritten)
     x.boot(&params);
     x.run_ms(5);
     for (int id = 0; id < DRIVE_PARAM_COUNT; ++id) {
-        EXPECT_EQ(x.get(drive_param_id_t(id)), drive_param_get(&params, drive_param_id_t(id)));
+        EXPECT_EQ(x.parameter(drive_param_id_t(id)), drive_param_get(&params, drive_param_id_t(id)));
     }
     EXPECT_EQ(x.set(DRIVE_PARAM_i_max, 4321), 0U);
-    EXPECT_EQ(x.get(DRIVE_PARAM_i_max), 4321);
+    EXPECT_EQ(x.parameter(DRIVE_PARAM_i_max), 4321);
     x.run_ms(2);
     drive_params_t wanted = params;
     wanted.i_max = 4321;
@@ -54,7 +54,7 @@ TEST(BusParameters, AtAndBeyondTheirLimits)
             drive_config_t config = {};
             const bool good = drive_configure(&config, &wanted, PM_CHANNELS).ok;
             EXPECT_EQ(x.set(id, value), good ? 0U : INCOMPATIBLE) << info.name << " " << value;
-            EXPECT_EQ(x.get(id), good ? value : drive_param_get(&params, id)) << info.name;
+            EXPECT_EQ(x.parameter(id), good ? value : drive_param_get(&params, id)) << info.name;
             taken += good ? 1 : 0;
             if (good) {
                 EXPECT_EQ(x.set(id, drive_param_get(&params, id)), 0U) << info.name;
@@ -94,14 +94,14 @@ TEST(BusParameters, NothingStructuralChangesWhileRunning)
     for (int n = 0; n < DRIVE_PARAM_COUNT; ++n) {
         const auto id = drive_param_id_t(n);
         const drive_config_t before = x.loop.app.drive.config;
-        const int32_t old = x.get(id);
+        const int32_t old = x.parameter(id);
         const uint32_t code = x.set(id, old == drive_param_table[n].max ? old - 1 : old + 1);
         x.control(0x0F);
         x.run_ms(2);
         EXPECT_TRUE(drive_same_frame(&before, &x.loop.app.drive.config)) << drive_param_table[n].name;
         refused += code == STATE ? 1 : 0;
         if (code != 0) {
-            EXPECT_EQ(x.get(id), old);
+            EXPECT_EQ(x.parameter(id), old);
         }
         x.control(0x0F);
     }
@@ -126,13 +126,13 @@ TEST(BusParameters, BatchIsCheckedTogetherAndUndoneTogether)
     x.run_ms(2);
     EXPECT_EQ(x.statusword() & 0x6F, 0x40); // not while a batch is open
     EXPECT_EQ(x.set(0x2010, 1, 0), 0U);
-    EXPECT_EQ(x.get(DRIVE_PARAM_i_max), 9500);
+    EXPECT_EQ(x.parameter(DRIVE_PARAM_i_max), 9500);
     EXPECT_EQ(x.set(0x2010, 1, 1), 0U);
     EXPECT_EQ(x.set(DRIVE_PARAM_i_max, 5000), 0U);
     EXPECT_EQ(x.set(DRIVE_PARAM_v_dc_min, 390000), 0U);
     EXPECT_EQ(x.set(0x2010, 1, 0), INCOMPATIBLE);
-    EXPECT_EQ(x.get(DRIVE_PARAM_i_max), 9500);
-    EXPECT_EQ(x.get(DRIVE_PARAM_v_dc_min), params.v_dc_min);
+    EXPECT_EQ(x.parameter(DRIVE_PARAM_i_max), 9500);
+    EXPECT_EQ(x.parameter(DRIVE_PARAM_v_dc_min), params.v_dc_min);
     const od_entry_t *named = Bench::entry_of(DRIVE_PARAM_v_dc_derate);
     EXPECT_EQ(x.get(0x2010, 2), named->index * 256U + named->sub);
 }
@@ -157,7 +157,7 @@ TEST(BusParameters, WhatTheHardwareRunsWithWaitsForARestart)
     EXPECT_TRUE(x.loop.hal.reset);
     sim_loop_boot(&x.loop);
     x.run_ms(5);
-    EXPECT_EQ(x.get(DRIVE_PARAM_dead_time), 1500);
+    EXPECT_EQ(x.parameter(DRIVE_PARAM_dead_time), 1500);
     EXPECT_EQ(x.get(0x2010, 3) & 0xFF, uint32_t(APP_READY));
 }
 
@@ -219,27 +219,27 @@ TEST(BusStore, GroupsAreStoredAndForgottenByThemselves)
     EXPECT_EQ(x.set(0x1010, 2, save), 0U);
     boot_again();
     EXPECT_EQ(x.get(0x1017) & 0xFFFF, 777U);
-    EXPECT_EQ(x.get(DRIVE_PARAM_i_max), params.i_max);
-    EXPECT_EQ(x.get(DRIVE_PARAM_R_s), params.R_s);
+    EXPECT_EQ(x.parameter(DRIVE_PARAM_i_max), params.i_max);
+    EXPECT_EQ(x.parameter(DRIVE_PARAM_R_s), params.R_s);
     EXPECT_EQ(x.set(DRIVE_PARAM_i_max, 4444), 0U);
     EXPECT_EQ(x.set(DRIVE_PARAM_R_s, 5000000), 0U);
     EXPECT_EQ(x.set(0x605B, 0, 1), 0U);
     EXPECT_EQ(x.set(0x1010, uint8_t(group_of_R_s + 1), save), 0U);
     boot_again();
     EXPECT_EQ(x.get(0x1017) & 0xFFFF, 777U);
-    EXPECT_EQ(x.get(DRIVE_PARAM_R_s), 5000000);
-    EXPECT_EQ(x.get(DRIVE_PARAM_i_max), group_of_i_max == group_of_R_s ? 4444 : params.i_max);
+    EXPECT_EQ(x.parameter(DRIVE_PARAM_R_s), 5000000);
+    EXPECT_EQ(x.parameter(DRIVE_PARAM_i_max), group_of_i_max == group_of_R_s ? 4444 : params.i_max);
     EXPECT_EQ(x.set(0x605B, 0, 1), 0U);
     EXPECT_EQ(x.set(0x1010, 1, save), 0U);
     EXPECT_EQ(x.set(0x1011, 2, load), 0U);
     EXPECT_EQ(x.get(0x1017) & 0xFFFF, 777U); // until the next start
     boot_again();
     EXPECT_EQ(x.get(0x1017) & 0xFFFF, 500U);
-    EXPECT_EQ(x.get(DRIVE_PARAM_R_s), 5000000);
+    EXPECT_EQ(x.parameter(DRIVE_PARAM_R_s), 5000000);
     EXPECT_EQ(x.get(0x605B) & 0xFFFF, 1U);
     EXPECT_EQ(x.set(0x1011, 1, load), 0U);
     boot_again();
-    EXPECT_EQ(x.get(DRIVE_PARAM_R_s), params.R_s);
+    EXPECT_EQ(x.parameter(DRIVE_PARAM_R_s), params.R_s);
     EXPECT_EQ(x.get(0x605B) & 0xFFFF, 0U);
     EXPECT_EQ(x.get(0x2010, 3) & 0xFF, uint32_t(APP_NOT_STORED));
 }
