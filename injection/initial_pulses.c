@@ -45,18 +45,26 @@ static void take(initial_pulses_t *self, pm_ab_t i)
 
 static pm_procedure_t conclude(initial_pulses_t *self, const initial_pulses_config_t *config)
 {
-    if (pm_hypot(self->y.alpha, self->y.beta) < config->y_min) {
+    self->length = pm_hypot(self->y.alpha, self->y.beta);
+    if (self->length < config->y_min) {
         return PM_FAILED_SALIENCY;
     }
     self->theta = pm_atan2(self->y.beta, self->y.alpha) / 2U;
-    const pm_q_t along = pm_park(self->w, pm_dir(self->theta)).d;
-    if (pm_abs(along) < config->w_min) {
+    self->along = pm_park(self->w, pm_dir(self->theta)).d;
+    if (pm_abs(self->along) < config->w_min) {
         return PM_FAILED_POLARITY;
     }
-    if (along < 0) {
+    if (self->along < 0) {
         self->theta += PM_TURN(0.5);
     }
     return PM_DONE;
+}
+
+/* The noise of a component is a fifth of w_min. */
+pm_sigma_t initial_pulses_margin(const initial_pulses_t *self, const initial_pulses_config_t *config)
+{
+    const pm_q_t least = pm_min(self->length, pm_abs(self->along));
+    return pm_div(least / 64, config->w_min) / (1 << (PM_Q_BITS - 6 - PM_SIGMA_BITS)) * 5;
 }
 
 /* The output of a step acts over the next period, so a pulse commanded in n steps ends at step n + 1. */

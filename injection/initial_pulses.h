@@ -7,6 +7,9 @@
  *   w = sum i_k           ~ e^{j theta}             first-order saturation: the polarity
  * Both sums cancel offsets and gain errors of the sensors to first order. The torque of a pair of pulses
  * averages to zero.
+ * Each component of a sum has 2 i_noise of noise: six currents of 2/3 i_noise^2 each.
+ *   margin of saliency = |y| / (2 i_noise)
+ *   margin of polarity = |w . e^{j theta}| / (2 i_noise)
  *
  * A one-shot procedure that owns the bridge: call initial_pulses_step() each period until it is not
  * PM_RUNNING. Fails with a reason when the current does not rise or fall in time, or when y or w is too small
@@ -23,11 +26,12 @@ extern "C" {
 #endif
 
 typedef struct {
-    uint16_t periods;    /* length of a pulse */
-    uint16_t timeout;    /* periods that the decay may take */
-    pm_q_t duty;         /* of the driven leg, 0 ... 1 */
-    pm_q_t i_zero;       /* currents below count as zero */
-    pm_q_t y_min, w_min; /* least lengths of y and w that count as a result */
+    uint16_t periods; /* length of a pulse */
+    uint16_t timeout; /* periods that the decay may take */
+    pm_q_t duty;      /* of the driven leg, 0 ... 1 */
+    pm_q_t i_zero;    /* currents below count as zero */
+    pm_q_t y_min;     /* least lengths that count as a result: of y, and ... */
+    pm_q_t w_min;     /* ... of w, 10 i_noise */
 } initial_pulses_config_t;
 
 typedef struct {
@@ -36,7 +40,8 @@ typedef struct {
     uint16_t timer;
     uint16_t quiet;
     bool decaying;
-    pm_angle_t theta; /* the result */
+    pm_angle_t theta;     /* the result */
+    pm_q_t length, along; /* |y|, and w along theta */
 } initial_pulses_t;
 
 /* What the legs do in the coming period. */
@@ -48,6 +53,9 @@ typedef struct {
 void initial_pulses_reset(initial_pulses_t *self);
 pm_procedure_t initial_pulses_step(initial_pulses_t *self, const initial_pulses_config_t *config, pm_ab_t i,
                                    initial_pulses_out_t *out);
+
+/* Of a result, the smaller of the two; at most 2560. */
+pm_sigma_t initial_pulses_margin(const initial_pulses_t *self, const initial_pulses_config_t *config);
 
 #ifdef __cplusplus
 }

@@ -85,8 +85,8 @@ static const signal_row_t signals[] = {
     {OD_LIVE_I_A, offsetof(drive_t, i_abc.a), IN_CURRENT},
     {OD_LIVE_I_B, offsetof(drive_t, i_abc.b), IN_CURRENT},
     {OD_LIVE_I_C, offsetof(drive_t, i_abc.c), IN_CURRENT},
-    {OD_LIVE_OMEGA_E, offsetof(drive_t, position.pll.omega), IN_SPEED_E},
-    {OD_LIVE_VELOCITY_ACTUAL, offsetof(drive_t, position.pll.omega), IN_SPEED_MECH},
+    {OD_LIVE_OMEGA_E, offsetof(drive_t, pll.omega), IN_SPEED_E},
+    {OD_LIVE_VELOCITY_ACTUAL, offsetof(drive_t, pll.omega), IN_SPEED_MECH},
     {OD_LIVE_VELOCITY_DEMAND, offsetof(drive_t, status.omega_ref), IN_SPEED_MECH},
     {OD_LIVE_DC_LINK_VOLTAGE, offsetof(drive_t, status.v_dc), IN_VOLTAGE},
     {OD_LIVE_QUALITY, offsetof(drive_t, status.quality), IN_SHARE},
@@ -294,6 +294,6 @@ cia402_in_t app_drive_facts(const app_t *app)
         .voltage = drive->status.v_dc >= limit->v_dc_min && drive->status.v_dc <= limit->v_dc_max,
         .limited = (drive->status.limits & ~derated) != 0U,
         .warning = (drive->status.limits & derated) != 0U,
-        .velocity = app_in_units(drive->position.pll.omega, unit.base, unit.exponent),
+        .velocity = app_in_units(drive->pll.omega, unit.base, unit.exponent),
     };
 }

@@ -173,6 +173,6 @@ enum {
     OD_BYTES_COUNT = 3,
 };
 
-enum { OD_PARAMETER_COUNT = 72 };
+enum { OD_PARAMETER_COUNT = 73 };
 
 #endif

@@ -124,6 +124,14 @@ static void make_limits(maker_t *m, drive_config_t *config)
     config->dL = config->current.L_d - config->current.L_q;
 }
 
+static sequence_id_t start_of(const drive_params_t *params, bool injection)
+{
+    if (!injection || params->start_method == 3) {
+        return SEQUENCE_align;
+    }
+    return params->start_fallback == 0 ? SEQUENCE_pulses : SEQUENCE_pulses_align;
+}
+
 /* What is beyond the range is refused by those who use it. */
 static pm_q_t i_d_rated(const maker_t *m, const mtpa_config_t *mtpa)
 {
@@ -147,7 +155,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     config->pole_pairs = pole_pairs(&m);
     config->slow_divider = m.slow_divider;
     config->injection = params->start_method % 2 == 1 || (params->start_method == 0 && salient(&m));
-    config->align_first = !config->injection || params->start_method == 3;
+    config->start = (uint8_t)start_of(params, config->injection);
     make_modulator(&m, &config->modulator);
     make_current_control(&m, &config->current);
     make_speed_control(&m, &config->speed);
@@ -161,7 +169,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
                                config->position.mismatch.id != MISMATCH_OFF ||
                                config->position.loop.id != LOOP_PLL ||
                                config->speed_estimate.id != SPEED_LOOP;
-    if (!config->align_first) {
+    if (config->start != (uint8_t)SEQUENCE_align) {
         make_pulses(&m, &config->pulses);
     }
     make_open_loop(&m, &config->open_loop);

@@ -11,6 +11,7 @@
 #include "firmware/control/mtpa.h"
 #include "firmware/control/speed_control.h"
 #include "firmware/drive/position.h"
+#include "firmware/drive/procedures/sequence.h"
 #include "firmware/math/num.h"
 #include "firmware/params/types.h"
 #include "injection/initial_pulses.h"
@@ -60,7 +61,7 @@ typedef struct {
     pm_num_t pole_pairs;
     uint32_t slow_divider; /* periods per drive_slow(): the nearest to 1 ms */
     bool injection;        /* injection leads at low speed; else open-loop start */
-    bool align_first;      /* the initial position comes from aligning, not from pulses */
+    uint8_t start;         /* SEQUENCE_...: how the initial position is found */
     int32_t k_theta;       /* pm_omega_to_angle() */
     pm_q_t i_max;
     pm_q_t i_d_light;

@@ -2,6 +2,7 @@
 
 #include "firmware/drive/drive_parts.h"
 #include "firmware/math/compiler.h"
+#include "firmware/math/image.h"
 #include "firmware/math/pair.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
@@ -34,7 +35,7 @@ bool drive_same_frame(const drive_config_t *a, const drive_config_t *b)
     const drive_base_t *y = &b->base;
     return same(x->v, y->v) && same(x->i, y->i) && same(x->omega, y->omega) && same(x->t_s, y->t_s) &&
            same(a->pole_pairs, b->pole_pairs) && a->modulator.counts == b->modulator.counts &&
-           a->injection == b->injection && a->align_first == b->align_first;
+           a->injection == b->injection && a->start == b->start;
 }
 
 PM_RARE void drive_reconfigure(drive_t *drive, const drive_config_t *config)
@@ -63,7 +64,7 @@ PM_RARE void drive_command(drive_t *drive, const drive_command_t *command)
     drive->taken = drive->taken && same_references;
     drive->command = *command;
     drive->command.mode = mode;
-    if (!command->enable && drive->stage == STAGE_IDENTIFY) {
+    if (!command->enable && drive->stage == STAGE_PROCEDURE) {
         drive->stage = STAGE_OFF; /* nothing to slow down: the period that comes is without voltage */
     }
 }
@@ -135,69 +136,60 @@ static inline void measure(drive_t *drive, const drive_in_t *in)
     drive->status.v_dc = pm_shl(in->v_dc, VOLTAGE_BITS);
 }
 
-static void calibrate(drive_t *drive, const drive_in_t *in)
-{
-    calibration_t *self = &drive->start.calibration;
-    if (self->count >= DRIVE_OFFSET_PERIODS) {
-        return;
-    }
-    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-        self->sum[x] += in->i_leg[x];
-    }
-    self->count++;
-    if (self->count == DRIVE_OFFSET_PERIODS) {
-        for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-            drive->zero[x] = pm_shl(self->sum[x], CURRENT_BITS - DRIVE_OFFSET_BITS);
-        }
-    }
-}
-
-static void pulses(drive_t *drive, drive_out_t *out)
-{
-    initial_pulses_out_t p = {.driven = false};
-    if (drive->pulses_state == PM_RUNNING) {
-        drive->pulses_state =
-            initial_pulses_step(&drive->start.pulses, &drive->config.pulses, drive->i_ab, &p);
-    }
-    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-        const int32_t on = pm_mulh(p.duty[x], pm_shl(drive->config.modulator.counts, 32 - PM_Q_BITS));
-        out->compare[x][0] = (uint16_t)on;
-        out->compare[x][1] = (uint16_t)on;
-    }
-    out->legs = p.driven ? PM_LEGS_PWM : PM_LEGS_OFF;
-}
-
 static void off(drive_out_t *out)
 {
     out->legs = PM_LEGS_OFF;
 }
 
-/* A period without control: a fault, the bridge off, calibration, pulses. */
-PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_out_t *out)
+/* Only those that drive the legs themselves have a step. */
+#define STEP(name)                                                                                           \
+    PM_IN_IMAGE(name, case PROCEDURE_##name                                                                  \
+                : drive->procedure.result = procedure_##name##_step(drive, in, out);                         \
+                break;)
+#define STEP_BARE(name)  STEP(name)
+#define STEP_LEGS(name)  STEP(name)
+#define STEP_ALONE(name) STEP(name)
+#define STEP_CONTROL(name)
+
+/* The procedure that has the legs, until it ends. */
+static inline void procedure_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
 {
-    drive->hw_fault = in->hw_fault;
-    protection_step(drive);
-    drive->v_acting = drive->v_next;
-    drive->v_next = (pm_ab_t){0, 0};
-    drive->status.theta = drive->position.pll.theta;
-    out->trip = drive->fault != DRIVE_FAULT_NONE ? 1U : 0U;
-    if (drive->stage == STAGE_PULSES) {
-        pulses(drive, out);
-    } else {
+    if (drive->procedure.result != PM_RUNNING) {
         off(out);
-        if (drive->stage == STAGE_CALIBRATE) {
-            calibrate(drive, in);
-        }
+        return;
+    }
+    switch (drive->sequence.procedure) {
+#define PM_METHOD(name, help, traits, needs) STEP_##traits(name)
+#include "firmware/drive/procedures/procedures.def"
+#undef PM_METHOD
+    default:
+        break;
     }
 }
 
-/* Nothing estimates the position: an identification, or no control at all. */
-PM_RARE static void without_position(drive_t *drive, const drive_in_t *in, drive_out_t *out)
+/* Currents and DC link need not be looked at twice, and cannot be before the calibration. */
+static inline bool is_checked(const drive_t *drive, const drive_in_t *in)
 {
-    if (drive->stage == STAGE_IDENTIFY && !in->hw_fault && protection_passed(drive)) {
-        commissioning_step(drive, out);
-    } else {
-        without_control(drive, in, out);
+    return drive->stage == STAGE_PROCEDURE && drive->state != DRIVE_CALIBRATING && !in->hw_fault &&
+           protection_passed(drive);
+}
+
+/* A period without control: a fault, the bridge off, or a procedure that has the legs. */
+PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_out_t *out)
+{
+    const bool checked = is_checked(drive, in);
+    drive->v_acting = drive->v_next;
+    out->trip = 0;
+    if (!checked) {
+        drive->v_next = (pm_ab_t){0, 0};
+        drive->hw_fault = in->hw_fault;
+        protection_step(drive);
+        drive->status.theta = drive->pll.theta;
+        off(out);
+        out->trip = drive->fault != DRIVE_FAULT_NONE ? 1U : 0U;
+    }
+    if (checked || drive->stage == STAGE_PROCEDURE) {
+        procedure_step(drive, in, out);
     }
 }
 
@@ -256,7 +248,7 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
     drive->period++;
     measure(drive, in);
     if (drive->stage < STAGE_OPEN_LOOP || in->hw_fault || !protection_passed(drive)) {
-        without_position(drive, in, out);
+        without_control(drive, in, out);
     } else {
         const pm_ab_t v = pm_pair_ab(&drive->v_acting);
         const pm_ab_t next = pm_pair_ab(&drive->v_next);
@@ -283,8 +275,8 @@ PM_RARE void drive_prepare(drive_t *drive)
     const drive_config_t *c = &drive->config;
     const bool open = drive->stage == STAGE_OPEN_LOOP;
     const pm_q_t v_dc = drive->status.v_dc;
-    const bool imposed = open || drive->stage == STAGE_IDENTIFY;
-    const pm_q_t omega = imposed ? drive->omega_open : drive->position.pll.omega;
+    const bool imposed = open || drive->stage == STAGE_PROCEDURE;
+    const pm_q_t omega = imposed ? drive->omega_open : drive->pll.omega;
     const int32_t turn = pm_omega_to_angle(omega, c->k_theta);
     /* On an imposed angle an observer drifts at low speed, and on the way up it slips. */
     const pm_q_t lead_to = open_loop_ramps(drive) ? c->position.omega_high : c->position.omega_low;

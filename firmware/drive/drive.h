@@ -117,8 +117,9 @@ typedef struct {
     pm_dq_t i, i_ref; /* estimated frame */
     pm_ab_t v;        /* voltage realised by the step's output */
     pm_q_t v_dc;
-    pm_q_t weight;  /* 0: injection, 1: flux observer */
-    pm_q_t quality; /* 1: good, 0: lost */
+    pm_q_t weight;           /* 0: injection, 1: flux observer */
+    pm_q_t quality;          /* 1: good, 0: lost */
+    drive_refusal_t refusal; /* of the present start or the last */
 } drive_status_t;
 
 typedef struct drive drive_t; /* caller-owned: the struct stands in drive_state.h */

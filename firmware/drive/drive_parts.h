@@ -46,15 +46,10 @@ void reference_reset(drive_t *drive, pm_q_t i_q);
 
 /* open_loop.c: align, open-loop start, current mode, hand-over to the observer and back. */
 void open_loop_start(drive_t *drive);
+void open_loop_hold(drive_t *drive); /* the vector stays, but for a rotor that swings */
 void open_loop_slow(drive_t *drive);
 void open_loop_resume(drive_t *drive);
 bool open_loop_ramps(const drive_t *drive); /* the imposed speed is not what is wanted yet */
-
-/* commissioning/commissioning.c: identification. Started after the calibration, with the bridge still off. */
-void commissioning_start(drive_t *drive);
-void commissioning_slow(drive_t *drive);
-void commissioning_abort(drive_t *drive);                  /* it has not come to its end */
-void commissioning_step(drive_t *drive, drive_out_t *out); /* bridge.c: one period */
 
 #ifdef __cplusplus
 }

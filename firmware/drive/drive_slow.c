@@ -1,5 +1,7 @@
 #include "firmware/drive/drive_parts.h"
 
+#include "firmware/math/compiler.h"
+
 /* Injection settles on the position of the pulses, without torque. */
 #define SETTLE_MS 30
 /* Standstill that ends a stop. */
@@ -13,55 +15,40 @@ static void enter(drive_t *drive, drive_state_t state, drive_stage_t stage)
     drive->still_ms = 0;
 }
 
-static void switch_off(drive_t *drive)
+PM_RARE static void switch_off(drive_t *drive)
 {
+    procedure_abort(drive);
     enter(drive, DRIVE_OFF, STAGE_OFF);
 }
 
-static void begin_calibration(drive_t *drive)
+PM_RARE static void begin_step(drive_t *drive, uint32_t step)
 {
-    drive->start.calibration = (calibration_t){0};
-    enter(drive, DRIVE_CALIBRATING, STAGE_CALIBRATE);
-}
-
-static void begin_finding(drive_t *drive)
-{
-    const bool pulses = !drive->config.align_first && drive->command.mode != DRIVE_MODE_CURRENT;
-    initial_pulses_reset(&drive->start.pulses);
-    drive->pulses_state = PM_RUNNING;
+    drive->sequence.step = (uint8_t)step;
+    drive->state_ms = 0;
+    drive->still_ms = 0;
     drive->stall_ms = 0;
     drive->lost_ms = 0;
     drive->sum_ms = 0;
-    if (pulses) {
-        enter(drive, DRIVE_FINDING, STAGE_PULSES);
-    } else {
-        enter(drive, DRIVE_FINDING, STAGE_OFF);
-        open_loop_start(drive);
-    }
+    procedure_begin(drive, (procedure_id_t)sequence_step((sequence_id_t)drive->sequence.id, step)->procedure);
 }
 
-static void finish_calibration(drive_t *drive)
+PM_RARE static void begin_sequence(drive_t *drive)
 {
-    if (drive->start.calibration.count < DRIVE_OFFSET_PERIODS) {
-        return;
-    }
-    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-        if (pm_abs(drive->zero[x] - PM_ONE) > pm_shl(drive->config.protection.offset_max, PM_Q_BITS - 15)) {
-            drive_trip(drive, DRIVE_FAULT_SENSOR_OFFSET);
-            return;
-        }
-    }
-    if (drive->command.mode == DRIVE_MODE_IDENTIFY) {
-        drive->state = DRIVE_RUNNING;
-        drive->sum_ms = 0;
-        commissioning_start(drive);
+    uint8_t id = drive->config.start;
+    if (drive->command.mode == DRIVE_MODE_CURRENT) {
+        id = (uint8_t)SEQUENCE_align;
+    } else if (drive->command.mode == DRIVE_MODE_IDENTIFY) {
+        id = (uint8_t)SEQUENCE_identify;
     } else {
-        begin_finding(drive);
+        /* as configured */
     }
+    drive->sequence = (sequence_t){.id = id};
+    drive->status.refusal = (drive_refusal_t){0};
+    begin_step(drive, 0);
 }
 
 /* The rotor stands at theta: injection takes over. */
-static void begin_injection(drive_t *drive, pm_angle_t theta)
+PM_RARE static void begin_injection(drive_t *drive, pm_angle_t theta)
 {
     position_reset(&drive->position, &drive->config.position, theta, drive->i_ab, true);
     current_control_reset(&drive->current, (pm_dq_t){0, 0});
@@ -70,54 +57,69 @@ static void begin_injection(drive_t *drive, pm_angle_t theta)
     drive->state_ms = 0;
 }
 
-static void finish_pulses(drive_t *drive)
-{
-    if (drive->pulses_state == PM_DONE) {
-        begin_injection(drive, drive->start.pulses.theta);
-    } else if (drive->pulses_state != PM_RUNNING) {
-        drive_trip(drive, DRIVE_FAULT_POSITION_NOT_FOUND);
-    }
-}
-
-static void finish_align(drive_t *drive)
+/* The sequence has come to its end: injection from there on, or the open loop that aligned the rotor. */
+static void begin_running(drive_t *drive)
 {
     if (drive->config.injection && drive->command.mode != DRIVE_MODE_CURRENT) {
-        begin_injection(drive, drive->theta_open);
+        begin_injection(drive, drive->sequence.theta);
     } else {
         drive->state = DRIVE_RUNNING;
     }
 }
 
-static void find(drive_t *drive)
+/* A procedure has come to its end, this way or that. */
+PM_RARE static void advance(drive_t *drive, pm_procedure_t result)
 {
-    switch (drive->stage) {
-    case STAGE_PULSES:
-        finish_pulses(drive);
+    sequence_t *self = &drive->sequence;
+    const uint32_t next = sequence_next(sequence_step((sequence_id_t)self->id, self->step), result);
+    if (result != PM_DONE) {
+        drive->status.refusal = (drive_refusal_t){.procedure = self->procedure, .reason = (uint8_t)result};
+    }
+    self->procedure = (uint8_t)PROCEDURE_NONE;
+    switch (next) {
+    case SEQUENCE_FAULT:
+        drive_trip(drive,
+                   result == PM_FAILED_OFFSET ? DRIVE_FAULT_SENSOR_OFFSET : DRIVE_FAULT_POSITION_NOT_FOUND);
         break;
-    case STAGE_OPEN_LOOP:
-        open_loop_slow(drive);
-        if (drive->state_ms >= drive->config.open_loop.align_ms) {
-            finish_align(drive);
-        }
+    case SEQUENCE_RUN:
+        begin_running(drive);
+        break;
+    case SEQUENCE_WAIT:
+        drive->stage = STAGE_OFF;
         break;
     default:
-        position_slow(&drive->position, &drive->config.position, drive->i_ab, drive->status.i);
-        drive->i_ref = (pm_dq_t){0, 0};
-        if (drive->state_ms >= SETTLE_MS) {
-            reference_reset(drive, 0);
-            drive->state = DRIVE_RUNNING;
-        }
+        begin_step(drive, next);
         break;
     }
 }
 
-/* Withdrawing the command ends it at once: the speed is not known, so there is no ramp. */
-static void identify(drive_t *drive, bool enable)
+/* Injection finds its way from where the rotor stands. */
+PM_RARE static void settle(drive_t *drive)
 {
-    commissioning_slow(drive);
-    if (!enable) {
-        commissioning_abort(drive);
+    position_slow(&drive->position, &drive->config.position, drive->i_ab, drive->status.i);
+    drive->i_ref = (pm_dq_t){0, 0};
+    if (drive->state_ms >= SETTLE_MS) {
+        reference_reset(drive, 0);
+        drive->state = DRIVE_RUNNING;
+    }
+}
+
+/* The end of the command ends it at once: there is no speed that the drive knows. Then the legs are off
+ * already, also when the command has come back meanwhile, to which another start belongs. */
+static void start(drive_t *drive)
+{
+    const bool working = drive->sequence.procedure != (uint8_t)PROCEDURE_NONE;
+    if (!drive->command.enable || (working && drive->stage == STAGE_OFF)) {
         switch_off(drive);
+    } else if (working) {
+        const pm_procedure_t result = procedure_slow(drive);
+        if (result != PM_RUNNING) {
+            advance(drive, result);
+        }
+    } else if (drive->stage == STAGE_VECTOR) {
+        settle(drive);
+    } else {
+        /* waits until enable is taken back */
     }
 }
 
@@ -153,33 +155,22 @@ static void move(drive_t *drive)
 {
     const bool enable = drive->command.enable;
     if (!enable && drive->command.coast) {
-        commissioning_abort(drive);
         switch_off(drive);
         return;
     }
     switch (drive->state) {
     case DRIVE_OFF:
         if (enable) {
-            begin_calibration(drive);
+            begin_sequence(drive);
         }
         break;
     case DRIVE_CALIBRATING:
-        if (enable) {
-            finish_calibration(drive);
-        } else {
-            switch_off(drive);
-        }
-        break;
     case DRIVE_FINDING:
-        if (enable) {
-            find(drive);
-        } else {
-            switch_off(drive);
-        }
+        start(drive);
         break;
     case DRIVE_RUNNING:
         if (drive->command.mode == DRIVE_MODE_IDENTIFY) {
-            identify(drive, enable);
+            start(drive);
             break;
         }
         run(drive);
@@ -197,15 +188,22 @@ static void move(drive_t *drive)
     }
 }
 
-/* Nothing is known of a rotor that turns without current control. */
+/* A procedure that is not part of a start has currents of its own, and goes on with the command that it began
+ * with. */
+static bool is_alone(const drive_t *drive)
+{
+    return drive->stage == STAGE_PROCEDURE && drive->state == DRIVE_RUNNING;
+}
+
+/* Of a rotor that turns without current control nothing is known. */
 static void report_nothing(drive_t *drive)
 {
     drive_status_t *s = &drive->status;
-    if (drive->stage != STAGE_IDENTIFY) { /* which has currents of its own */
+    if (!is_alone(drive)) {
         drive->i_ref = (pm_dq_t){0, 0};
         s->i = (pm_dq_t){0, 0};
     }
-    drive->position.pll = (pm_pll_t){.theta = 0}; /* the step copies the angle from there */
+    drive->pll = (pm_pll_t){.theta = 0}; /* the step copies the angle from there */
     s->omega = 0;
     s->omega_ref = 0;
     s->weight = 0;
@@ -236,7 +234,7 @@ void drive_slow(drive_t *drive, const drive_slow_in_t *in)
     drive->current.limited = false;
     drive->modulator.limited = false;
     if (drive->fault == DRIVE_FAULT_NONE) {
-        if (!drive->taken && drive->stage != STAGE_IDENTIFY) { /* which goes on with what it began with */
+        if (!drive->taken && !is_alone(drive)) {
             reference_take(drive);
             drive->taken = true;
         }
@@ -245,7 +243,7 @@ void drive_slow(drive_t *drive, const drive_slow_in_t *in)
         protection_slow(drive);
     }
     if (drive->fault != DRIVE_FAULT_NONE) {
-        commissioning_abort(drive);
+        procedure_abort(drive);
         drive->state = DRIVE_FAULT;
         drive->stage = STAGE_OFF;
     }

@@ -2,41 +2,17 @@
 #ifndef DRIVE_DRIVE_STATE_H
 #define DRIVE_DRIVE_STATE_H
 
-#include "firmware/drive/commissioning/commissioning.h"
 #include "firmware/drive/drive.h"
+#include "firmware/drive/procedures/procedure.h"
+#include "firmware/drive/procedures/sequence.h"
 
 /* What drive_step() does; drive_slow() moves it on. */
 typedef enum {
     STAGE_OFF,
-    STAGE_CALIBRATE,
-    STAGE_PULSES,
-    STAGE_IDENTIFY,
+    STAGE_PROCEDURE, /* a procedure has the legs, each by itself */
     STAGE_OPEN_LOOP, /* current vector at an imposed angle */
     STAGE_VECTOR,    /* field-oriented control at the estimated angle */
 } drive_stage_t;
-
-#define DRIVE_OFFSET_BITS    10
-#define DRIVE_OFFSET_PERIODS 1024U /* 2^DRIVE_OFFSET_BITS */
-
-/* Offsets of the current channels: means of so many periods. */
-typedef struct {
-    int32_t sum[DRIVE_LEGS];
-    uint16_t count; /* periods taken */
-} calibration_t;
-
-/* Before the position is estimated: the loop stays as it was. */
-typedef struct {
-    pm_pll_t pll;
-    union {
-        calibration_t calibration;
-        initial_pulses_t pulses;
-    };
-} drive_start_t;
-
-typedef struct {
-    pm_pll_t pll;
-    commissioning_t work;
-} drive_identify_t;
 
 struct drive {
     drive_config_t config;
@@ -61,12 +37,11 @@ struct drive {
     pm_ab_t v_next;    /* commanded at k: acts over [k+1, k+2) */
     modulator_t modulator;
 
-    union { /* as long as nothing estimates the position, what comes before; its loop stays as it was */
-        position_t position;
-        drive_start_t start;
-        drive_identify_t identify;
+    union {                    /* the stage says which: */
+        pm_pll_t pll;          /* always, the first of both: angle and speed, zero below STAGE_OPEN_LOOP */
+        position_t position;   /* from STAGE_OPEN_LOOP on */
+        procedure_t procedure; /* in STAGE_PROCEDURE */
     };
-    pm_procedure_t pulses_state;
     current_control_t current;
     speed_control_t speed;
     field_weakening_t field_weakening;
@@ -95,6 +70,8 @@ struct drive {
     drive_fault_record_t record;
     commissioning_report_t commissioning_report;
     speed_t speed_estimate;
+    sequence_t sequence;
+    procedure_beside_t beside;
 };
 
 #endif

@@ -13,7 +13,6 @@
 void open_loop_start(drive_t *drive)
 {
     drive->stage = STAGE_OPEN_LOOP;
-    drive->state_ms = 0;
     drive->agree_ms = 0;
     drive->theta_open = SWEEP_FROM;
     drive->omega_ramp = 0;
@@ -92,7 +91,7 @@ static void damp(drive_t *drive)
     drive->omega_open = drive->omega_ramp - pm_small_gain(pm_small(swing), c->open_loop.per_swing);
 }
 
-void open_loop_slow(drive_t *drive)
+void open_loop_hold(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
     const bool current_mode = drive->command.mode == DRIVE_MODE_CURRENT;
@@ -100,11 +99,13 @@ void open_loop_slow(drive_t *drive)
     drive->i_open = approach(drive->i_open, i_wanted, c->open_loop.i_slope);
     drive->i_ref = (pm_dq_t){.d = drive->i_open, .q = 0};
     damp(drive);
-    if (drive->state_ms < c->open_loop.align_ms) {
-        const bool sweeping = 2U * drive->state_ms <= c->open_loop.align_ms;
-        drive->theta_open += sweeping ? c->open_loop.sweep : 0U;
-        return;
-    }
+}
+
+void open_loop_slow(drive_t *drive)
+{
+    const drive_config_t *c = &drive->config;
+    const bool current_mode = drive->command.mode == DRIVE_MODE_CURRENT;
+    open_loop_hold(drive);
     const pm_q_t target = wanted_speed(drive);
     drive->omega_ramp = approach(drive->omega_ramp, target, c->open_loop.slope);
 

@@ -13,11 +13,17 @@ void drive_trip(drive_t *drive, drive_fault_t fault)
         .fault = fault,
         .i = drive->i_abc,
         .v_dc = drive->status.v_dc,
-        .omega = drive->position.pll.omega,
-        .theta = drive->position.pll.theta,
+        .omega = drive->pll.omega,
+        .theta = drive->pll.theta,
         .temperature_dC = drive->temperature_dC,
         .period = drive->period,
+        .refusal = drive->status.refusal,
     };
+}
+
+static bool is_live(const drive_t *drive)
+{
+    return drive->stage != STAGE_OFF && drive->state != DRIVE_CALIBRATING;
 }
 
 void protection_step(drive_t *drive)
@@ -25,7 +31,7 @@ void protection_step(drive_t *drive)
     const protection_config_t *c = &drive->config.protection;
     const pm_q_t v_dc = drive->status.v_dc;
     /* before the calibration the offsets are not known, and nothing is driven */
-    const bool live = drive->stage > STAGE_CALIBRATE;
+    const bool live = is_live(drive);
     if (drive->hw_fault) {
         drive_trip(drive, DRIVE_FAULT_HARDWARE);
     } else if (live && !protection_currents_passed(drive)) {
@@ -58,14 +64,14 @@ void protection_slow(drive_t *drive)
     if (drive->temperature_dC >= c->temp_trip_dC) {
         drive_trip(drive, DRIVE_FAULT_OVER_TEMPERATURE);
     }
-    if (drive->stage <= STAGE_CALIBRATE) {
+    if (!is_live(drive)) {
         return;
     }
     const pm_q_t sum = drive->i_abc.a + drive->i_abc.b + drive->i_abc.c;
     if (lasts(&drive->sum_ms, pm_abs(sum) > c->i_sum, 2)) {
         drive_trip(drive, DRIVE_FAULT_SENSOR_SUM);
     }
-    const pm_q_t omega = drive->position.pll.omega;
+    const pm_q_t omega = drive->pll.omega;
     if (turning && pm_abs(omega) > PM_ONE) {
         drive_trip(drive, DRIVE_FAULT_OVER_SPEED);
     }

@@ -17,7 +17,7 @@
 #define RECORD_MAGIC "PMREC002"
 #define RECORD_LEGS  3
 
-enum { RECORD_LAYOUT = 24 }; /* figures of record_layout() */
+enum { RECORD_LAYOUT = 27 }; /* figures of record_layout() */
 enum { RECORD_COMMAND = 1, RECORD_CLEAR = 2 };
 
 typedef struct {

@@ -10,12 +10,10 @@ static int mode_of(const drive_t *drive)
     switch (drive->stage) {
     case STAGE_OFF:
         return FIGURE_OFF;
-    case STAGE_CALIBRATE:
-        return FIGURE_CALIBRATE;
-    case STAGE_PULSES:
-        return FIGURE_PULSES;
-    case STAGE_IDENTIFY:
-        return FIGURE_IDENTIFY;
+    case STAGE_PROCEDURE:
+        return drive->state == DRIVE_CALIBRATING ? FIGURE_CALIBRATE
+               : drive->state == DRIVE_RUNNING   ? FIGURE_IDENTIFY
+                                                 : FIGURE_PULSES;
     case STAGE_OPEN_LOOP:
         return drive->state == DRIVE_FINDING ? FIGURE_ALIGN : FIGURE_OPEN_LOOP;
     case STAGE_VECTOR:

@@ -9,7 +9,7 @@
 /* Timer counts are carried in 128ths: the fraction that one period cannot output is added to the next. */
 #define PART 128U
 
-void commissioning_clear_sums(commissioning_t *self)
+void commissioning_clear_sums(identify_t *self)
 {
     for (uint32_t n = 0; n < sizeof self->sum / sizeof self->sum[0]; n++) {
         self->sum[n] = 0;
@@ -17,29 +17,29 @@ void commissioning_clear_sums(commissioning_t *self)
     self->samples = 0;
 }
 
-pm_q_t commissioning_mean(const commissioning_t *self, uint32_t n)
+pm_q_t commissioning_mean(const identify_t *self, uint32_t n)
 {
     return (pm_q_t)pm_quotient(self->sum[n], self->samples);
 }
 
 void commissioning_start_current(drive_t *drive)
 {
-    const pm_dq_t v = {.d = drive->identify.work.v.alpha, .q = drive->identify.work.v.beta};
+    const pm_dq_t v = {.d = drive->procedure.identify.v.alpha, .q = drive->procedure.identify.v.beta};
     current_control_reset(&drive->current, v);
     drive->i_ref = (pm_dq_t){0, 0};
     drive->omega_open = 0;
-    drive->identify.work.kind = KIND_CURRENT;
+    drive->procedure.identify.kind = KIND_CURRENT;
 }
 
 /* A bandwidth of f_pwm / 21: kp = 0.3 L / T_s, ki = 0.3 R. */
 void commissioning_set_gains(drive_t *drive)
 {
-    const commissioning_t *self = &drive->identify.work;
+    const identify_t *self = &drive->procedure.identify;
     const pm_q_t per_period = pm_div(self->L_d, 4 * commissioning_period(drive)); /* of L / T_s, a quarter */
     const pm_gain_t kp = pm_mul_sat(per_period, PM_Q(0.3));
     const pm_gain_t ki = pm_mul(self->R, PM_Q(0.3)) / 4;
     const pm_q_t ratio = pm_sat(pm_div(ki, kp), PM_Q_BITS - 1);
-    drive->identify.work.pi = (pm_pi_config_t){.kp = kp, .ki = ki, .kb = pm_shl(ratio, 31 - PM_Q_BITS)};
+    drive->procedure.identify.pi = (pm_pi_config_t){.kp = kp, .ki = ki, .kb = pm_shl(ratio, 31 - PM_Q_BITS)};
 }
 
 /* A share of the period in Q20; the fraction of a count left over goes into the next period. */
@@ -53,7 +53,7 @@ static inline void write_leg(int32_t share, int32_t parts, int32_t *rest, uint16
 
 static inline void write_legs(drive_t *drive, pm_abc_t u, drive_out_t *out)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     const int32_t per_volt = pm_per_volt(drive->status.v_dc);
     const int32_t parts = pm_shl(drive->config.modulator.counts, 39 - 31); /* PART, and a share in Q31 */
     write_leg(pm_mulh_add(PM_SHARE_HALF, u.a, per_volt), parts, &self->rest[0], out->compare[0]);
@@ -65,7 +65,7 @@ static inline void write_legs(drive_t *drive, pm_abc_t u, drive_out_t *out)
 
 static inline pm_wide_t axis_voltage(const drive_t *drive, pm_pi_t *pi, pm_q_t error)
 {
-    const pm_pi_config_t *c = &drive->identify.work.pi;
+    const pm_pi_config_t *c = &drive->procedure.identify.pi;
     const pm_wide_t top = pm_gain(drive->status.v_dc, PM_GAIN(0.4));
     const pm_wide_t u = pm_pi_output(pi, c, error, 0);
     const pm_wide_t limited = pm_clamp(u, -top, top);
@@ -89,7 +89,7 @@ static inline pm_abc_t regain(pm_abc_t u, pm_half_dir_t dir, pm_q_t lost)
  * the EMF of a swinging rotor drives a current through the winding's own resistance, which damps it. */
 static inline pm_abc_t turn(drive_t *drive)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     const int32_t step = drive->turn_open;
     drive->theta_open += (pm_angle_t)step;
     const pm_dir_t dir = pm_dir(drive->theta_open);
@@ -115,7 +115,7 @@ static inline pm_abc_t turn(drive_t *drive)
 
 static void hold_voltage(drive_t *drive)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     self->sum[0] += drive->i_ab.alpha;
     self->sum[1] += drive->i_ab.beta;
     self->sum[2] += drive->v_acting.alpha;
@@ -126,7 +126,7 @@ static void hold_voltage(drive_t *drive)
 /* The voltage of the wave, and that of the d-axis during a wave on q. */
 static void wave(drive_t *drive, pm_ab_t v_past)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     square_step(drive, v_past);
     const pm_q_t bias = self->of.square.bias;
     if (bias != 0) {
@@ -134,11 +134,12 @@ static void wave(drive_t *drive, pm_ab_t v_past)
     }
 }
 
-PM_APART void commissioning_step(drive_t *drive, drive_out_t *out)
+PM_APART pm_procedure_t procedure_identify_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
 {
-    commissioning_t *self = &drive->identify.work;
-    const pm_ab_t v_past = pm_pair_ab(&drive->v_acting);
-    drive->v_acting = drive->v_next;
+    (void)in;
+    identify_t *self = &drive->procedure.identify;
+    const pm_ab_t v_past = pm_pair_ab(&self->v_past);
+    self->v_past = drive->v_acting;
     pm_abc_t u;
     if (self->kind == (uint8_t)KIND_CURRENT) {
         u = turn(drive);
@@ -153,4 +154,5 @@ PM_APART void commissioning_step(drive_t *drive, drive_out_t *out)
     drive->status.theta = drive->theta_open;
     drive->v_next = self->v;
     write_legs(drive, u, out);
+    return PM_RUNNING; /* its slow part knows the end */
 }

@@ -1,17 +1,10 @@
 /* The sequence of the identification. */
 #include "firmware/drive/commissioning/commissioning.h"
 
-#include <stddef.h>
-
 #include "firmware/drive/commissioning/commissioning_parts.h"
 #include "firmware/math/root.h"
 
 #define HOLD_MS 500U
-
-/* The position that others read stays as it was. */
-_Static_assert(offsetof(drive_t, identify.work) + sizeof(commissioning_t) <=
-                   offsetof(drive_t, position.weight),
-               "fits beside the loop's speed and the quality");
 
 enum {
     SWEEP,
@@ -50,7 +43,7 @@ static pm_q_t assumed_loss(const drive_t *drive)
  * parameters. */
 static void know(drive_t *drive)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     const commissioning_result_t *r = &drive->commissioning_report.result;
     const current_control_config_t *c = &drive->config.current;
     self->L_d = r->L_d != 0 ? r->L_d : c->L_d;
@@ -87,7 +80,7 @@ static bool is_wanted(uint8_t routines, uint32_t phase)
 
 static void enter(drive_t *drive, uint8_t phase)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     self->phase = phase;
     self->part = 0;
     self->ms = 0;
@@ -126,7 +119,7 @@ static void enter(drive_t *drive, uint8_t phase)
 /* The vector returns the rotor to phase A; then the rotor has time to come to rest. */
 static phase_result_t hold(drive_t *drive, bool full)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     const pm_q_t i = full ? commissioning_current(drive) : commissioning_current(drive) / 2;
     const int32_t left = pm_angle_diff(0U, drive->theta_open);
     const int32_t most = (int32_t)(PM_TURN(0.5) / HOLD_MS);
@@ -138,7 +131,7 @@ static phase_result_t hold(drive_t *drive, bool full)
 
 static phase_result_t phase_slow(drive_t *drive)
 {
-    switch (drive->identify.work.phase) {
+    switch (drive->procedure.identify.phase) {
     case SWEEP:
         return sweep_slow(drive);
     case LEVELS:
@@ -168,36 +161,39 @@ static phase_result_t phase_slow(drive_t *drive)
 
 static void finish(drive_t *drive, commissioning_state_t state, commissioning_reason_t reason)
 {
-    drive->stage = STAGE_OFF;
     drive->commissioning_report.state = (uint8_t)state;
     drive->commissioning_report.reason = (uint8_t)reason;
 }
 
-void commissioning_start(drive_t *drive)
+void procedure_identify_begin(drive_t *drive)
 {
     commissioning_report_t *report = &drive->commissioning_report;
     report->routines = drive->command.routines == 0U ? (uint8_t)COMMISSIONING_ALL : drive->command.routines;
     report->state = (uint8_t)COMMISSIONING_RUNNING;
     report->reason = (uint8_t)COMMISSIONING_NO_REASON;
     report->progress = 0;
-    drive->identify.work = (commissioning_t){.kind = KIND_VOLTAGE};
     drive->omega_open = 0;
     know(drive);
     enter(drive, SWEEP);
-    drive->stage = STAGE_IDENTIFY;
 }
 
-void commissioning_slow(drive_t *drive)
+/* The report's reasons in the order of those of all procedures. */
+static pm_procedure_t reason_of(commissioning_reason_t reason)
 {
-    commissioning_t *self = &drive->identify.work;
-    if (drive->stage != STAGE_IDENTIFY) {
-        return;
-    }
+    return (pm_procedure_t)((uint32_t)PM_FAILED_NO_CURRENT + (uint32_t)reason -
+                            (uint32_t)COMMISSIONING_NO_CURRENT);
+}
+
+pm_procedure_t procedure_identify_slow(drive_t *drive)
+{
+    identify_t *self = &drive->procedure.identify;
     self->ms++;
     const phase_result_t result = phase_slow(drive);
     if (result.failed != COMMISSIONING_NO_REASON) {
         finish(drive, COMMISSIONING_FAILED, result.failed);
-    } else if (result.done) {
+        return reason_of(result.failed);
+    }
+    if (result.done) {
         uint8_t next = self->phase;
         do {
             next++;
@@ -205,17 +201,14 @@ void commissioning_slow(drive_t *drive)
         drive->commissioning_report.progress = (uint8_t)(100U * (uint32_t)next / (uint32_t)END);
         if (next == (uint8_t)END) {
             finish(drive, COMMISSIONING_DONE, COMMISSIONING_NO_REASON);
-        } else {
-            enter(drive, next);
+            return PM_DONE;
         }
-    } else {
-        /* goes on */
+        enter(drive, next);
     }
+    return PM_RUNNING;
 }
 
-void commissioning_abort(drive_t *drive)
+void procedure_identify_abort(drive_t *drive)
 {
-    if (drive->commissioning_report.state == (uint8_t)COMMISSIONING_RUNNING) {
-        finish(drive, COMMISSIONING_FAILED, COMMISSIONING_ABORTED);
-    }
+    finish(drive, COMMISSIONING_FAILED, COMMISSIONING_ABORTED);
 }

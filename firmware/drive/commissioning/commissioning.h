@@ -12,7 +12,7 @@
  *               saturation, cross-coupling
  * The bridge opens at the end, on a failure, on a fault, and within a period after enable is withdrawn.
  *
- * drive_step() and drive_slow() call these in STAGE_IDENTIFY; a period costs less than one with injection.
+ * A procedure that owns the bridge (procedures/procedure.h); a period costs less than one with injection.
  * Tests: tests/unit/drive/commissioning_test.cpp, tests/scenario/identify*.yaml. */
 #ifndef DRIVE_COMMISSIONING_COMMISSIONING_H
 #define DRIVE_COMMISSIONING_COMMISSIONING_H
@@ -89,11 +89,12 @@ typedef struct {
     pm_q_t third;     /* of the lost voltage */
 } square_t;
 
-/* At work; shares its place with the estimators of the position. */
+/* At work. */
 typedef struct {
     int64_t sum[5];
     int32_t samples; /* in the sums */
     pm_ab_t v;       /* what the bridge is to give next */
+    pm_ab_t v_past;  /* what acted over the last period */
     int32_t rest[3]; /* of the timer's counts, 128ths */
     pm_pi_config_t pi;
     pm_q_t R, lost, L_d, L_q; /* per-unit, as far as they are known */
@@ -114,7 +115,7 @@ typedef struct {
             pm_q_t tau_up, tau_even; /* u_d / omega while speeding up, at speed */
         } rotation;
     } of;
-} commissioning_t;
+} identify_t;
 
 typedef struct {
     commissioning_result_t result;

@@ -9,13 +9,13 @@ extern "C" {
 #endif
 
 /* What a period does with the bridge. */
-enum { KIND_VOLTAGE, KIND_CURRENT, KIND_SQUARE };
+enum { KIND_VOLTAGE, KIND_CURRENT, KIND_SQUARE }; /* the first to begin with */
 
 /* bridge.c */
 void commissioning_start_current(drive_t *drive); /* current control in the frame of theta_open */
 void commissioning_set_gains(drive_t *drive);     /* by R and L_d */
-void commissioning_clear_sums(commissioning_t *self);
-pm_q_t commissioning_mean(const commissioning_t *self, uint32_t n); /* of sum n over the samples */
+void commissioning_clear_sums(identify_t *self);
+pm_q_t commissioning_mean(const identify_t *self, uint32_t n); /* of sum n over the samples */
 
 /* square.c: one period of the square wave. Sums, s the sign of the voltage, w = v_d - R i_d - lost:
  *   SUM_CURRENT   s i            i: mean of the currents at both ends of the period

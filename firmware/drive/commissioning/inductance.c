@@ -42,7 +42,7 @@ static pm_q_t best_i_d(const drive_t *drive, pm_q_t i_q)
 /* From the inductance at zero current: four fifths of the voltage that will be needed. */
 static void foresee(const drive_t *drive, square_t *square)
 {
-    const pm_q_t flux = 2 * pm_mul(drive->identify.work.L_q, square->wanted);
+    const pm_q_t flux = 2 * pm_mul(drive->procedure.identify.L_q, square->wanted);
     const pm_q_t top = pm_mul(drive->status.v_dc, PM_Q(0.3));
     const pm_q_t step = pm_max(pm_mul(top, commissioning_period(drive)), 1);
     const uint32_t half = (uint32_t)(flux / step) + 1U;
@@ -52,7 +52,7 @@ static void foresee(const drive_t *drive, square_t *square)
 
 void inductance_enter(drive_t *drive, bool on_q, bool rated)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     const pm_q_t i = rated ? commissioning_current(drive) : pm_mul(commissioning_current(drive), SHARE_SMALL);
     const pm_q_t bias = rated ? -best_i_d(drive, i) : 0;
     const uint32_t settled = bias != 0 ? BIASED_SETTLE_CYCLES : SETTLE_CYCLES;
@@ -66,7 +66,7 @@ void inductance_enter(drive_t *drive, bool on_q, bool rated)
         .wanted = i,
         .far = pm_mul(i, SHARE_FAR),
         .bias = bias,
-        .third = drive->identify.work.lost / 3,
+        .third = drive->procedure.identify.lost / 3,
     };
     if (rated) {
         foresee(drive, &self->of.square);
@@ -78,7 +78,7 @@ void inductance_enter(drive_t *drive, bool on_q, bool rated)
 }
 
 /* Products of two signals have twice their fractional bits. */
-static pm_q_t mean_product(const commissioning_t *self, uint32_t n)
+static pm_q_t mean_product(const identify_t *self, uint32_t n)
 {
     return (pm_q_t)pm_quotient(self->sum[n] / FINE, self->samples);
 }
@@ -86,7 +86,7 @@ static pm_q_t mean_product(const commissioning_t *self, uint32_t n)
 /* Flux per T_s: the voltage, whose amplitude is the same in all periods, less R i and lost voltage. */
 static pm_q_t per_unit(const drive_t *drive)
 {
-    const commissioning_t *self = &drive->identify.work;
+    const identify_t *self = &drive->procedure.identify;
     const square_t *square = &self->of.square;
     const pm_q_t edges = (pm_q_t)pm_quotient((int64_t)square->negative * PM_ONE, self->samples);
     const pm_q_t lost =
@@ -97,7 +97,7 @@ static pm_q_t per_unit(const drive_t *drive)
 
 static pm_q_t cross(const drive_t *drive)
 {
-    const commissioning_t *self = &drive->identify.work;
+    const identify_t *self = &drive->procedure.identify;
     const pm_q_t flux = pm_mul(mean_product(self, SUM_D_FLUX), commissioning_period(drive));
     const pm_q_t current = pm_mul(mean_product(self, SUM_D_CHANGE), drive->commissioning_report.result.L_d);
     const pm_q_t slope = pm_div(flux - current, mean_product(self, SUM_SQUARE));
@@ -107,7 +107,7 @@ static pm_q_t cross(const drive_t *drive)
 /* The amplitude was found with positive i_d; with negative i_d there is less saturation, so less current. */
 static pm_q_t at_test_current(const drive_t *drive, pm_q_t L)
 {
-    const commissioning_t *self = &drive->identify.work;
+    const identify_t *self = &drive->procedure.identify;
     const pm_q_t L_q = drive->commissioning_report.result.L_q;
     const pm_q_t peak = pm_half((int32_t)self->of.square.half * commissioning_mean(self, SUM_CHANGE));
     const pm_q_t short_of = pm_min(pm_div(commissioning_current(drive), peak), PM_Q(1.25));
@@ -116,7 +116,7 @@ static pm_q_t at_test_current(const drive_t *drive, pm_q_t L)
 
 static void conclude(drive_t *drive, bool on_q, bool rated, pm_q_t L)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     commissioning_result_t *r = &drive->commissioning_report.result;
     if (rated) {
         r->L_q_rated = at_test_current(drive, L);
@@ -135,7 +135,7 @@ static void conclude(drive_t *drive, bool on_q, bool rated, pm_q_t L)
 
 phase_result_t inductance_slow(drive_t *drive, bool on_q, bool rated)
 {
-    const commissioning_t *self = &drive->identify.work;
+    const identify_t *self = &drive->procedure.identify;
     if (self->of.square.state == (uint8_t)SQUARE_FAILED) {
         return (phase_result_t){.failed = COMMISSIONING_NO_CURRENT};
     }

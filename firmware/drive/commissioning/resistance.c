@@ -19,14 +19,14 @@ static pm_q_t top_voltage(const drive_t *drive)
 
 static void set_voltage(drive_t *drive, pm_q_t U)
 {
-    drive->identify.work.of.resistance.U = U;
+    drive->procedure.identify.of.resistance.U = U;
     const pm_ab_t v = pm_park_inverse((pm_dq_t){.d = U, .q = 0}, pm_dir(drive->theta_open));
-    drive->identify.work.v = v;
+    drive->procedure.identify.v = v;
 }
 
 void sweep_enter(drive_t *drive)
 {
-    drive->identify.work.kind = KIND_VOLTAGE;
+    drive->procedure.identify.kind = KIND_VOLTAGE;
     drive->theta_open = PM_TURN(0.75);
     set_voltage(drive, 0);
 }
@@ -34,7 +34,7 @@ void sweep_enter(drive_t *drive)
 /* A quarter turn from the initial vector, so that a rotor that stood opposite to it has been moved. */
 phase_result_t sweep_slow(drive_t *drive)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     const pm_q_t wanted = commissioning_current(drive);
     const pm_q_t step = drive->status.v_dc / 4096 + 1;
     const pm_q_t i = pm_hypot(commissioning_mean(self, 0), commissioning_mean(self, 1));
@@ -64,7 +64,7 @@ phase_result_t sweep_slow(drive_t *drive)
 
 void levels_enter(drive_t *drive)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     self->of.resistance.slope_v = 0;
     self->of.resistance.slope_i = 0;
     self->of.resistance.v = 0;
@@ -73,7 +73,7 @@ void levels_enter(drive_t *drive)
 
 static phase_result_t conclude(drive_t *drive)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     commissioning_result_t *r = &drive->commissioning_report.result;
     if (self->of.resistance.slope_i <= 0 || self->of.resistance.slope_v <= 0) {
         return (phase_result_t){.failed = COMMISSIONING_IMPLAUSIBLE};
@@ -87,7 +87,7 @@ static phase_result_t conclude(drive_t *drive)
     return (phase_result_t){.done = true};
 }
 
-static void take_level(commissioning_t *self)
+static void take_level(identify_t *self)
 {
     static const int32_t weights[LEVELS] = {3, 1, -1, -3};
     const pm_q_t i = commissioning_mean(self, 0);
@@ -101,7 +101,7 @@ static void take_level(commissioning_t *self)
 /* Integral control with 50 ms: the slope of the current per volt is known to a factor of two only. */
 phase_result_t levels_slow(drive_t *drive)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     const pm_q_t full = commissioning_current(drive);
     const pm_q_t wanted = full - (pm_q_t)self->part * (full / 5);
     const bool even = pm_abs(commissioning_mean(self, 1)) < full / 4;

@@ -26,7 +26,7 @@ typedef struct {
 
 void rotation_enter(drive_t *drive)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     self->of.rotation.omega =
         pm_clamp(drive->omega_target, -drive->config.omega_max, drive->config.omega_max);
     self->of.rotation.count = 0;
@@ -34,13 +34,13 @@ void rotation_enter(drive_t *drive)
     self->of.rotation.u_d = drive->u.d;
 }
 
-static pm_q_t ramp_step(const commissioning_t *self)
+static pm_q_t ramp_step(const identify_t *self)
 {
     return pm_abs(self->of.rotation.omega) / RAMP_MS + 1;
 }
 
 /* Torque over 1.5 P i, including the resistive loss: power over omega. i_q is the error that ramps leave. */
-static pm_q_t torque_voltage(const commissioning_t *self, pm_q_t omega)
+static pm_q_t torque_voltage(const identify_t *self, pm_q_t omega)
 {
     const pm_q_t i_d = pm_max(commissioning_mean(self, I_D), 1);
     const pm_q_t turned = pm_mul(commissioning_mean(self, U_Q), pm_div(commissioning_mean(self, I_Q), i_d));
@@ -50,7 +50,7 @@ static pm_q_t torque_voltage(const commissioning_t *self, pm_q_t omega)
 /* Between half the speed and nine tenths. */
 static void take_torque(drive_t *drive)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     const pm_q_t top = pm_abs(self->of.rotation.omega);
     const pm_q_t omega = pm_abs(self->of.rotation.omega_ref);
     if (omega > top / 2 && omega < top - top / 10) {
@@ -62,7 +62,7 @@ static void take_torque(drive_t *drive)
     self->sum[TORQUE] = torque;
 }
 
-static pm_q_t mean_torque(const commissioning_t *self)
+static pm_q_t mean_torque(const identify_t *self)
 {
     return (pm_q_t)pm_quotient(self->sum[TORQUE], self->of.rotation.count);
 }
@@ -71,7 +71,7 @@ static pm_q_t mean_torque(const commissioning_t *self)
  * falls behind; the vector then slows down: 30 rad/s per radian. */
 static void turn_on(drive_t *drive, pm_q_t target)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     const pm_q_t ref = commissioning_approach(self->of.rotation.omega_ref, target, ramp_step(self));
     const pm_q_t off = drive->u.d - self->of.rotation.u_d;
     self->of.rotation.u_d += off / 256;
@@ -88,7 +88,7 @@ static void turn_on(drive_t *drive, pm_q_t target)
 
 phase_result_t rotation_up(drive_t *drive)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     take_torque(drive);
     turn_on(drive, self->of.rotation.omega);
     self->of.rotation.tau_up = mean_torque(self);
@@ -97,7 +97,7 @@ phase_result_t rotation_up(drive_t *drive)
 
 static active_t active_flux(const drive_t *drive)
 {
-    const commissioning_t *self = &drive->identify.work;
+    const identify_t *self = &drive->procedure.identify;
     const pm_q_t omega = self->of.rotation.omega;
     const pm_q_t speed = pm_abs(omega);
     const pm_q_t i = commissioning_mean(self, I_D);
@@ -112,7 +112,7 @@ static active_t active_flux(const drive_t *drive)
     return (active_t){.psi = psi, .follows = follows};
 }
 
-static bool is_measured(commissioning_t *self)
+static bool is_measured(identify_t *self)
 {
     if (self->ms == SETTLE_MS) {
         commissioning_clear_sums(self);
@@ -125,7 +125,7 @@ static const phase_result_t stuck = {.failed = COMMISSIONING_NOT_TURNING};
 
 phase_result_t rotation_full(drive_t *drive)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     turn_on(drive, self->of.rotation.omega);
     if (!is_measured(self)) {
         return running;
@@ -142,7 +142,7 @@ phase_result_t rotation_full(drive_t *drive)
 /* At a quarter of the current, where saliency and its saturation have little effect. */
 phase_result_t rotation_less(drive_t *drive)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     commissioning_result_t *r = &drive->commissioning_report.result;
     const pm_q_t half = commissioning_current(drive) / 4;
     drive->i_ref.d = commissioning_approach(drive->i_ref.d, half, half / 64 + 1);
@@ -161,7 +161,7 @@ phase_result_t rotation_less(drive_t *drive)
 
 static void conclude_mechanics(drive_t *drive, pm_q_t tau_down, pm_q_t i)
 {
-    const commissioning_t *self = &drive->identify.work;
+    const identify_t *self = &drive->procedure.identify;
     commissioning_result_t *r = &drive->commissioning_report.result;
     const pm_q_t tau_up = self->of.rotation.tau_up;
     r->J = pm_div(pm_mul(tau_up - tau_down, i) / 2, ramp_step(self) * COMMISSIONING_J_STEPS);
@@ -177,7 +177,7 @@ static void conclude_mechanics(drive_t *drive, pm_q_t tau_down, pm_q_t i)
 
 phase_result_t rotation_down(drive_t *drive)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     const pm_q_t full = commissioning_current(drive) / 2;
     if (self->ms < SETTLE_MS) {
         drive->i_ref.d = commissioning_approach(drive->i_ref.d, full, full / 64 + 1);

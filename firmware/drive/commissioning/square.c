@@ -27,7 +27,7 @@ static inline edges_t edges_of(const square_t *square, pm_abc_t i, pm_ab_t v)
     return (edges_t){.alpha = 2 * a - b - c, .beta = b - c};
 }
 
-static inline void sum_axis(commissioning_t *self, pm_q_t i, pm_q_t di, int32_t negative, bool positive)
+static inline void sum_axis(identify_t *self, pm_q_t i, pm_q_t di, int32_t negative, bool positive)
 {
     self->sum[SUM_CURRENT] += positive ? i : -i;
     self->sum[SUM_CHANGE] += positive ? di : -di;
@@ -36,7 +36,7 @@ static inline void sum_axis(commissioning_t *self, pm_q_t i, pm_q_t di, int32_t 
 }
 
 /* The sums of full products stay below 16 i^4. */
-static inline void sum_other(commissioning_t *self, pm_q_t v, pm_ab_t i, pm_ab_t di, int32_t negative)
+static inline void sum_other(identify_t *self, pm_q_t v, pm_ab_t i, pm_ab_t di, int32_t negative)
 {
     const square_t *square = &self->of.square;
     if (pm_magnitude(i.beta) > square->far) {
@@ -48,7 +48,7 @@ static inline void sum_other(commissioning_t *self, pm_q_t v, pm_ab_t i, pm_ab_t
     }
 }
 
-static inline void take(commissioning_t *self, pm_ab_t i, pm_abc_t legs, pm_ab_t v)
+static inline void take(identify_t *self, pm_ab_t i, pm_abc_t legs, pm_ab_t v)
 {
     const square_t *square = &self->of.square;
     const pm_ab_t last = square->last;
@@ -79,7 +79,7 @@ static void judge(drive_t *drive, square_t *square)
     } else if (pm_min(square->top, square->low) >= square->wanted) {
         square->state = (uint8_t)SQUARE_MEASURES;
         square->bias = -square->bias;
-        commissioning_clear_sums(&drive->identify.work);
+        commissioning_clear_sums(&drive->procedure.identify);
     } else {
         square->voltage += square->voltage / 12;
         if (square->voltage > pm_mul(drive->status.v_dc, PM_Q(0.4))) {
@@ -105,7 +105,7 @@ static void flip(square_t *square)
 
 static void move(drive_t *drive, pm_ab_t v_past)
 {
-    commissioning_t *self = &drive->identify.work;
+    identify_t *self = &drive->procedure.identify;
     square_t *square = &self->of.square;
     const pm_q_t i = square->on_q ? drive->i_ab.beta : drive->i_ab.alpha;
     if (square->state == (uint8_t)SQUARE_WAITS) { /* until the earlier current has decayed */
@@ -134,7 +134,7 @@ static void move(drive_t *drive, pm_ab_t v_past)
 
 void square_step(drive_t *drive, pm_ab_t v_past)
 {
-    square_t *square = &drive->identify.work.of.square;
+    square_t *square = &drive->procedure.identify.of.square;
     move(drive, v_past);
     square->last = drive->i_ab;
     square->i_last = drive->i_abc;

@@ -49,7 +49,7 @@ TEST(Config, DefaultsAreAccepted)
     const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
     EXPECT_TRUE(r.ok);
     EXPECT_TRUE(c.injection);
-    EXPECT_FALSE(c.align_first);
+    EXPECT_EQ(c.start, SEQUENCE_pulses);
 }
 
 TEST(Config, RefusesAndNamesWhatIsOutOfRange)
@@ -340,14 +340,14 @@ TEST(Config, StartFollowsTheMachine)
 {
     const auto start = [](const Changes &x) {
         const drive_config_t c = configure(changed(x));
-        return std::make_pair(c.injection, c.align_first);
+        return std::make_pair(c.injection, sequence_id_t(c.start));
     };
-    EXPECT_EQ(start({}), std::make_pair(true, false));
-    EXPECT_EQ(start({{DRIVE_PARAM_L_d, 74e-3}}), std::make_pair(false, true));   // no saliency
-    EXPECT_EQ(start({{DRIVE_PARAM_i_noise, 0.1}}), std::make_pair(false, true)); // not seen
-    EXPECT_EQ(start({{DRIVE_PARAM_start_method, 1}}), std::make_pair(true, false));
-    EXPECT_EQ(start({{DRIVE_PARAM_start_method, 2}}), std::make_pair(false, true));
-    EXPECT_EQ(start({{DRIVE_PARAM_start_method, 3}}), std::make_pair(true, true));
+    EXPECT_EQ(start({}), std::make_pair(true, SEQUENCE_pulses));
+    EXPECT_EQ(start({{DRIVE_PARAM_L_d, 74e-3}}), std::make_pair(false, SEQUENCE_align));   // no saliency
+    EXPECT_EQ(start({{DRIVE_PARAM_i_noise, 0.1}}), std::make_pair(false, SEQUENCE_align)); // not seen
+    EXPECT_EQ(start({{DRIVE_PARAM_start_method, 1}}), std::make_pair(true, SEQUENCE_pulses));
+    EXPECT_EQ(start({{DRIVE_PARAM_start_method, 2}}), std::make_pair(false, SEQUENCE_align));
+    EXPECT_EQ(start({{DRIVE_PARAM_start_method, 3}}), std::make_pair(true, SEQUENCE_align));
 }
 
 // Parameter sets drawn at random: a fourth over the whole ranges, the others around the defaults, so that
@@ -456,7 +456,7 @@ Names must_be_positive(const drive_config_t &c)
         x.push_back({"h_d", s.h_d});
         x.push_back({"h_d_inverse", s.h_d_inverse});
     }
-    if (!c.align_first) {
+    if (c.start != SEQUENCE_align) {
         x.push_back({"pulse periods", c.pulses.periods});
         x.push_back({"pulse duty", c.pulses.duty});
         x.push_back({"pulse timeout beyond the pulse", c.pulses.timeout - c.pulses.periods});

@@ -189,10 +189,10 @@ TEST(Drive, CalibrationTakes1024PeriodsWithTheBridgeOff)
     x.enable(true, DRIVE_MODE_CURRENT);
     x.run_ms(1); // the state machine takes the command
     int periods = 0;
-    while (x.d.stage == STAGE_CALIBRATE && periods < 5000) {
+    while (x.d.sequence.procedure == PROCEDURE_calibrate && periods < 5000) {
         x.run_ms(1);
         periods += 10;
-        if (x.d.stage == STAGE_CALIBRATE) {
+        if (x.d.sequence.procedure == PROCEDURE_calibrate) {
             ASSERT_FALSE(x.driven());
         }
     }

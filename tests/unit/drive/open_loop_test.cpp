@@ -26,15 +26,20 @@ Drive started()
     Drive x(direct::params(2));
     x.d.command.mode = DRIVE_MODE_SPEED;
     x.d.state = DRIVE_FINDING;
-    open_loop_start(&x.d);
+    procedure_begin(&x.d, PROCEDURE_align);
     return x;
 }
 
 void slow(Drive &x, int ms)
 {
     for (int k = 0; k < ms; ++k) {
-        ++x.d.state_ms;
-        open_loop_slow(&x.d);
+        if (x.d.sequence.procedure == PROCEDURE_align) {
+            if (procedure_slow(&x.d) == PM_DONE) {
+                x.d.sequence.procedure = PROCEDURE_NONE;
+            }
+        } else {
+            open_loop_slow(&x.d);
+        }
     }
 }
 

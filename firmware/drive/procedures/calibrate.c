@@ -1,0 +1,41 @@
+#include "firmware/drive/drive_parts.h"
+
+void procedure_calibrate_begin(drive_t *drive)
+{
+    (void)drive;
+}
+
+static pm_procedure_t conclude(drive_t *drive)
+{
+    const int32_t most = pm_shl(drive->config.protection.offset_max, PM_Q_BITS - 15);
+    pm_procedure_t result = PM_DONE;
+    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
+        const pm_q_t zero = pm_shl(drive->procedure.calibrate.sum[x], PM_Q_BITS - 15 - CALIBRATE_BITS);
+        drive->zero[x] = zero;
+        if (pm_abs(zero - PM_ONE) > most) {
+            result = PM_FAILED_OFFSET;
+        }
+    }
+    return result;
+}
+
+pm_procedure_t procedure_calibrate_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
+{
+    (void)out;
+    calibrate_t *self = &drive->procedure.calibrate;
+    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
+        self->sum[x] += in->i_leg[x];
+    }
+    self->count++;
+    return self->count == CALIBRATE_PERIODS ? conclude(drive) : PM_RUNNING;
+}
+
+pm_procedure_t procedure_calibrate_slow(drive_t *drive)
+{
+    return drive->procedure.result;
+}
+
+void procedure_calibrate_abort(drive_t *drive)
+{
+    (void)drive;
+}

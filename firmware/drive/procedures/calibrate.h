@@ -1,0 +1,20 @@
+/* Offsets of the current channels: means of 1024 periods with the bridge off.
+ *
+ *   zero = sum of the codes / 1024
+ * 1024 periods; fails (OFFSET) when a channel is off mid-scale by more than offset_max.
+ * Tests: tests/unit/drive/drive_test.cpp, tests/contract/procedure_contract_test.cpp,
+ * tests/scenario/fault_sensor_offset.yaml. */
+#ifndef DRIVE_PROCEDURES_CALIBRATE_H
+#define DRIVE_PROCEDURES_CALIBRATE_H
+
+#include <stdint.h>
+
+#define CALIBRATE_BITS    10
+#define CALIBRATE_PERIODS 1024U /* 2^CALIBRATE_BITS */
+
+typedef struct {
+    int32_t sum[3];
+    uint16_t count; /* periods so far */
+} calibrate_t;
+
+#endif

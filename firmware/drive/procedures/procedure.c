@@ -1,0 +1,77 @@
+#include "firmware/drive/procedures/procedure.h"
+
+#include <stddef.h>
+
+#include "firmware/drive/drive_parts.h"
+#include "firmware/math/compiler.h"
+#include "firmware/math/image.h"
+
+_Static_assert(offsetof(position_t, pll) == 0 && offsetof(procedure_t, pll) == 0,
+               "drive->pll is that of whichever has the place");
+
+#define STATE_BARE    DRIVE_CALIBRATING
+#define STATE_LEGS    DRIVE_FINDING
+#define STATE_CONTROL DRIVE_FINDING
+#define STATE_ALONE   DRIVE_RUNNING
+
+static drive_state_t state_of(procedure_id_t id)
+{
+    static const uint8_t states[PROCEDURE_COUNT] = {
+        DRIVE_OFF,
+#define PM_METHOD(name, help, traits, needs) STATE_##traits,
+#include "firmware/drive/procedures/procedures.def"
+#undef PM_METHOD
+    };
+    return (drive_state_t)states[id];
+}
+
+PM_RARE void procedure_begin(drive_t *drive, procedure_id_t id)
+{
+    drive->state = state_of(id);
+    drive->stage = STAGE_PROCEDURE;
+    drive->sequence.procedure = (uint8_t)id;
+    drive->procedure = (procedure_t){.result = PM_RUNNING};
+    switch (id) {
+#define PM_METHOD(name, help, traits, needs)                                                                 \
+    PM_IN_IMAGE(name, case PROCEDURE_##name : procedure_##name##_begin(drive); break;)
+#include "firmware/drive/procedures/procedures.def"
+#undef PM_METHOD
+    case PROCEDURE_NONE:
+    case PROCEDURE_COUNT:
+    default:
+        break;
+    }
+    if (drive->stage == STAGE_PROCEDURE) { /* not of what current control has commanded */
+        drive->v_next = (pm_ab_t){0, 0};
+    }
+}
+
+pm_procedure_t procedure_slow(drive_t *drive)
+{
+    switch ((procedure_id_t)drive->sequence.procedure) {
+#define PM_METHOD(name, help, traits, needs)                                                                 \
+    PM_IN_IMAGE(name, case PROCEDURE_##name : return procedure_##name##_slow(drive);)
+#include "firmware/drive/procedures/procedures.def"
+#undef PM_METHOD
+    case PROCEDURE_NONE:
+    case PROCEDURE_COUNT:
+    default:
+        return PM_RUNNING;
+    }
+}
+
+void procedure_abort(drive_t *drive)
+{
+    const procedure_id_t id = (procedure_id_t)drive->sequence.procedure;
+    drive->sequence.procedure = (uint8_t)PROCEDURE_NONE;
+    switch (id) {
+#define PM_METHOD(name, help, traits, needs)                                                                 \
+    PM_IN_IMAGE(name, case PROCEDURE_##name : procedure_##name##_abort(drive); break;)
+#include "firmware/drive/procedures/procedures.def"
+#undef PM_METHOD
+    case PROCEDURE_NONE:
+    case PROCEDURE_COUNT:
+    default:
+        break;
+    }
+}

@@ -1,0 +1,32 @@
+#include "firmware/drive/procedures/sequence.h"
+
+#include "firmware/drive/procedures/procedure.h"
+
+#define FAULT_ALWAYS SEQUENCE_FAULT, PM_RUNNING
+#define CALIBRATE                                                                                            \
+    {                                                                                                        \
+        PROCEDURE_calibrate, 1, FAULT_ALWAYS                                                                 \
+    }
+
+static const sequence_step_t steps[SEQUENCE_COUNT][SEQUENCE_STEPS] = {
+    [SEQUENCE_align] = {CALIBRATE, {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
+    [SEQUENCE_pulses] = {CALIBRATE, {PROCEDURE_initial_pulses, SEQUENCE_RUN, FAULT_ALWAYS}},
+    [SEQUENCE_pulses_align] = {CALIBRATE,
+                               {PROCEDURE_initial_pulses, SEQUENCE_RUN, 2, PM_FAILED_POLARITY},
+                               {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
+    [SEQUENCE_identify] = {CALIBRATE, {PROCEDURE_identify, SEQUENCE_WAIT, SEQUENCE_WAIT, SEQUENCE_ANY}},
+};
+
+const sequence_step_t *sequence_step(sequence_id_t id, uint32_t step)
+{
+    return &steps[id][step];
+}
+
+uint32_t sequence_next(const sequence_step_t *step, pm_procedure_t result)
+{
+    if (result == PM_DONE) {
+        return step->done;
+    }
+    const bool covered = step->reason == (uint8_t)SEQUENCE_ANY || step->reason == (uint8_t)result;
+    return covered ? step->refused : (uint32_t)SEQUENCE_FAULT;
+}

@@ -1,0 +1,53 @@
+/* What a start consists of: procedures one after the other, and where a refusal leads.
+ *
+ *   align          calibrate, align
+ *   pulses         calibrate, initial_pulses
+ *   pulses_align   calibrate, initial_pulses; align, if these found no polarity
+ *   identify       calibrate, identify
+ * The fall-back is for what alignment can replace: without saliency injection has nothing to go by, and
+ * without a current nothing is connected; those are faults in all of them.
+ * Tests: tests/unit/drive/sequence_test.cpp. */
+#ifndef DRIVE_PROCEDURES_SEQUENCE_H
+#define DRIVE_PROCEDURES_SEQUENCE_H
+
+#include "firmware/math/frames.h"
+#include "firmware/math/procedure.h"
+
+typedef enum {
+    SEQUENCE_align,
+    SEQUENCE_pulses,
+    SEQUENCE_pulses_align,
+    SEQUENCE_identify,
+    SEQUENCE_COUNT,
+} sequence_id_t;
+
+#define SEQUENCE_STEPS 3
+
+/* Where a step leads: the number of another, or one of these. */
+enum {
+    SEQUENCE_FAULT = SEQUENCE_STEPS,
+    SEQUENCE_RUN,  /* the drive runs, from the angle that was found */
+    SEQUENCE_WAIT, /* bridge off, until enable is taken back */
+};
+
+#define SEQUENCE_ANY PM_PROCEDURE_COUNT
+
+typedef struct {
+    uint8_t procedure; /* PROCEDURE_... */
+    uint8_t done;
+    uint8_t refused; /* where it leads when it fails by ... */
+    uint8_t reason;  /* ... this, PM_FAILED_... or SEQUENCE_ANY; by another: SEQUENCE_FAULT */
+} sequence_step_t;
+
+const sequence_step_t *sequence_step(sequence_id_t id, uint32_t step);
+uint32_t sequence_next(const sequence_step_t *step, pm_procedure_t result);
+
+/* The drive's place in it. */
+typedef struct {
+    uint8_t id, step;
+    uint8_t procedure; /* at work, or PROCEDURE_COUNT */
+    pm_angle_t theta;  /* of the rotor, where the last position finding left it */
+    pm_sigma_t margin; /* of that, the smallest */
+} sequence_t;
+
+#endif

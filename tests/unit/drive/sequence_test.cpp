@@ -1,0 +1,195 @@
+// The sequence of a start, alone and as the drive follows it: every failure at every step, enable taken back
+// and faults at any instant. A procedure's result is put in its place; no motor.
+#include <gtest/gtest.h>
+
+#include "tests/unit/drive/direct.h"
+
+namespace
+{
+
+using direct::Drive;
+
+drive_params_t falling_back()
+{
+    drive_params_t p = direct::params(1);
+    p.start_fallback = 1;
+    return p;
+}
+
+uint32_t next(sequence_id_t id, uint32_t step, pm_procedure_t result)
+{
+    return sequence_next(sequence_step(id, step), result);
+}
+
+TEST(Sequence, LeadsWhereItSays)
+{
+    for (int id = 0; id < SEQUENCE_COUNT; ++id) {
+        const auto sequence = static_cast<sequence_id_t>(id);
+        EXPECT_EQ(sequence_step(sequence, 0)->procedure, PROCEDURE_calibrate);
+        EXPECT_EQ(next(sequence, 0, PM_DONE), 1U);
+        for (int reason = PM_DONE + 1; reason < PM_PROCEDURE_COUNT; ++reason) {
+            const auto result = static_cast<pm_procedure_t>(reason);
+            EXPECT_EQ(next(sequence, 0, result), uint32_t(SEQUENCE_FAULT)) << id << ' ' << reason;
+            const bool replaced = id == SEQUENCE_pulses_align && reason == PM_FAILED_POLARITY;
+            const uint32_t expected = id == SEQUENCE_identify ? uint32_t(SEQUENCE_WAIT)
+                                                              : (replaced ? 2U : uint32_t(SEQUENCE_FAULT));
+            EXPECT_EQ(next(sequence, 1, result), expected) << id << ' ' << reason;
+        }
+        EXPECT_EQ(next(sequence, 1, PM_DONE),
+                  uint32_t(id == SEQUENCE_identify ? SEQUENCE_WAIT : SEQUENCE_RUN));
+    }
+    EXPECT_EQ(sequence_step(SEQUENCE_pulses_align, 2)->procedure, PROCEDURE_align);
+    EXPECT_EQ(next(SEQUENCE_pulses_align, 2, PM_DONE), uint32_t(SEQUENCE_RUN));
+    EXPECT_EQ(next(SEQUENCE_pulses_align, 2, PM_FAILED_POLARITY), uint32_t(SEQUENCE_FAULT));
+}
+
+// Calibrated, with the pulses at work.
+Drive in_pulses(const drive_params_t &p)
+{
+    Drive x(p);
+    x.enable(true);
+    for (int ms = 0; ms < 120 && x.d.sequence.procedure != PROCEDURE_initial_pulses; ++ms) {
+        x.run_ms(1);
+    }
+    EXPECT_EQ(x.d.sequence.procedure, PROCEDURE_initial_pulses);
+    EXPECT_EQ(x.state(), DRIVE_FINDING);
+    return x;
+}
+
+TEST(Sequence, ARefusalIsAFaultOrLeadsToTheFallBack)
+{
+    for (const bool fall_back : {false, true}) {
+        for (int reason = PM_DONE + 1; reason < PM_PROCEDURE_COUNT; ++reason) {
+            Drive x = in_pulses(fall_back ? falling_back() : direct::params(1));
+            x.d.procedure.result = static_cast<pm_procedure_t>(reason);
+            x.run_ms(1);
+            EXPECT_EQ(drive_status(&x.d)->refusal.procedure, PROCEDURE_initial_pulses);
+            EXPECT_EQ(drive_status(&x.d)->refusal.reason, reason);
+            if (fall_back && reason == PM_FAILED_POLARITY) {
+                EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+                EXPECT_EQ(x.d.sequence.procedure, PROCEDURE_align);
+                EXPECT_EQ(x.d.stage, STAGE_OPEN_LOOP);
+                x.run_ms(301);
+                EXPECT_EQ(x.d.stage, STAGE_VECTOR); // injection goes on from there
+                EXPECT_EQ(x.d.sequence.procedure, PROCEDURE_NONE);
+                continue;
+            }
+            const bool offset = reason == PM_FAILED_OFFSET;
+            EXPECT_EQ(x.fault(), offset ? DRIVE_FAULT_SENSOR_OFFSET : DRIVE_FAULT_POSITION_NOT_FOUND)
+                << reason;
+            EXPECT_EQ(drive_fault_record(&x.d)->refusal.procedure, PROCEDURE_initial_pulses);
+            EXPECT_EQ(drive_fault_record(&x.d)->refusal.reason, reason);
+            x.step();
+            EXPECT_FALSE(x.driven());
+            EXPECT_TRUE(x.out.trip);
+        }
+    }
+}
+
+TEST(Sequence, AnotherStartForgetsTheRefusal)
+{
+    Drive x = in_pulses(falling_back());
+    x.d.procedure.result = PM_FAILED_POLARITY;
+    x.run_ms(1);
+    ASSERT_EQ(drive_status(&x.d)->refusal.reason, PM_FAILED_POLARITY);
+    x.enable(false);
+    x.run_ms(1);
+    x.enable(true);
+    x.run_ms(1);
+    EXPECT_EQ(drive_status(&x.d)->refusal.reason, 0);
+    EXPECT_EQ(drive_status(&x.d)->refusal.procedure, PROCEDURE_NONE);
+}
+
+struct Start {
+    const char *name;
+    drive_params_t params;
+    drive_mode_t mode;
+};
+
+const Start kStarts[] = {
+    {"pulses", direct::params(1), DRIVE_MODE_SPEED},      {"align", direct::params(3), DRIVE_MODE_SPEED},
+    {"open loop", direct::params(2), DRIVE_MODE_SPEED},   {"current", direct::params(1), DRIVE_MODE_CURRENT},
+    {"identify", direct::params(1), DRIVE_MODE_IDENTIFY},
+};
+
+// At each millisecond of the start and in the middle of it; currents follow the pulses a little, so that
+// these go on.
+void at_each_instant(void (*act)(Drive &, const char *))
+{
+    for (const Start &start : kStarts) {
+        for (int ms = 1; ms < 460; ms += ms < 101 ? 50 : 3) {
+            Drive x(start.params);
+            x.command.current_mA = 1000;
+            x.enable(true, start.mode);
+            x.run_ms(ms);
+            x.step();
+            x.step();
+            if (x.fault() == DRIVE_FAULT_NONE) {
+                act(x, start.name);
+            }
+        }
+    }
+}
+
+TEST(Sequence, EnableTakenBackOpensTheBridge)
+{
+    at_each_instant([](Drive &x, const char *name) {
+        if (x.state() == DRIVE_RUNNING && x.command.mode != DRIVE_MODE_IDENTIFY) {
+            return; // has started: stops by its ramp
+        }
+        x.enable(false, x.command.mode);
+        x.run_ms(1);
+        EXPECT_EQ(x.state(), DRIVE_OFF) << name;
+        for (int k = 0; k < 20; ++k) {
+            x.step();
+            ASSERT_FALSE(x.driven()) << name;
+        }
+        EXPECT_EQ(x.d.sequence.procedure, PROCEDURE_NONE);
+    });
+}
+
+// Within a millisecond: the start that was under way is not gone on with.
+TEST(Sequence, EnableThatComesBackStartsAnew)
+{
+    at_each_instant([](Drive &x, const char *name) {
+        const bool legs = x.d.stage == STAGE_PROCEDURE;
+        x.enable(false, x.command.mode);
+        x.step();
+        EXPECT_TRUE(!legs || !x.driven()) << name;
+        x.enable(true, x.command.mode);
+        x.run_ms(2);
+        if (legs) {
+            EXPECT_EQ(x.state(), DRIVE_CALIBRATING) << name;
+            EXPECT_FALSE(x.driven()) << name;
+        }
+    });
+}
+
+TEST(Sequence, AFaultOpensTheBridgeInThePeriod)
+{
+    at_each_instant([](Drive &x, const char *name) {
+        x.in.hw_fault = true;
+        x.step();
+        EXPECT_FALSE(x.driven()) << name;
+        EXPECT_TRUE(x.out.trip) << name;
+        x.run_ms(1);
+        EXPECT_EQ(x.fault(), DRIVE_FAULT_HARDWARE) << name;
+        EXPECT_EQ(x.d.sequence.procedure, PROCEDURE_NONE) << name;
+        x.in.hw_fault = false;
+        x.run_ms(2);
+        EXPECT_FALSE(x.driven()) << name;
+    });
+}
+
+TEST(Sequence, OverCurrentOpensTheBridgeUnlessNothingIsKnownOfIt)
+{
+    at_each_instant([](Drive &x, const char *name) {
+        const bool bare = x.state() == DRIVE_CALIBRATING;
+        x.in.i_leg[1] = direct::current_code(0.95);
+        x.step();
+        EXPECT_FALSE(x.driven()) << name;
+        EXPECT_EQ(x.out.trip, !bare && x.state() != DRIVE_OFF) << name;
+    });
+}
+
+} // namespace
