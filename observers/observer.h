@@ -22,6 +22,7 @@
 #ifndef OBSERVERS_OBSERVER_H
 #define OBSERVERS_OBSERVER_H
 
+#include "firmware/math/image.h"
 #include "observers/active_flux.h"
 #include "observers/back_emf.h"
 #include "observers/ekf_full.h"
@@ -50,14 +51,14 @@ typedef enum {
 typedef struct {
     observer_id_t id;
     union {
-#define PM_METHOD(name, help, traits, needs) name##_config_t name;
+#define PM_METHOD(name, help, traits, needs) PM_IN_IMAGE(name, name##_config_t name;)
 #include "observers/observers.def"
 #undef PM_METHOD
     };
 } observer_config_t;
 
 typedef union {
-#define PM_METHOD(name, help, traits, needs) name##_t name;
+#define PM_METHOD(name, help, traits, needs) PM_IN_IMAGE(name, name##_t name;)
 #include "observers/observers.def"
 #undef PM_METHOD
 } observer_t;

@@ -24,6 +24,7 @@
 #include "firmware/can/node_state.h"
 #include "firmware/can/trace.h"
 #include "firmware/drive/drive_state.h"
+#include "firmware/math/image.h"
 #include "firmware/params/parameters.h"
 #include "hal/hal.h"
 
@@ -31,8 +32,12 @@
 extern "C" {
 #endif
 
-/* 8 kB: four signals, 20 kHz, 50 ms */
+/* Length of the trace's ring: as the image's manifest says (firmware/images); elsewhere 8 kB */
+#ifdef PM_IMAGE_TRACE_NUMBERS
+#define APP_TRACE_NUMBERS PM_IMAGE_TRACE_NUMBERS
+#else
 #define APP_TRACE_NUMBERS 4000U
+#endif
 
 /* Whether the drive may be switched on: object parameters_ready */
 typedef enum {
@@ -103,6 +108,15 @@ drive_result_t app_configure(app_t *app, hal_t *hal, const drive_params_t *param
 
 /* The one of an image (main.c): by this name a debugger, and the emulated board, find it. */
 extern app_t app_instance;
+
+/* What an image says of itself, found by the name app_image. */
+typedef struct {
+    char name[16];         /* of its manifest, without .yaml; zeros behind it */
+    uint32_t drive_bytes;  /* sizeof(drive_t) */
+    uint32_t config_bytes; /* sizeof(drive_config_t) */
+} app_image_t;
+
+extern const app_image_t app_image;
 
 void app_boot(app_t *app, hal_t *hal);
 void app_turn(app_t *app);

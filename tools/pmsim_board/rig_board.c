@@ -23,7 +23,7 @@ struct rig {
     plant_t *plant;
     board_t *board;
     watch_t watch;
-    rig_scale_t scale;
+    twin_scale_t scale;
     drive_command_t sent;
     master_t master;
     load_t load;
@@ -59,14 +59,88 @@ void rig_board_gdb(uint16_t port)
     gdb_port = port;
 }
 
-static bool boot(rig_t *rig, const drive_params_t *params)
+/* Refused ones too: the image has to refuse them itself. */
+static uint32_t make_page(const drive_params_t *params, uint32_t words[STORE_WORDS])
 {
-    uint32_t words[STORE_WORDS];
-    /* refused ones too: the image has to refuse them itself */
-    const uint32_t used =
-        noise == BUS_QUIET ? app_page(params, 1, words) : bus_load_page(params, 1000, words);
-    board_program(rig->board, STORE_ADDRESS, words, used * sizeof words[0]);
-    return board_boot(rig->board, BOOT_S);
+    return noise == BUS_QUIET ? app_page(params, 1, words) : bus_load_page(params, 1000, words);
+}
+
+/* A parameter that the image has not, and that is not as it would be without it */
+static const char *missing(const twin_t *twin, const uint32_t page[])
+{
+    const int32_t count = store_check(page);
+    for (int32_t n = 0; n < count; n++) {
+        bool has_index;
+        const store_pair_t pair = store_pair(page, (uint32_t)n);
+        const od_entry_t *entry = od_find((uint16_t)(pair.id >> 8), (uint8_t)(pair.id & 0xFFU), &has_index);
+        if (entry->kind == (uint8_t)OD_PARAMETER && !twin->has(pair.id) &&
+            pair.value != drive_param_table[entry->slot].def) {
+            return drive_param_table[entry->slot].name;
+        }
+    }
+    return NULL;
+}
+
+static bool check_parameters(rig_t *rig, const twin_t *twin, const uint32_t page[], bool refusal_expected,
+                             char *error, size_t error_size)
+{
+    const char *parameter = missing(twin, page);
+    if (parameter != NULL) {
+        snprintf(error, error_size, "parameter %s is not in this image (%s)", parameter, twin->name);
+        return false;
+    }
+    const char *reason = twin->configure(page, &rig->scale, &parameter);
+    if (reason != NULL && !refusal_expected) {
+        snprintf(error, error_size, "drive refuses parameter %s: %s", parameter, reason);
+        return false;
+    }
+    return true;
+}
+
+static bool attach_gdb(rig_t *rig, char *error, size_t error_size)
+{
+    if (gdb_port >= 0) {
+        rig->gdb = gdb_server_attach(board_cpu(rig->board), (uint16_t)gdb_port);
+        if (rig->gdb == NULL) {
+            snprintf(error, error_size, "no gdb on port %d: %s", gdb_port, strerror(errno));
+            return false;
+        }
+    }
+    return true;
+}
+
+/* The image on its board, watched. */
+static bool begin(rig_t *rig, const drive_params_t *params, bool refusal_expected, char *error,
+                  size_t error_size)
+{
+    uint32_t page[STORE_WORDS];
+    char why[200];
+    rig->board = board_create(image_path, rig->plant, error, error_size);
+    if (rig->board == NULL) {
+        return false;
+    }
+    const twin_t *twin =
+        twin_of(board_variable(rig->board, "app_image", sizeof(app_image_t)), why, sizeof why);
+    if (twin == NULL) {
+        snprintf(error, error_size, "%s: %s", image_path, why);
+        return false;
+    }
+    const uint32_t used = make_page(params, page);
+    if (!check_parameters(rig, twin, page, refusal_expected, error, error_size) ||
+        !attach_gdb(rig, error, error_size)) {
+        return false;
+    }
+    board_program(rig->board, STORE_ADDRESS, page, used * sizeof page[0]);
+    if (!board_boot(rig->board, BOOT_S)) {
+        snprintf(error, error_size, "%s: %s", image_path, board_error(rig->board));
+        return false;
+    }
+    if (!watch_begin(&rig->watch, rig->board, twin)) {
+        snprintf(error, error_size, "%s: has no variable app_instance of at least %zu bytes", image_path,
+                 twin->memory_bytes);
+        return false;
+    }
+    return true;
 }
 
 rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_params_t *params,
@@ -80,37 +154,7 @@ rig_t *rig_create(const plant_config_t *plant, double theta_e_rad, const drive_p
         rig_destroy(rig);
         return NULL;
     }
-    drive_t drive;
-    const drive_result_t result =
-        drive_init(&drive, params, 0); /* what the image carries beside the common */
-    if (!result.ok && !refusal_expected) {
-        snprintf(error, error_size, "drive refuses parameter %s: %s", drive_param_table[result.param].name,
-                 result.reason);
-        rig_destroy(rig);
-        return NULL;
-    }
-    rig->scale = rig_scale(&drive.config.base, params->pole_pairs, drive.config.slow_divider);
-    rig->board = board_create(image_path, rig->plant, error, error_size);
-    if (rig->board == NULL) {
-        rig_destroy(rig);
-        return NULL;
-    }
-    if (gdb_port >= 0) {
-        rig->gdb = gdb_server_attach(board_cpu(rig->board), (uint16_t)gdb_port);
-        if (rig->gdb == NULL) {
-            snprintf(error, error_size, "no gdb on port %d: %s", gdb_port, strerror(errno));
-            rig_destroy(rig);
-            return NULL;
-        }
-    }
-    if (!boot(rig, params)) {
-        snprintf(error, error_size, "%s: %s", image_path, board_error(rig->board));
-        rig_destroy(rig);
-        return NULL;
-    }
-    if (!watch_begin(&rig->watch, rig->board)) {
-        snprintf(error, error_size, "%s: has no variable app_instance of at least %zu bytes", image_path,
-                 sizeof(image_memory_t));
+    if (!begin(rig, params, refusal_expected, error, error_size)) {
         rig_destroy(rig);
         return NULL;
     }
@@ -242,13 +286,12 @@ void rig_step(rig_t *rig, rig_sample_t *sample)
         take_frames(rig);
     }
     rig->watch.figures.simulated_s += board_period_s(rig->board);
-    const drive_out_t out = image_out(rig->watch.image);
-    rig_fill_sample(&rig->scale, &rig->watch.image->drive, &out, sample);
+    rig->watch.twin->sample(&rig->scale, rig->watch.image, sample);
 }
 
 uint32_t rig_slow_divider(const rig_t *rig)
 {
-    return rig->watch.image->drive.config.slow_divider;
+    return rig->watch.twin->slow_divider(rig->watch.image);
 }
 
 void rig_record(const rig_t *rig, record_period_t *record)
@@ -260,11 +303,8 @@ void rig_record(const rig_t *rig, record_period_t *record)
         .speed_mrad_s = rig->sent.speed_mrad_s,
         .torque_uNm = rig->sent.torque_uNm,
         .current_mA = rig->sent.current_mA,
-        .temperature_dC = rig->watch.image->slow.temperature_dC,
     };
-    const drive_in_t in = image_in(rig->watch.image);
-    const drive_out_t out = image_out(rig->watch.image);
-    rig_record_legs(&in, &out, record);
+    rig->watch.twin->record(rig->watch.image, record);
 }
 
 /* Replays are for the drive on the host. */

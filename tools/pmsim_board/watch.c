@@ -1,29 +1,10 @@
 #include "tools/pmsim_board/watch.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 enum { EXCEPTION_PENDSV = 14, EXCEPTION_SYSTICK = 15, EXCEPTION_IRQ0 = 16 };
 enum { IRQ_ADC = 18, IRQ_FDCAN = 21, IRQ_USART2 = 38 };
-
-static int mode_of(const drive_t *drive)
-{
-    switch (drive->stage) {
-    case STAGE_OFF:
-        return FIGURE_OFF;
-    case STAGE_PROCEDURE:
-        return drive->state == DRIVE_CALIBRATING ? FIGURE_CALIBRATE
-               : drive->state == DRIVE_RUNNING   ? FIGURE_IDENTIFY
-                                                 : FIGURE_PULSES;
-    case STAGE_OPEN_LOOP:
-        return drive->state == DRIVE_FINDING ? FIGURE_ALIGN : FIGURE_OPEN_LOOP;
-    case STAGE_VECTOR:
-        break;
-    }
-    if (drive->position.inject) {
-        return drive->position.weight > 0 ? FIGURE_BLEND : FIGURE_INJECTION;
-    }
-    return drive->field_weakening.i_d < 0 ? FIGURE_WEAKENING : FIGURE_FLUX;
-}
 
 static int interrupt_of(int exception)
 {
@@ -70,71 +51,17 @@ static void count(watch_t *watch, int interrupt, int exception)
     *before = *now;
 }
 
-static size_t first_difference(const void *first, const void *second, size_t size)
-{
-    const uint8_t *a = first;
-    const uint8_t *b = second;
-    size_t at = 0;
-    while (at < size && a[at] == b[at]) {
-        at++;
-    }
-    return at;
-}
-
-/* Byte by byte, holes included: both have copied the same memory. */
-static bool same(const void *first, const void *second, size_t size)
-{
-    return memcmp(first, second, size) == 0;
-}
-
-/* The limits' flags stay until the slow interrupt; this period's own are seen when they are taken away
- * before. */
-static void step(watch_t *watch, drive_out_t *out)
-{
-    drive_t *drive = &watch->before;
-    const bool current = drive->current.limited;
-    const bool modulator = drive->modulator.limited;
-    const bool fault = drive->fault != DRIVE_FAULT_NONE;
-    watch->mode = mode_of(drive);
-    drive->current.limited = false;
-    drive->modulator.limited = false;
-    const drive_in_t in = image_in(watch->image);
-    drive_step(drive, &in, out);
-    watch->event[FIGURE_LIMITED] = drive->current.limited || drive->modulator.limited;
-    watch->event[FIGURE_FAULT] = !fault && drive->fault != DRIVE_FAULT_NONE;
-    drive->current.limited = drive->current.limited || current;
-    drive->modulator.limited = drive->modulator.limited || modulator;
-}
-
-/* The set of parameters that the image has taken, if it has, is taken from it. */
-static void step_slow(watch_t *watch)
-{
-    drive_t *drive = &watch->before;
-    const drive_config_t *now = &watch->image->drive.config;
-    if (!same(&drive->config, now, sizeof *now)) {
-        drive_reconfigure(drive, now);
-        watch->event[FIGURE_SWAP] = true;
-    }
-    const drive_slow_in_t in = {.temperature_dC = watch->image->slow.temperature_dC};
-    drive_slow(drive, &in);
-}
-
 /* The same step on the host, from the same memory. */
 static void compare(watch_t *watch, int interrupt)
 {
-    drive_t *drive = &watch->before;
-    drive_out_t out = image_out(watch->image);
-    if (interrupt == FIGURE_CONTROL) {
-        step(watch, &out);
-    } else {
-        step_slow(watch);
-    }
-    if (!same(drive, &watch->image->drive, sizeof *drive) ||
-        !same(&out, &watch->image->out, sizeof watch->image->out)) {
+    const twin_t *twin = watch->twin;
+    const bool control = interrupt == FIGURE_CONTROL;
+    const size_t at = control ? twin->control(watch->before, watch->image, watch->event)
+                              : twin->slow(watch->before, watch->image, watch->event);
+    if (at != TWIN_SAME) {
         cpu_fail(board_cpu(watch->board),
-                 "image and host differ after the %s interrupt of period %u, from byte %zu of %zu",
-                 interrupt == FIGURE_CONTROL ? "control" : "slow", watch->image->drive.period,
-                 first_difference(drive, &watch->image->drive, sizeof *drive), sizeof *drive);
+                 "image and host differ after the %s interrupt of period %u, from byte %zu of %u",
+                 control ? "control" : "slow", twin->period(watch->image), at, twin->drive_bytes);
     }
     watch->figures.identical++;
 }
@@ -148,10 +75,10 @@ static void trace(void *owner, int exception, bool entry)
     }
     const bool compared = interrupt == FIGURE_CONTROL || interrupt == FIGURE_SLOW;
     if (entry && compared) {
-        watch->before = watch->image->drive;
+        memcpy(watch->before, watch->image, watch->twin->drive_bytes);
         watch->entered = interrupt;
     } else if (!entry) {
-        watch->mode = mode_of(&watch->before);
+        watch->mode = watch->twin->mode(watch->before);
         if (compared && watch->entered == interrupt) { /* not one that had begun before the watch */
             compare(watch, interrupt);
         }
@@ -161,13 +88,14 @@ static void trace(void *owner, int exception, bool entry)
     }
 }
 
-bool watch_begin(watch_t *watch, board_t *board)
+bool watch_begin(watch_t *watch, board_t *board, const twin_t *twin)
 {
-    *watch = (watch_t){.board = board, .entered = -1};
-    watch->image = board_variable(board, "app_instance", sizeof *watch->image);
+    *watch = (watch_t){.board = board, .twin = twin, .entered = -1};
+    watch->image = board_variable(board, "app_instance", twin->memory_bytes);
     if (watch->image == NULL) {
         return false;
     }
+    watch->before = calloc(1, twin->drive_bytes);
     cpu_trace(board_cpu(board), watch, trace);
     return true;
 }
@@ -187,4 +115,5 @@ void watch_end(watch_t *watch)
     f->stack_most = board_stack_used(watch->board);
     f->resets = board_resets(watch->board);
     figures_merge(f);
+    free(watch->before);
 }

@@ -8,7 +8,7 @@
 
 #include "sim_plant/board/board.h"
 #include "tools/pmsim_board/figures.h"
-#include "tools/pmsim_board/image_memory.h"
+#include "tools/pmsim_board/twin.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -16,8 +16,9 @@ extern "C" {
 
 typedef struct {
     board_t *board;
-    const image_memory_t *image;                      /* in the processor's memory */
-    drive_t before;                                   /* at the entry of the interrupt that runs, */
+    const twin_t *twin;
+    const void *image;                                /* app_instance in the processor's memory */
+    void *before;                                     /* its drive at the entry of the interrupt that runs, */
     int entered;                                      /* which is this one; -1: none seen yet */
     int mode;                                         /* of the control interrupt that ends, */
     bool event[FIGURE_EVENTS];                        /* and what happened in it */
@@ -26,7 +27,7 @@ typedef struct {
 } watch_t;
 
 /* From now on, on a board that has booted. False: its image has no such memory. The watch stays in place. */
-bool watch_begin(watch_t *watch, board_t *board);
+bool watch_begin(watch_t *watch, board_t *board, const twin_t *twin);
 
 /* Adds what the board tells at the end, and all of it to the program's figures. */
 void watch_end(watch_t *watch);

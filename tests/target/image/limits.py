@@ -1,9 +1,9 @@
 """What the flashed image may take: flash, memory, stack in the worst nesting of interrupts; no heap; and that what the
 control interrupt reaches is in CCM SRAM.
 
-usage: limits.py IMAGE.elf [--flash BYTES] [--without FUNCTION...]     exit code 0: all within bounds
+usage: limits.py IMAGE.elf MANIFEST.yaml     exit code 0: all within the budgets of the manifest (firmware/images)
 
-Those that may stay in flash, with what only they reach, are named by --without.
+What may stay in flash, with what only it reaches, the manifest names by `in_flash`.
 
 The stack is the sum over the priorities: the deepest of thread and of the handlers of each, plus the frame that the
 processor stacks; before hal_start() there are no interrupts but faults. Frames are read from the instructions; where the compiler wrote one down (-fstack-usage), the larger
@@ -15,10 +15,9 @@ from pathlib import Path
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
+import gen_images  # noqa: E402
 from image_graph import Image  # noqa: E402
 
-RAM_MOST = 12 * 1024
-STACK_MOST = 2048
 EXCEPTION_FRAME = 36  # eight words, and one to align
 THREAD = "port_reset"
 # by priority; handlers of one priority do not interrupt each other
@@ -78,25 +77,26 @@ def check(what, figure, most):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("image", type=Path)
-    parser.add_argument("--flash", type=int, default=64 * 1024)
-    parser.add_argument("--without", nargs="*", default=[])
+    parser.add_argument("manifest", type=Path)
     options = parser.parse_args()
     path = options.image
+    manifest = gen_images.read(options.manifest)
+    most = manifest.budgets
     image = Image(path)
     sizes = {name: section.size for name, section in image.sections.items()}
     flash = sum(sizes[name] for name in (".vectors", ".ccm", ".text", ".rodata", ".data"))
     ram = sum(sizes[name] for name in (".vectors_ccm", ".data", ".bss", ".noinit"))
-    good = check("flash", flash, options.flash)
-    good &= check("static memory without stack", ram, RAM_MOST)
+    good = check("flash", flash, most["flash"])
+    good &= check("static memory without stack", ram, most["ram"])
+    good &= check("CCM SRAM", sizes[".vectors_ccm"] + sizes[".ccm"], most["ccm"])
     frames = compiler_frames(path)
     print("stack by rising priority, until interrupts come:")
-    good &= check("stack of the start", stack(image, frames, False), STACK_MOST)
+    good &= check("stack of the start", stack(image, frames, False), most["stack"])
     print("stack by rising priority, with interrupts:")
-    good &= check("stack", stack(image, frames, True), STACK_MOST)
+    good &= check("stack", stack(image, frames, True), most["stack"])
     reserved = image.symbols["port_stack_top"] - image.symbols["port_stack_bottom"]
-    good &= check("stack beside what is reserved", STACK_MOST, reserved)
-    print(f"     CCM SRAM: {sizes['.vectors_ccm'] + sizes['.ccm']} of 10240 bytes")
-    for name in outside_ccm(image, options.without):
+    good &= check("stack beside what is reserved", most["stack"], reserved)
+    for name in outside_ccm(image, manifest.in_flash):
         print(f"FAIL the control interrupt reaches {name} in flash")
         good = False
     for name in sorted(set(HEAP) & set(image.symbols)):
