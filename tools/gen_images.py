@@ -14,15 +14,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from dictionary import source  # noqa: E402
+from dictionary import methods, source  # noqa: E402
 from dictionary.source import SourceError  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = "firmware/images"
 CMAKE = f"{FOLDER}/images.cmake"
 NAMES = f"{FOLDER}/images.def"
-LISTS = ("firmware", "observers", "injection", "bldc")
-ROW = re.compile(r"^PM_METHOD\((\w+),", re.MULTILINE)
 KEYS = ("help", "board", "program", "methods", "trace_numbers", "in_flash", "budgets")
 WORD = re.compile(r"[A-Za-z]\w*")
 # key of `budgets` -> its own keys
@@ -41,19 +39,6 @@ class Image:
     trace_numbers: int
     in_flash: list
     budgets: dict  # flat: flash, ..., interrupt_mean
-
-
-def methods(root):
-    """Name -> list (path) of every method that an image may have."""
-    found = {}
-    for folder in LISTS:
-        for path in sorted((root / folder).glob("**/*.def")):
-            shown = str(path.relative_to(root))
-            for name in ROW.findall(path.read_text(encoding="utf-8")):
-                if name in found:
-                    raise SourceError(f"{shown}: method `{name}` stands in {found[name]} already")
-                found[name] = shown
-    return found
 
 
 def _budgets(table):
@@ -101,7 +86,7 @@ def read(path, root=ROOT):
         raise table.error(f"trace_numbers must be {TRACE_LEAST} to {TRACE_MOST}", "trace_numbers")
     in_flash = table.texts("in_flash")
     return Image(path.stem, table.text("help"), table.text("board"), table.text("program"),
-                 _methods(table, methods(root)), trace_numbers, in_flash, _budgets(table.table("budgets")))
+                 _methods(table, methods.known(root)), trace_numbers, in_flash, _budgets(table.table("budgets")))
 
 
 def images(root=ROOT):
@@ -145,7 +130,7 @@ def names(found):
 
 def files(root=ROOT):
     """{path: text} of all that is generated."""
-    known, found = methods(Path(root)), images(root)
+    known, found = methods.known(Path(root)), images(root)
     out = {f"{FOLDER}/{image.name}.h": header(image, known) for image in found}
     out[CMAKE] = cmake(found)
     out[NAMES] = names(found)

@@ -37,7 +37,7 @@ static uint16_t bit_rate(const hal_t *hal)
 {
     bool has_index;
     const od_entry_t *entry = od_find(0x2080, 2, &has_index);
-    int32_t kbit_s = od_values_of(entry)->preset;
+    int32_t kbit_s = od_values_of(entry).preset;
     (void)app_stored_value(hal, entry->index, entry->sub, &kbit_s);
     return (uint16_t)kbit_s;
 }

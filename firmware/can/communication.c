@@ -168,7 +168,7 @@ static void preset_words(node_t *node)
 {
     for (uint32_t row = 0; row < od_count; row++) {
         const od_entry_t *entry = &od_table[row];
-        node_recall(node, entry, od_values_of(entry)->preset);
+        node_recall(node, entry, od_values_of(entry).preset);
     }
     node_host_recall(node->context);
 }

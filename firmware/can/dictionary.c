@@ -2,6 +2,20 @@
 
 #include <stddef.h>
 
+#include "firmware/params/parameters.h"
+
+od_values_t od_values_of(const od_entry_t *entry)
+{
+    if (entry->kind == (uint8_t)OD_PARAMETER) {
+        const drive_param_info_t *info = &drive_param_table[entry->slot];
+        return (od_values_t){.least = info->min, .preset = info->def, .most = info->max};
+    }
+    if ((entry->flags & (uint32_t)OD_RANGE) == 0U) {
+        return (od_values_t){.preset = od_presets[entry->values]};
+    }
+    return od_values[entry->values];
+}
+
 const od_entry_t *od_find(uint16_t index, uint8_t sub, bool *has_index)
 {
     const uint32_t wanted = (uint32_t)index * 256U + sub;

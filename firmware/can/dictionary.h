@@ -29,7 +29,7 @@ typedef enum {
 typedef enum {
     OD_CONSTANT,  /* `preset` itself; a string or domain: constant bytes number `slot` */
     OD_NODE,      /* word `slot` of the node's own: communication objects */
-    OD_PARAMETER, /* parameter `slot` of the drive (drive_param_id_t) */
+    OD_PARAMETER, /* parameter `slot` of the drive (drive_param_id_t), as the image counts them */
     OD_LIVE,      /* number `slot` of what the application shows or takes: CiA 402, measurements, trace */
 } od_kind_t;
 
@@ -60,12 +60,13 @@ typedef struct {
     unsigned kind : 2;  /* od_kind_t */
     unsigned group : 2; /* od_group_t */
     unsigned slot : 10;
-    unsigned values : 10; /* of od_values */
+    unsigned values : 10; /* place in od_values or od_presets; parameters have theirs elsewhere */
 } od_entry_t;
 
 /* Generated: dictionary_table.c, and the names of slots in dictionary_slots.h */
 extern const od_entry_t od_table[];
-extern const od_values_t od_values[]; /* each that occurs, once */
+extern const od_values_t od_values[]; /* of what has OD_RANGE: each that occurs, once; without parameters */
+extern const int32_t od_presets[];    /* of what has no range */
 extern const uint16_t od_count;
 extern const uint32_t od_schema; /* CRC-32 over what a stored set depends on */
 
@@ -77,10 +78,8 @@ typedef struct {
 
 extern const od_bytes_t od_bytes[];
 
-static inline const od_values_t *od_values_of(const od_entry_t *entry)
-{
-    return &od_values[entry->values];
-}
+/* Without OD_RANGE only the preset counts. */
+od_values_t od_values_of(const od_entry_t *entry);
 
 /* NULL: no such object, or with *has_index no such sub-index. Binary search. */
 const od_entry_t *od_find(uint16_t index, uint8_t sub, bool *has_index);

@@ -37,7 +37,7 @@ uint32_t object_find(uint16_t index, uint8_t sub, const od_entry_t **entry)
 int32_t object_preset(const node_t *node, const od_entry_t *entry)
 {
     const uint32_t relative = (entry->flags & (uint32_t)OD_NODE_ID) != 0U ? node->id : 0U;
-    return (int32_t)((uint32_t)od_values_of(entry)->preset + relative);
+    return (int32_t)((uint32_t)od_values_of(entry).preset + relative);
 }
 
 /* A mapping of a PDO is reported as index, sub-index and bits of its object. */
@@ -114,9 +114,9 @@ static uint32_t check_range(const od_entry_t *entry, int32_t value)
     if ((entry->flags & (uint32_t)OD_RANGE) == 0U) {
         return SDO_OK;
     }
-    const od_values_t *range = od_values_of(entry);
-    const bool low = is_signed(entry) ? value < range->least : (uint32_t)value < (uint32_t)range->least;
-    const bool high = is_signed(entry) ? value > range->most : (uint32_t)value > (uint32_t)range->most;
+    const od_values_t range = od_values_of(entry);
+    const bool low = is_signed(entry) ? value < range.least : (uint32_t)value < (uint32_t)range.least;
+    const bool high = is_signed(entry) ? value > range.most : (uint32_t)value > (uint32_t)range.most;
     if (low) {
         return SDO_TOO_LOW;
     }

@@ -5,7 +5,7 @@
 
 /* clang-format off */
 #define PM_IMAGE_NAME "small"
-#define PM_IMAGE_TRACE_NUMBERS 4000U
+#define PM_IMAGE_TRACE_NUMBERS 3840U
 
 #define PM_WITHOUT_mismatch 1
 #define PM_WITHOUT_ekf_full 1

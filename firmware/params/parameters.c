@@ -25,10 +25,11 @@ void drive_params_default(drive_params_t *params)
     for (int32_t id = 0; id < (int32_t)DRIVE_PARAM_COUNT; id++) {
         drive_param_set(params, (drive_param_id_t)id, drive_param_table[id].def);
     }
+    params->absent = 0;
 }
 
-/* Every member is an int32_t, so the struct has the layout of an array of them. */
-_Static_assert(sizeof(drive_params_t) == DRIVE_PARAM_COUNT * sizeof(int32_t), "a parameter is not 32 bits");
+/* Every member is an int32_t, so the struct has the layout of an array of them; those that are absent share one. */
+_Static_assert(sizeof(drive_params_t) == (DRIVE_PARAM_COUNT + 1) * sizeof(int32_t), "a parameter is not 32 bits");
 
 int32_t drive_param_get(const drive_params_t *params, drive_param_id_t id)
 {

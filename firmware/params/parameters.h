@@ -3,10 +3,12 @@
  *
  * drive_params_t holds one int32 per parameter; drive_param_table describes them in the same order. A value
  * outside its range, or a combination that cannot be, is refused by drive_configure(), which names it.
- * Tests: tests/unit/drive/parameters_test.cpp. */
+ * A parameter of methods that an image does not have is not in its table and has no id; it reads as 0 there, so
+ * that code that nobody calls compiles. Tests: tests/unit/drive/parameters_test.cpp. */
 #ifndef PARAMS_PARAMETERS_H
 #define PARAMS_PARAMETERS_H
 
+#include "firmware/math/image.h"
 #include "firmware/params/types.h"
 
 #ifdef __cplusplus
@@ -17,13 +19,24 @@ struct drive_params {
 #define PM_PARAM(name, unit, exp10, min, def, max, help) int32_t name;
 #include "firmware/params/parameters.def"
 #undef PM_PARAM
+    union { /* what the image does not have: 0 */
+        int32_t absent;
+#define PM_PARAM(name, unit, exp10, min, def, max, help)
+#define PM_NO_PARAM(name) int32_t name;
+#include "firmware/params/parameters.def"
+#undef PM_PARAM
+    };
 };
 
 enum {
 #define PM_PARAM(name, unit, exp10, min, def, max, help) DRIVE_PARAM_##name,
 #include "firmware/params/parameters.def"
 #undef PM_PARAM
-    DRIVE_PARAM_COUNT
+    DRIVE_PARAM_COUNT,
+#define PM_PARAM(name, unit, exp10, min, def, max, help)
+#define PM_NO_PARAM(name) DRIVE_PARAM_##name = DRIVE_PARAM_COUNT,
+#include "firmware/params/parameters.def"
+#undef PM_PARAM
 };
 
 typedef struct {

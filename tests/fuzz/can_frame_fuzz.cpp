@@ -123,9 +123,9 @@ uint32_t put(void *context, const od_entry_t *entry, int32_t value)
     uint32_t code = SDO_UNSUPPORTED;
     if ((entry->flags & OD_RANGE) != 0) { // the node promises it
         const bool is_signed = entry->type <= OD_I32;
-        demand(is_signed ? value >= od_values_of(entry)->least && value <= od_values_of(entry)->most
-                         : uint32_t(value) >= uint32_t(od_values_of(entry)->least) &&
-                               uint32_t(value) <= uint32_t(od_values_of(entry)->most));
+        demand(is_signed ? value >= od_values_of(entry).least && value <= od_values_of(entry).most
+                         : uint32_t(value) >= uint32_t(od_values_of(entry).least) &&
+                               uint32_t(value) <= uint32_t(od_values_of(entry).most));
     }
     demand((entry->flags & OD_WRITE) != 0);
     demand((entry->flags & OD_ONLY_OFF) == 0 || !on(context));

@@ -41,7 +41,7 @@ def c_flags(entry):
         flags.append("OD_ONLY_OFF")
     if entry.node_id:
         flags.append("OD_NODE_ID")
-    if entry.least is not None and entry.writable:
+    if has_range(entry):
         flags.append("OD_RANGE")
     return " | ".join(flags)
 
@@ -52,8 +52,53 @@ def c_values(entry):
 
 
 def all_values(dictionary):
-    """Each that occurs, once."""
-    return sorted({c_values(e) for e in dictionary.entries})
+    """Each range that occurs, once, and each preset of what has none; those of parameters stand in parameters.def."""
+    own = [e for e in dictionary.entries if e.lives != "parameter"]
+    ranges = sorted({c_values(e) for e in own if has_range(e)})
+    presets = sorted({c_values(e)[1] for e in own if not has_range(e)})
+    return {"ranges": ranges, "presets": presets}
+
+
+def has_range(entry):
+    return entry.least is not None and entry.writable
+
+
+def c_place(entry, values):
+    """Of its values in those of all_values()."""
+    if entry.lives == "parameter":
+        return 0
+    least_to_most = c_values(entry)
+    return values["ranges"].index(least_to_most) if has_range(entry) else values["presets"].index(least_to_most[1])
+
+
+def image_methods(dictionary, known):
+    """(index, sub) -> methods of the lists, one of which an image must have for the entry; none: all images have it.
+
+    A record's count goes with its last member.
+    """
+    out = {}
+    for obj in dictionary.objects:
+        out.update({(e.index, e.sub): e.methods if all(name in known for name in e.methods) else () for e in obj.entries})
+        members = [out[(e.index, e.sub)] for e in obj.entries if e.sub]
+        if members:
+            out[(obj.index, 0)] = tuple(dict.fromkeys(sum(members, ()))) if all(members) else ()
+    return out
+
+
+def runs(entries, methods):
+    """[(condition of the preprocessor, or "", entries)] in order."""
+    out = []
+    for entry in entries:
+        condition = " || ".join(f"PM_HAS({name})" for name in methods[(entry.index, entry.sub)])
+        if not out or out[-1][0] != condition:
+            out.append((condition, []))
+        out[-1][1].append(entry)
+    return out
+
+
+def c_slot(entry):
+    """Slots of parameters depend on the image."""
+    return f"OD_PARAMETER_{c_name(entry.alias or entry.name)}" if entry.lives == "parameter" else f"{entry.slot}U"
 
 
 FILTERS = {
@@ -64,6 +109,8 @@ FILTERS = {
     "c_kind": lambda e: KINDS[e.lives],
     "c_group": lambda e: f"OD_GROUP_{e.group.upper()}",
     "c_values": c_values,
+    "c_slot": c_slot,
+    "c_place": c_place,
 }
 
 

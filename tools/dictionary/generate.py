@@ -4,7 +4,7 @@ from pathlib import Path
 
 import jinja2
 
-from . import emit_c, emit_dbc, emit_docs, emit_eds, ledger, model, reader
+from . import emit_c, emit_dbc, emit_docs, emit_eds, ledger, methods, model, reader
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = "firmware/params/parameters.yaml"
@@ -28,12 +28,17 @@ def _environment():
 
 
 def _c_files(render, dictionary, sheet):
-    render("firmware/params/parameters.def", "parameters.def.j2", objects=dictionary.objects)
+    of_image = emit_c.image_methods(dictionary, methods.known(ROOT))
+    groups = [(obj.name, emit_c.runs([e for e in obj.entries if e.lives == "parameter"], of_image)) for obj in dictionary.objects
+             if obj.entries[-1].lives == "parameter" and not obj.entries[-1].alias]
+    render("firmware/params/parameters.def", "parameters.def.j2", parts=groups)
     render("firmware/app/error_codes.def", "error_codes.def.j2", faults=dictionary.faults)
-    render("firmware/can/dictionary_slots.h", "dictionary_slots.h.j2", words=[e for e in dictionary.of("node") if not model.is_mapping(e)],
-           mappings=[e for e in dictionary.of("node") if model.is_mapping(e)], live=dictionary.of("live"), parameters=dictionary.of("parameter"),
+    node = dictionary.of("node")
+    render("firmware/can/dictionary_slots.h", "dictionary_slots.h.j2", words=[e for e in node if not model.is_mapping(e)],
+           mappings=[e for e in node if model.is_mapping(e)], live=dictionary.of("live"),
+           parameters=emit_c.runs(dictionary.of("parameter"), of_image),
            bytes=[e for e in dictionary.of("constant") if e.bits == 0])
-    render("firmware/can/dictionary_table.c", "dictionary_table.c.j2", entries=dictionary.entries,
+    render("firmware/can/dictionary_table.c", "dictionary_table.c.j2", runs=emit_c.runs(dictionary.entries, of_image),
            values=emit_c.all_values(dictionary), schema=emit_c.schema(dictionary))
     render(BYTES, "dictionary_bytes.c.j2",
            constants=emit_c.constants(dictionary, sheet))

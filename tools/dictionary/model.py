@@ -208,7 +208,7 @@ def link_alias(dictionary):
                 raise entry.error(f"{entry.type} cannot hold all values of `{entry.alias}`")
             entry.unit, entry.exp10 = target.unit, target.exp10
             entry.least, entry.most, entry.preset = target.least, target.most, target.preset
-            entry.access, entry.book = target.access, target.book
+            entry.access, entry.book, entry.methods = target.access, target.book, target.methods
 
 
 def is_mapping(entry):

@@ -54,15 +54,15 @@ int64_t highest(const od_entry_t &entry)
 int64_t least(const od_entry_t &entry)
 {
     return (entry.flags & OD_RANGE) == 0 ? lowest(entry)
-           : is_signed(entry)            ? int64_t(od_values_of(&entry)->least)
-                                         : int64_t(uint32_t(od_values_of(&entry)->least));
+           : is_signed(entry)            ? int64_t(od_values_of(&entry).least)
+                                         : int64_t(uint32_t(od_values_of(&entry).least));
 }
 
 int64_t most(const od_entry_t &entry)
 {
     return (entry.flags & OD_RANGE) == 0 ? highest(entry)
-           : is_signed(entry)            ? int64_t(od_values_of(&entry)->most)
-                                         : int64_t(uint32_t(od_values_of(&entry)->most));
+           : is_signed(entry)            ? int64_t(od_values_of(&entry).most)
+                                         : int64_t(uint32_t(od_values_of(&entry).most));
 }
 
 std::string name(const od_entry_t &entry)

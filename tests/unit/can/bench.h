@@ -253,7 +253,7 @@ class Bench
     {
         auto &all = self(context).values(e);
         const auto found = all.find(e->slot);
-        return found == all.end() ? od_values_of(e)->preset : found->second;
+        return found == all.end() ? od_values_of(e).preset : found->second;
     }
 
     static uint32_t put(void *context, const od_entry_t *e, int32_t value)

@@ -116,8 +116,8 @@ TEST(Dictionary, EveryValueIsAcceptedAtItsLimitsAndRefusedBeyond)
         }
         Bench x;
         const bool ranged = (e->flags & OD_RANGE) != 0;
-        const int64_t least = ranged ? limit(*e, od_values_of(e)->least) : least_of_type(*e);
-        const int64_t most = ranged ? limit(*e, od_values_of(e)->most) : most_of_type(*e);
+        const int64_t least = ranged ? limit(*e, od_values_of(e).least) : least_of_type(*e);
+        const int64_t most = ranged ? limit(*e, od_values_of(e).most) : most_of_type(*e);
         for (const int64_t value : {least, most}) {
             x.taken.clear();
             EXPECT_EQ(x.set(e->index, e->sub, uint32_t(value)), 0U) << name(*e) << " " << value;
@@ -150,7 +150,7 @@ TEST(Dictionary, WhatIsOnlyForOffIsRefusedWhileOn)
         if ((e->flags & OD_WRITE) != 0) {
             Bench x;
             x.on = true;
-            const bool refused = x.set(e->index, e->sub, uint32_t(od_values_of(e)->preset)) == 0x08000022U;
+            const bool refused = x.set(e->index, e->sub, uint32_t(od_values_of(e).preset)) == 0x08000022U;
             const bool inhibit =
                 e->index >= 0x1800 && e->index < 0x1804 && e->sub == 3; // not while it is in use
             EXPECT_EQ(refused, (e->flags & OD_ONLY_OFF) != 0 || (inhibit && e->index == 0x1800)) << name(*e);
@@ -185,7 +185,7 @@ TEST(Dictionary, SubIndexZeroCountsItsRecord)
             while (last + 1 < od_count && od_table[last + 1].index == e.index) {
                 ++last;
             }
-            EXPECT_EQ(od_values_of(&e)->preset, od_table[last].sub) << name(e);
+            EXPECT_EQ(od_values_of(&e).preset, od_table[last].sub) << name(e);
         }
     }
 }

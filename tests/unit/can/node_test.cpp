@@ -474,7 +474,7 @@ class Lss : public Bench
     uint32_t identity(uint8_t n)
     {
         return can::entry(0x1018, n)->kind == OD_NODE ? 0x12345678
-                                                      : uint32_t(od_values_of(can::entry(0x1018, n))->preset);
+                                                      : uint32_t(od_values_of(can::entry(0x1018, n)).preset);
     }
 };
 

@@ -7,7 +7,8 @@ using can::Bytes;
 // instead of the generated table
 extern "C" {
 enum { RW = OD_READ | OD_WRITE };
-extern const od_values_t od_values[] = {{0, 0, 0}, {0, 5, 0}};
+extern const od_values_t od_values[] = {{0, 0, 0}};
+extern const int32_t od_presets[] = {0, 5};
 extern const od_entry_t od_table[] = {
     {0x1F50, 1, OD_WRITE | OD_ONLY_OFF, OD_DOMAIN, OD_LIVE, OD_GROUP_NONE, 0, 0},
     {0x2000, 0, RW, OD_DOMAIN, OD_LIVE, OD_GROUP_NONE, 1, 0},

@@ -228,7 +228,7 @@ ENTRIES = (
     Entry(0x2300, 14, "speed_estimator", "position", "i32", "live", "1", 0, 0, 0, 3, 0, False, True, "application", "none", {0: 'loop', 1: 'difference of positions', 2: 'EMF ratio', 3: 'difference and EMF ratio combined'}, 'speed for the speed controller; #148 and #149 of the book too', "A #150"),
     Entry(0x2300, 15, "second_harmonic", "position", "i32", "live", "1", 0, 0, 0, 2, 0, False, True, "application", "none", {0: 'stays', 1: 'adaptive notch at the angle', 2: 'resonator at the speed'}, 'takes an error at twice the angle, of unlike phases, out of the position', "3.6.3 #35"),
     Entry(0x2300, 16, "mismatch_correction", "position", "i32", "live", "1", 0, 0, 0, 2, 0, False, True, "application", "none", {0: 'off', 1: 'injection on the q-axis against a wrong L_q', 2: 'injection on the d-axis against a wrong R_s'}, ("learns the position's error of wrong parameters from an injected current; "
- '#29 to #31 of the book too. Not in pmdrive.elf'), "3.5.2.4 #32"),
+ '#29 to #31 of the book too.'), "3.5.2.4 #32"),
     Entry(0x2300, 17, "mismatch_frequency", "position", "i32", "live", "Hz", -3, 0, 2000, 100000, 40000, False, True, "application", "none", {}, ('of that current; on the d-axis at most a quarter of the electrical '
  'frequency. A step of 1 kHz is a whole part of its period'), "3.5.2.1 #29"),
     Entry(0x2300, 18, "mismatch_current", "position", "i32", "live", "A", -3, 0, 10, 1000000, 400, False, True, "application", "none", {}, 'its amplitude, a tenth of the rated current; J must be right for the q-axis', "3.5.2.2 #30"),
