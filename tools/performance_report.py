@@ -11,12 +11,15 @@ import sys
 import tempfile
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import gen_images  # noqa: E402
+
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs/performance.md"
 PMSIM = ROOT / "out/build/host-release/tools/pmsim/pmsim"
 TARGET = ROOT / "out/build/stm32g431"
-IMAGE = TARGET / "pmdrive.elf"
-IMAGE_ALL = TARGET / "pmdrive_all.elf"
+IMAGES = gen_images.images(ROOT)
+FOC, SMALL = (TARGET / f"{next(x.program for x in IMAGES if x.name == name)}.elf" for name in ("foc", "small"))
 SCENARIOS = ROOT / "tests/scenario"
 FAST = (SCENARIOS / "board/identity.yaml", "--set", "theta=0")  # at 20 kHz
 RUNS = 5
@@ -35,7 +38,7 @@ def count_step(folder):
                               "--", record]))["functions"]
 
 
-def run_board(folder, *words, image=IMAGE):
+def run_board(folder, *words, image=SMALL):
     """Figures of a run on the emulated board."""
     figures = folder / "figures.json"
     output([PMSIM, "board", image, *words, "--jobs", "1", "--quiet", "--figures", figures])
@@ -44,17 +47,24 @@ def run_board(folder, *words, image=IMAGE):
 
 def board_speed(*words):
     """Simulated seconds per second of the wall: the best of several runs, which others on the machine slow down."""
-    runs = (json.loads(output([PMSIM, "board", IMAGE, *words, "--jobs", "1", "--json"])) for _ in range(RUNS))
+    runs = (json.loads(output([PMSIM, "board", SMALL, *words, "--jobs", "1", "--json"])) for _ in range(RUNS))
     return max(run["simulated_s"] / run["wall_s"] for run in runs)
 
 
-def limits(*words):
-    """What -> (bytes, bound) of an image."""
-    text = output([sys.executable, ROOT / "tests/target/image/limits.py", *words])
-    return re.findall(r"(?m)^ok\s+(.+?): (\d+) of (\d+) bytes", text)
+def limits(image):
+    """What -> (bytes, budget) of an image."""
+    manifest = ROOT / gen_images.FOLDER / f"{image.name}.yaml"
+    text = output([sys.executable, ROOT / "tests/target/image/limits.py", TARGET / f"{image.program}.elf", manifest])
+    return {what: (size, most) for what, size, most in re.findall(r"(?m)^ok\s+(.+?): (\d+) of (\d+) bytes", text)}
 
 
-# Number -> name of those that pmdrive.elf leaves out.
+def size_rows():
+    """Bytes and budget of every image."""
+    found = [limits(image) for image in IMAGES]
+    return [[what, *(figure for sizes in found for figure in sizes[what])] for what in found[0]]
+
+
+# Number -> name of those that the image `small` leaves out.
 OBSERVERS = {6: "`ekf_full`", 7: "`ekf_reduced`", 8: "`mras_current`", 9: "`mras_voltage`", 10: "`mras_simple`"}
 SPEEDS = ("speed of the emulation with plant and comparison, simulated s per wall s",
           "the same for the demonstration, at 10 kHz")
@@ -80,9 +90,9 @@ def speeds(keep):
 
 
 def observer_rows(folder):
-    """Of pmdrive_all.elf, by optional observer."""
+    """Of the image `foc`, by optional observer."""
     for number, name in OBSERVERS.items():
-        run = run_board(folder, SCENARIOS / "board/observers.yaml", "--set", f"observer={number}", image=IMAGE_ALL)
+        run = run_board(folder, SCENARIOS / "board/observers.yaml", "--set", f"observer={number}", image=FOC)
         yield [name, *(f"{run[f'control.{key}']:.0f}" for key in ("flux.mean", "blend.mean", "worst")),
                f"{run['control.worst_percent']:.1f} %", f"{run['load_percent']:.1f} %"]
 
@@ -128,11 +138,9 @@ def main():
                ["interrupts after which the drive's memory was the host's, bit for bit",
                 f"{demo['identical'] + fast['identical']:.0f} of as many", "all"],
                [SPEEDS[0], speed, "4"], [SPEEDS[1], slow_speed, ""]]),
-        table(["control interrupt of `pmdrive_all.elf`, 20 kHz", "observer, mean", "with injection, mean", "worst",
+        table(["control interrupt of `foc`, 20 kHz", "observer, mean", "with injection, mean", "worst",
                "of the period, worst", "processor load"], optional),
-        table(["image", "bytes", "budget", "with all observers"],
-              [[what, size, bound, all_size] for (what, size, bound), (_, all_size, _)
-               in zip(limits(IMAGE), limits(IMAGE_ALL, "--flash", "73728", "--without", "commissioning_step"))]),
+        table(["bytes", *(head for image in IMAGES for head in (f"`{image.name}`", "budget"))], size_rows()),
     ]
     text, found = re.subn(r"(?s)(<!-- measured -->\n).*?(<!-- end -->)",
                           lambda m: m[1] + "\n" + "\n\n".join(parts) + "\n\n" + m[2], PAGE.read_text())

@@ -8,7 +8,7 @@ const drive_param_info_t drive_param_table[DRIVE_PARAM_COUNT] = {
 #undef PM_PARAM
 };
 
-const int8_t drive_param_exp10[DRIVE_PARAM_COUNT] = {
+const int8_t drive_param_exp10[DRIVE_PARAM_COUNT + 1] = {
 #define PM_PARAM(name, unit, exp10, min, def, max, help) exp10,
 #include "firmware/params/parameters.def"
 #undef PM_PARAM
@@ -29,7 +29,8 @@ void drive_params_default(drive_params_t *params)
 }
 
 /* Every member is an int32_t, so the struct has the layout of an array of them; those that are absent share one. */
-_Static_assert(sizeof(drive_params_t) == (DRIVE_PARAM_COUNT + 1) * sizeof(int32_t), "a parameter is not 32 bits");
+_Static_assert(sizeof(drive_params_t) == (DRIVE_PARAM_COUNT + 1) * sizeof(int32_t),
+               "a parameter is not 32 bits");
 
 int32_t drive_param_get(const drive_params_t *params, drive_param_id_t id)
 {

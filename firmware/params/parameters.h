@@ -45,7 +45,8 @@ typedef struct {
 } drive_param_info_t;
 
 extern const drive_param_info_t drive_param_table[DRIVE_PARAM_COUNT];
-extern const int8_t drive_param_exp10[DRIVE_PARAM_COUNT]; /* a value is its integer times 10^exp10 */
+/* A value is its integer times 10^exp10; the last is for those that are absent. */
+extern const int8_t drive_param_exp10[DRIVE_PARAM_COUNT + 1];
 
 /* What people read; the firmware does without it. */
 typedef struct {

@@ -77,7 +77,7 @@ class SimulatedNode(threading.Thread):
         self.lib.node_stored.restype = c.c_int32
         self.bus = can.Bus(interface="virtual", channel=channel)
         self.node, self.profile = c.create_string_buffer(16384), c.create_string_buffer(512)
-        self.parameters = dict(enumerate((e.index, e.sub) for e in names.select([])))
+        self.parameters = self._places(names.select([]))
         self.values = {(e.index, e.sub): e.preset or 0 for e in dictionary.ENTRIES if e.number}
         self.kept = {(0x2080, 1): node_id}
         self.backup, self.fault, self.alarms, self.enabled_at, self.speed = None, 0, [], None, 0
@@ -88,6 +88,11 @@ class SimulatedNode(threading.Thread):
         self.host = Host(**{name: kind(getattr(self, "_" + name)) for name, kind in CALLS})
         self.boot()
         self.start()
+
+    def _places(self, entries):
+        """Slot -> place of those that the library has."""
+        rows = ((e, self.lib.od_find(e.index, e.sub, c.byref(c.c_bool()))) for e in entries)
+        return {row.contents.slot: (e.index, e.sub) for e, row in rows if row}
 
     def place(self, name):
         entry = names.find(name)

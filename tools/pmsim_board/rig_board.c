@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "firmware/app/app.h"
+#include "firmware/params/parameters.h"
 #include "firmware/params/store.h"
 #include "sim_plant/board/board.h"
 #include "tools/pmsim/rig_sample.h"

@@ -6,6 +6,7 @@
 #include "firmware/can/dictionary.h"
 #include "firmware/drive/drive_state.h"
 #include "firmware/math/image.h"
+#include "firmware/params/parameters.h"
 #include "firmware/params/store.h"
 #include "hal/hal.h"
 #include "tools/pmsim/rig_sample.h"

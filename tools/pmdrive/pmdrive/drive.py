@@ -8,7 +8,7 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from . import dictionary, names
 from .entry import Entry
-from .errors import BusError, Disturbed, FaultError, NoAnswer, NotDone, Refused, UsageError
+from .errors import BusError, Disturbed, FaultError, NoAnswer, NotDone, NotInImage, Refused, UsageError
 
 SAVE = int.from_bytes(b"save", "little")
 LOAD = int.from_bytes(b"load", "little")
@@ -72,7 +72,8 @@ class Drive:
             try:
                 return function(index, sub, *arguments)
             except SdoAbortedError as error:
-                raise Refused(label, error.code, index, sub) from None
+                known = (index, sub) in names.BY_PLACE and error.code in NotInImage.CODES
+                raise (NotInImage if known else Refused)(label, error.code, index, sub) from None
             except SdoCommunicationError as error:
                 silent = "No SDO response" in str(error)
                 if silent or not left:  # else the answer was to another client of the drive
@@ -137,11 +138,14 @@ class Drive:
     # --- many values ------------------------------------------------------------------------------------------
 
     def dump(self, entries=None, progress=None):
-        """{entry: integer}; all that is stored if no entries are given."""
+        """{entry: integer}; all that is stored if no entries are given. Without what is not in the drive's image."""
         entries = names.stored() if entries is None else entries
         out = {}
         for n, entry in enumerate(entries, 1):
-            out[entry] = self.read(entry)
+            try:
+                out[entry] = self.read(entry)
+            except NotInImage:
+                pass
             if progress:
                 progress(n, len(entries))
         return out
@@ -149,7 +153,10 @@ class Drive:
     def diff(self, values, progress=None):
         """[(entry, here, there)] of what differs from values."""
         present = self.dump(list(values), progress)
-        return [(entry, present[entry], raw) for entry, raw in values.items() if present[entry] != raw]
+        for entry in values.keys() - present.keys():
+            if values[entry] != entry.preset:
+                self.read(entry)  # says that it is not in this image
+        return [(entry, here, values[entry]) for entry, here in present.items() if here != values[entry]]
 
     def load(self, values, dry_run=False, progress=None):
         """Sets what differs, all checked together by the drive, and reads it back. Returns what diff() gave."""

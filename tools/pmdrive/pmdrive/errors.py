@@ -76,6 +76,18 @@ class Refused(PmdriveError):
         return {**super().as_dict(), "object": self.label, "abort": self.code, "index": self.index, "sub": self.sub}
 
 
+class NotInImage(Refused):
+    """An object that this tool knows and the device does not have: it belongs to methods that its image lacks."""
+
+    CODES = (0x06020000, 0x06090011)
+
+    def __init__(self, label, code, index, sub):
+        super().__init__(label, code, index, sub, "flash an image that has the method, or a firmware of this version: "
+                                                  "`pmdrive info` tells which it is")
+        self.text = f"{label}: not in this image ({code >> 16:04X} {code & 0xFFFF:04X}h)"
+        self.args = (f"{self.text}\n  {self.do}",)
+
+
 class NoAnswer(PmdriveError):
     """Nothing comes back."""
 

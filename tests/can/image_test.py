@@ -1,0 +1,61 @@
+"""The host tool against the node of an image without some methods: their parameters are not there, and it says so.
+
+usage: image_test.py LIBRARY [unittest's words]     the shared library of firmware/can, made for firmware/images/small.h
+"""
+import sys
+import unittest
+from pathlib import Path
+
+import tool_test
+from pmdrive import dictionary, names
+from pmdrive.errors import NotInImage
+from tool_test import Bench
+
+WITHOUT_MEMBER, WITHOUT_OBJECT = "mismatch_frequency", "ekf_speed_noise"
+NO_OBJECT, NO_SUB = 0x06020000, 0x06090011
+
+
+class Image(Bench):
+    def test_a_parameter_of_an_absent_method_is_refused_by_name(self):
+        with self.connect() as drive:
+            for name, code in ((WITHOUT_MEMBER, NO_SUB), (WITHOUT_OBJECT, NO_OBJECT)):
+                for access in (lambda: drive.read(name), lambda: drive.write(name, names.find(name).preset)):
+                    with self.assertRaises(NotInImage) as caught:
+                        access()
+                    self.assertEqual(caught.exception.code, code)
+                    self.assertIn("not in this image", str(caught.exception))
+
+    def test_the_command_says_so(self):
+        _, err = self.command("get", WITHOUT_OBJECT, code=1)
+        self.assertIn("not in this image", err)
+
+    def test_places_of_the_others_are_unchanged(self):
+        with self.connect() as drive:
+            for entry in names.select([]):
+                if entry.name not in (WITHOUT_MEMBER, WITHOUT_OBJECT):
+                    try:
+                        self.assertEqual(drive.read(entry), self.node.values[(entry.index, entry.sub)], entry.name)
+                    except NotInImage:
+                        self.assertRegex(entry.name, "^(ekf|mismatch)_")
+
+    def test_a_dump_leaves_it_out_and_loads_again(self):
+        out, _ = self.command("dump", "--out", self.path("all.yaml"))
+        text = Path(self.path("all.yaml")).read_text(encoding="utf-8")
+        self.assertIn("open_loop_damping", text)
+        self.assertNotIn(WITHOUT_OBJECT, text)
+        self.assertIn("nothing to change", self.command("load", self.path("all.yaml"))[0])
+
+    def test_a_value_that_cannot_be_set_is_named(self):
+        values = {names.find(WITHOUT_MEMBER): names.find(WITHOUT_MEMBER).preset}
+        with self.connect() as drive:
+            self.assertEqual(drive.diff(values), [])
+            with self.assertRaises(NotInImage):
+                drive.diff({entry: raw + 1 for entry, raw in values.items()})
+
+    def test_the_tool_knows_more_than_the_image(self):
+        self.assertIn(WITHOUT_OBJECT, {entry.name for entry in dictionary.ENTRIES})
+
+
+if __name__ == "__main__":
+    tool_test.LIBRARY = sys.argv.pop(1)
+    unittest.main()
