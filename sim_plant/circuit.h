@@ -21,6 +21,7 @@
 #include "sim_plant/bridge.h"
 #include "sim_plant/dclink.h"
 #include "sim_plant/field.h"
+#include "sim_plant/lags.h"
 #include "sim_plant/mechanics.h"
 #include "sim_plant/probe.h"
 
@@ -64,6 +65,7 @@ typedef struct {
     dclink_t link;
     mechanics_t mech;
     probe_t probe;
+    lags_t lags;
     point_t now;
     point_t next;  /* the end of a step, until that is taken */
     field_t field; /* of the present point, when a symmetrical machine knows it */
