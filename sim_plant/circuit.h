@@ -21,6 +21,7 @@
 #include "sim_plant/bridge.h"
 #include "sim_plant/dclink.h"
 #include "sim_plant/field.h"
+#include "sim_plant/lags.h"
 #include "sim_plant/mechanics.h"
 #include "sim_plant/probe.h"
 
@@ -64,11 +65,13 @@ typedef struct {
     dclink_t link;
     mechanics_t mech;
     probe_t probe;
+    lags_t lags;
     point_t now;
     point_t next;  /* the end of a step, until that is taken */
     field_t field; /* of the present point, when a symmetrical machine knows it */
     bool field_known;
-    int events; /* since the end of a segment */
+    bool in_blocks; /* the legs commutate in blocks (gates.h) */
+    int events;     /* since the end of a segment */
     double t_s;
     double period_start_s;
     double low_since_s[PLANT_LEGS];  /* when switch or diode of the negative rail began to conduct */

@@ -85,10 +85,11 @@ static inline mechanics_motion_t circuit_motion(const circuit_t *c, const point_
     };
 }
 
-/* Legs of a symmetrical star float, the others are tied (two_phase.h). */
+/* Legs of a symmetrical star float in block commutation, the others are tied (two_phase.h). Gaps of the dead
+ * time and a bridge that is off take the general way. */
 static inline bool circuit_two_phase(const circuit_t *c)
 {
-    return c->bridge.floating != 0u && c->bridge.swinging == 0u && c->machine.symmetrical &&
+    return c->in_blocks && c->bridge.floating != 0u && c->bridge.swinging == 0u && c->machine.symmetrical &&
            c->machine.winding.active == 2 && c->machine.winding.branch < 0 && c->bridge.both == 0u &&
            mechanics_plain(&c->mech) && dclink_plain(&c->link);
 }

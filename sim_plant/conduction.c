@@ -78,6 +78,7 @@ void circuit_switch(circuit_t *c, const gates_t *gates, unsigned legs)
         }
     }
     circuit_summarise(c);
+    c->in_blocks = gates_in_blocks(gates);
 }
 
 static bool low_side(leg_t leg)

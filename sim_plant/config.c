@@ -187,13 +187,26 @@ const char *config_sensor_fault(const plant_sensor_t *s, double period_s)
             "sensor: full scales must be finite and not negative")
     REQUIRE(not_negative(s->filter_s) && not_negative(s->hysteresis_V) && not_negative(s->capture_s),
             "sensor.filter_s, hysteresis_V and capture_s must be finite and not negative")
+    REQUIRE(isfinite(s->v_dc_offset_V) && isfinite(s->v_zero_offset_V) && isfinite(s->v_zero_gain_error),
+            "sensor: offsets and gain errors must be finite")
+    REQUIRE(not_negative(s->i_filter_s) && not_negative(s->v_zero_filter_s),
+            "sensor.i_filter_s and v_zero_filter_s must be finite and not negative")
+    REQUIRE(s->i_filter_s == 0.0 || s->shunt == PLANT_IN_LINE,
+            "sensor.i_filter_s is for shunts in line; the others settle, settle_s")
+    REQUIRE(not_negative(s->v_zero_full_scale_V) && not_negative(s->v_zero_network_ohm) &&
+                not_negative(s->v_zero_load_ohm) && not_negative(s->v_zero_noise_lsb),
+            "sensor.v_zero_*: range, resistances and noise must be finite and not negative")
+    REQUIRE(s->v_zero_bits >= 0 && s->v_zero_bits <= 16, "sensor.v_zero_bits must be 0 (bits) to 16")
     for (int k = 0; k < PLANT_LEGS; k++) {
+        REQUIRE(s->v_zero_network_error[k] > -1.0 && isfinite(s->v_zero_network_error[k]),
+                "sensor.v_zero_network_error must be finite and above -1")
         REQUIRE(isfinite(s->gain_error[k]), "sensor.gain_error must be finite")
         REQUIRE(isfinite(s->offset_A[k]), "sensor.offset_A must be finite")
     }
     for (int n = 0; n < PLANT_LEGS + PLANT_SETS; n++) {
         REQUIRE(s->divider_error[n] > -1.0 && isfinite(s->divider_error[n]),
                 "sensor.divider_error must be finite and above -1")
+        REQUIRE(isfinite(s->v_offset_V[n]), "sensor.v_offset_V must be finite")
     }
     return NULL;
 }

@@ -87,12 +87,32 @@ double steps_locate(const circuit_t *c, double h_late, steps_retake_t *retake, c
     return h_late;
 }
 
+static void lag_inputs(const circuit_t *c, const point_t *p, const circuit_nodes_t *nodes, lagged_t *inputs)
+{
+    *inputs = (lagged_t){{0.0}, {0.0}};
+    for (int set = 0; set < c->machine.winding.sets; set++) {
+        inputs->v_zero_V[set] = lags_zero_V(&c->lags, set, nodes->v_zero_V[set], nodes->v_leg_V);
+    }
+    for (int k = 0; k < c->bridge.legs; k++) {
+        inputs->i_A[k] = circuit_leg_A(c, p, k);
+    }
+}
+
 void steps_probe(circuit_t *c, const point_t *to, double h)
 {
     circuit_nodes_t before, after;
     double v_before_V[PLANT_LEGS + PLANT_SETS], v_after_V[PLANT_LEGS + PLANT_SETS];
     circuit_nodes(c, &c->now, &before);
     circuit_nodes(c, to, &after);
+    if (lags_active(&c->lags)) {
+        lagged_t first, last;
+        lag_inputs(c, &c->now, &before, &first);
+        lag_inputs(c, to, &after, &last);
+        lags_advance(&c->lags, h, &first, &last);
+    }
+    if (!probe_active(&c->probe)) {
+        return;
+    }
     memcpy(v_before_V, before.v_leg_V, sizeof before.v_leg_V);
     memcpy(v_after_V, after.v_leg_V, sizeof after.v_leg_V);
     memcpy(&v_before_V[PLANT_LEGS], before.v_neutral_V, sizeof before.v_neutral_V);

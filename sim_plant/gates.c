@@ -194,6 +194,16 @@ gate_t gates_faulty(const gates_t *gates, int k)
     return upper ? (lower ? GATE_BOTH : GATE_HIGH) : (lower ? GATE_LOW : GATE_OFF);
 }
 
+bool gates_in_blocks(const gates_t *gates)
+{
+    bool driven = false, blocks = false;
+    for (int k = 0; k < gates->legs; k++) {
+        driven = driven || gates->leg[k].driven;
+        blocks = blocks || !gates->leg[k].driven || gates->leg[k].state != PLANT_LEG_PWM;
+    }
+    return driven && blocks;
+}
+
 double gates_search_s(const gates_t *gates, double t_s)
 {
     double next_s = gates->period_s;

@@ -71,6 +71,9 @@ static inline gate_t gates_conducting(const gates_t *gates, int k)
     return gates->leg[k].fault == PLANT_HEALTHY ? gates->leg[k].gate : gates_faulty(gates, k);
 }
 
+/* Whether some legs are driven and others not, or one switch alone is: block commutation. */
+bool gates_in_blocks(const gates_t *gates);
+
 /* The next instant after t at which gates_update() has something to do; T when nothing is left. */
 double gates_search_s(const gates_t *gates, double t_s);
 static inline double gates_next_s(const gates_t *gates, double t_s)

@@ -50,6 +50,7 @@ typedef struct {
     uint16_t v_dc;
     uint16_t v_leg[PLANT_LEGS];
     uint16_t v_neutral[PLANT_SETS];
+    uint16_t v_zero[PLANT_SETS]; /* mid-scale is none */
     uint16_t temperature;
     uint8_t settled; /* bit k: i_leg[k] was sampled in its valid window */
 } plant_adc_t;

@@ -112,7 +112,21 @@ typedef struct {
     double filter_s;                               /* RC of those channels; 0: none */
     double hysteresis_V; /* E18: comparators of terminal k against the mean of the terminals of its set */
     double capture_s;    /* resolution of the timer that captures their edges */
-    double t_full_scale_degC; /* temperature channel spans -fs ... +fs; 0: 200 */
+    double t_full_scale_degC;                   /* temperature channel spans -fs ... +fs; 0: 200 */
+    double v_dc_offset_V;                       /* added to what the DC link's channel sees, */
+    double v_offset_V[PLANT_LEGS + PLANT_SETS]; /* and behind the dividers of terminals and neutrals */
+    double i_filter_s; /* in line: time constant of the currents' amplifiers; 0: none */
+    /* Differential channel of each set, bipolar: the mean of the terminals, by a star of three resistors,
+     * against the neutral (v_zero_V of plant_truth_t). */
+    double v_zero_full_scale_V; /* codes span -fs ... +fs; 0: the board has none */
+    double v_zero_gain_error;   /* relative */
+    double v_zero_offset_V;     /* behind the gain */
+    double v_zero_network_ohm;  /* each resistor of the star, */
+    double v_zero_load_ohm;     /* and what loads it: gain 1/(1 + network/(3 load)); 0: nothing */
+    double v_zero_network_error[PLANT_LEGS]; /* relative, of each resistor */
+    double v_zero_filter_s;                  /* RC; 0: none */
+    double v_zero_noise_lsb;                 /* rms, of its own converter; */
+    int v_zero_bits;                         /* 0: bits */
 } plant_sensor_t;
 
 typedef struct map_table map_table_t; /* map_table.h */

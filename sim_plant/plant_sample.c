@@ -8,7 +8,24 @@
 
 static bool has_voltage_channels(const plant_t *plant)
 {
-    return plant->config.sensor.v_leg_full_scale_V > 0.0;
+    return plant->config.sensor.v_leg_full_scale_V > 0.0 || plant->config.sensor.v_zero_full_scale_V > 0.0;
+}
+
+static void see_voltages(const plant_t *plant, sensor_input_t *seen)
+{
+    const circuit_t *circuit = &plant->circuit;
+    const lags_t *lags = &circuit->lags;
+    circuit_nodes_t nodes;
+    circuit_nodes(circuit, &circuit->now, &nodes);
+    for (int n = 0; n < PLANT_LEGS + PLANT_SETS; n++) {
+        double raw_V = n < PLANT_LEGS ? nodes.v_leg_V[n] : nodes.v_neutral_V[n - PLANT_LEGS];
+        double seen_V = probe_active(&circuit->probe) ? probe_voltage(&circuit->probe, n) : raw_V;
+        *(n < PLANT_LEGS ? &seen->v_leg_V[n] : &seen->v_neutral_V[n - PLANT_LEGS]) = seen_V;
+    }
+    for (int set = 0; set < circuit->machine.winding.sets; set++) {
+        seen->v_zero_V[set] = lags->zero_s > 0.0 ? lags->y.v_zero_V[set]
+                                                 : lags_zero_V(lags, set, nodes.v_zero_V[set], nodes.v_leg_V);
+    }
 }
 
 /* What the converters see now. Node voltages only where a board measures them: they cost. */
@@ -25,19 +42,13 @@ void plant_look(const plant_t *plant, sensor_input_t *seen)
     };
     for (int k = 0; k < circuit->bridge.legs; k++) {
         bool low = circuit->bridge.leg[k] == LEG_LOW || circuit->bridge.leg[k] == LEG_DIODE_LOW;
-        seen->i_A[k] = plant_leg_A(plant, k);
+        double i_A = plant_leg_A(plant, k);
+        seen->i_A[k] = circuit->lags.current_s > 0.0 ? circuit->lags.y.i_A[k] : i_A;
         seen->low_for_s[k] = low ? circuit->t_s - circuit->low_since_s[k] : -1.0;
-        seen->i_dc_A += circuit->bridge.upper[k] * seen->i_A[k];
+        seen->i_dc_A += circuit->bridge.upper[k] * i_A;
     }
-    if (!has_voltage_channels(plant)) {
-        return;
-    }
-    circuit_nodes_t nodes;
-    circuit_nodes(circuit, &circuit->now, &nodes);
-    for (int n = 0; n < PLANT_LEGS + PLANT_SETS; n++) {
-        double raw_V = n < PLANT_LEGS ? nodes.v_leg_V[n] : nodes.v_neutral_V[n - PLANT_LEGS];
-        double seen_V = probe_active(&circuit->probe) ? probe_voltage(&circuit->probe, n) : raw_V;
-        *(n < PLANT_LEGS ? &seen->v_leg_V[n] : &seen->v_neutral_V[n - PLANT_LEGS]) = seen_V;
+    if (has_voltage_channels(plant)) {
+        see_voltages(plant, seen);
     }
 }
 

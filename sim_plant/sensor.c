@@ -108,7 +108,20 @@ static uint16_t divided(const plant_sensor_t *sensor, noise_t *noise, int n, dou
     bool own = sensor->v_leg_full_scale_V > 0.0;
     double full_scale_V = own ? sensor->v_leg_full_scale_V : sensor->v_full_scale_V;
     double noise_lsb = own ? draw_lsb(sensor, noise) : 0.0;
-    return unipolar(resolution(sensor), (1.0 + sensor->divider_error[n]) * v_V / full_scale_V, noise_lsb);
+    double seen_V = (1.0 + sensor->divider_error[n]) * v_V + sensor->v_offset_V[n];
+    return unipolar(resolution(sensor), seen_V / full_scale_V, noise_lsb);
+}
+
+static uint16_t differential(const plant_sensor_t *s, noise_t *noise, double v_V)
+{
+    if (s->v_zero_full_scale_V == 0.0) {
+        return MID_SCALE;
+    }
+    int bits = s->v_zero_bits > 0 ? s->v_zero_bits : resolution(s);
+    double loading = s->v_zero_load_ohm > 0.0 ? s->v_zero_network_ohm / (3.0 * s->v_zero_load_ohm) : 0.0;
+    double seen_V = (1.0 + s->v_zero_gain_error) * v_V / (1.0 + loading) + s->v_zero_offset_V;
+    double noise_lsb = s->v_zero_noise_lsb > 0.0 ? s->v_zero_noise_lsb * noise_gaussian(noise) : 0.0;
+    return bipolar(bits, seen_V / s->v_zero_full_scale_V, noise_lsb);
 }
 
 void sensor_convert(const plant_sensor_t *sensor, noise_t *noise, const sensor_input_t *input,
@@ -118,12 +131,16 @@ void sensor_convert(const plant_sensor_t *sensor, noise_t *noise, const sensor_i
     int bits = resolution(sensor);
     *adc = (plant_adc_t){.settled = 0};
     convert_currents(sensor, noise, input, adc);
-    adc->v_dc = unipolar(bits, input->v_dc_V / sensor->v_full_scale_V, draw_lsb(sensor, noise));
+    double v_dc_V = input->v_dc_V + sensor->v_dc_offset_V;
+    adc->v_dc = unipolar(bits, v_dc_V / sensor->v_full_scale_V, draw_lsb(sensor, noise));
     for (int k = 0; k < input->legs; k++) {
         adc->v_leg[k] = divided(sensor, noise, k, input->v_leg_V[k]);
     }
     for (int set = 0; set < input->sets; set++) {
         adc->v_neutral[set] = divided(sensor, noise, PLANT_LEGS + set, input->v_neutral_V[set]);
+    }
+    for (int set = 0; set < PLANT_SETS; set++) {
+        adc->v_zero[set] = set < input->sets ? differential(sensor, noise, input->v_zero_V[set]) : MID_SCALE;
     }
     double t_full_scale_degC =
         sensor->t_full_scale_degC > 0.0 ? sensor->t_full_scale_degC : T_FULL_SCALE_DEGC;

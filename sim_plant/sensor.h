@@ -11,8 +11,14 @@
  * with the time constant settle_s / 5. At settle_s the remaining e^-5 (0.7 %) counts as none: from there on
  * the reading is exact and its `settled` bit is set. Where the current ends, the reading is zero at once.
  *
- * Voltages are unipolar. The DC link has noise only; terminals and neutrals, which the caller has filtered
- * (probe.h), have the gain error of their divider too. Temperature is bipolar, without noise.
+ * Voltages are unipolar and clip at zero and full scale without notice: a terminal on its lower diode and a
+ * neutral below the negative rail read zero. The DC link has offset and noise; terminals and neutrals, which
+ * the caller has filtered (probe.h), have the gain of their divider too. Temperature is bipolar, without
+ * noise. The differential channel is bipolar and clips at either end:
+ *
+ *   share of full scale = ((1 + v_zero_gain_error) v / (1 + network/(3 load)) + v_zero_offset) / full scale
+ *
+ * with converter steps and noise of its own, drawn after all others. It reads mid-scale where there is none.
  *
  * The noise is Gaussian from a generator of its own: equal seeds give equal runs. Drawn in the order i_leg,
  * v_dc, v_leg, v_neutral; the last two only with v_leg_full_scale_V > 0, else they have no noise.
@@ -32,6 +38,7 @@ typedef struct {
     double i_A[PLANT_LEGS];
     double v_leg_V[PLANT_LEGS]; /* behind the filter, as v_neutral_V */
     double v_neutral_V[PLANT_SETS];
+    double v_zero_V[PLANT_SETS]; /* behind its own */
     double v_dc_V;
     double i_dc_A;
     double temperature_degC;

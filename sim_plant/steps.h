@@ -53,7 +53,13 @@ typedef void steps_retake_t(const circuit_t *circuit, const void *start, double 
 double steps_locate(const circuit_t *circuit, double h_late, steps_retake_t *retake, const void *start,
                     point_t *to);
 
-/* The voltage channels and comparators over a step to that point. */
+/* Whether a board measures what has a memory. */
+static inline bool steps_probing(const circuit_t *c)
+{
+    return probe_active(&c->probe) || lags_active(&c->lags);
+}
+
+/* Its channels, comparators and amplifiers over a step to that point. */
 void steps_probe(circuit_t *circuit, const point_t *to, double h);
 
 /* Longest step so that the rotor turns less than its series allows. */

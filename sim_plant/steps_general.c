@@ -211,7 +211,7 @@ static double take_step(circuit_t *c, double left_s, double rate[], bool *event)
             h = steps_locate(c, h, retake, rate, &next);
         }
     }
-    if (probe_active(&c->probe)) {
+    if (steps_probing(c)) {
         steps_probe(c, &next, h);
     }
     c->now = next;

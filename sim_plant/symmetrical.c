@@ -264,7 +264,7 @@ INLINE double take_steps(circuit_t *c, double left_s, shape_t shape, bool swings
                 step(c, &start, h, shape, swings, floats, to, &c->field);
             }
         }
-        if (probe_active(&c->probe)) {
+        if (steps_probing(c)) {
             steps_probe(c, to, h);
         }
         arrive(c, to, shape, swings);
