@@ -111,6 +111,10 @@ const char *config_machine_fault(const plant_config_t *config)
     if (fault) {
         return fault;
     }
+    const plant_winding_t *w = &config->winding;
+    REQUIRE(w->connection == PLANT_STAR || !map_zero_given(config->map) ||
+                (w->L_eddy_d_H == 0.0 && w->L_eddy_q_H == 0.0),
+            "winding.L_eddy_d_H and L_eddy_q_H cannot stand beside psi_0 of a table in an open winding")
     machine_t machine;
     machine_set(&machine, config, 25.0, 25.0);
     REQUIRE(machine_is_sound(&machine),

@@ -114,6 +114,7 @@ void machine_set(machine_t *machine, const plant_config_t *config, double windin
     machine->R_eddy_ohm = w->R_eddy_ohm;
     winding_init(&machine->winding, w, machine->R_s_ohm, psi_m_Wb, psi_core_Wb, magnet);
     machine->biased = machine->map != NULL || machine->gamma_eddy_d_1_H + machine->gamma_eddy_q_1_H > 0.0;
+    machine->zero_map = machine->winding.zero >= 0 && map_zero_given(machine->map);
     find_loose(machine);
     machine->symmetrical =
         machine->winding.symmetrical && !machine->biased && machine->winding.cogging_terms == 0;
@@ -232,6 +233,20 @@ void machine_idle(const machine_t *m, machine_state_t *s, int set)
     }
 }
 
+double machine_map_zero_V(const machine_t *m, const machine_state_t *s, const machine_point_t *p,
+                          double omega_e_rad_s, const machine_rate_t *rate, int set)
+{
+    if (!map_zero_given(m->map)) {
+        return 0.0;
+    }
+    map_zero_t zero;
+    dq_t i_A = p->core[set].i_A;
+    dq_t moved_A_s = frame_to_dq(of_set(rate->u, set), s->rotor);
+    map_zero_eval(m->map, i_A, machine_own_angle_rad(s, set), &zero);
+    return zero.d_H * (moved_A_s.d + omega_e_rad_s * i_A.q) +
+           zero.q_H * (moved_A_s.q - omega_e_rad_s * i_A.d) + omega_e_rad_s * zero.theta_Wb;
+}
+
 dq_t machine_flux_Wb(const machine_t *m, const machine_state_t *s, const machine_point_t *p)
 {
     const winding_t *w = &m->winding;
@@ -244,12 +259,12 @@ dq_t machine_flux_Wb(const machine_t *m, const machine_state_t *s, const machine
     return (dq_t){p->core[0].psi_Wb.d + psi.d, p->core[0].psi_Wb.q + psi.q};
 }
 
-static double core_energy_J(const machine_t *m, const machine_state_t *s, const core_t *core)
+static double core_energy_J(const machine_t *m, const machine_state_t *s, const core_t *core, int set)
 {
     dq_t psi = core->psi_Wb;
     if (m->map != NULL) {
         map_point_t at;
-        map_table_eval(m->map, core->i_A, s->theta_e_rad, &at);
+        map_table_eval(m->map, core->i_A, machine_own_angle_rad(s, set), &at);
         return 1.5 * (psi.d * core->i_A.d + psi.q * core->i_A.q) - at.coenergy_J;
     }
     double psi2 = psi.d * psi.d + psi.q * psi.q;
@@ -262,7 +277,7 @@ double machine_energy_J(const machine_t *m, const machine_state_t *s, const mach
     const winding_t *w = &m->winding;
     double energy_J = winding_cogging_J(w, s->rotor) / m->pole_pairs;
     for (int set = 0; set < w->sets; set++) {
-        energy_J += core_energy_J(m, s, &p->core[set]);
+        energy_J += core_energy_J(m, s, &p->core[set], set);
         for (int axis = 0; axis < 2; axis++) {
             double gamma_1_H = axis == 0 ? m->gamma_eddy_d_1_H : m->gamma_eddy_q_1_H;
             double i_A = s->eddy_A[2 * set + axis];

@@ -11,7 +11,8 @@
  *   W = 1.5 (psi_d^2/(2 L_d0) + psi_q^2/(2 L_q0) + c |psi|^6/6 - i_f psi_d)
  *
  * so that saturation, cross-coupling and polarity belong together and energy is conserved; or a table
- * (map_table.h). i_f is the magnet's equivalent current. winding.h adds what is linear in the currents.
+ * (map_table.h), which may say what reaches the zero sequence (map_zero.h). i_f is the magnet's equivalent
+ * current. winding.h adds what is linear in the currents.
  *
  * State of a coordinate: core flux with the energy form, core current with a table, and the current itself
  * for a zero sequence or the fault branch. A plain machine, one star set of the energy form with harmonics of
@@ -30,6 +31,7 @@
 #define PLANT_MACHINE_H
 
 #include "sim_plant/map_table.h"
+#include "sim_plant/map_zero.h"
 #include "sim_plant/winding.h"
 
 typedef struct {
@@ -51,6 +53,7 @@ typedef struct {
     double fastest_1_s;   /* and of the rate of decay of any; */
     double gamma_leg_1_H; /* largest response of a leg's current to its own voltage */
     const map_table_t *map;
+    bool zero_map; /* whose psi_0 meets a current: in an open winding */
     double gamma_eddy_d_1_H, gamma_eddy_q_1_H, R_eddy_ohm; /* zero: no eddy circuits */
     winding_t winding;
 } machine_t;
@@ -74,6 +77,8 @@ typedef struct {
     machine_tangent_t gamma_1_H;
     machine_tangent_t L_H; /* with them */
     dq_t psi_theta_Wb;
+    dq_t zero_H;          /* dpsi_0/di_dq and ... */
+    double zero_theta_Wb; /* ... dpsi_0/dtheta of a table in an open winding, which carries i_0 */
 } core_t;
 
 typedef struct {
@@ -113,10 +118,21 @@ void machine_kick(const machine_t *machine, machine_state_t *state, const machin
 /* State of a set whose legs carry nothing. */
 void machine_idle(const machine_t *machine, machine_state_t *state, int set);
 
+/* dpsi_0/dt of a table, beside winding_zero_V(); 0 without psi_0. */
+double machine_map_zero_V(const machine_t *machine, const machine_state_t *state,
+                          const machine_point_t *point, double omega_e_rad_s, const machine_rate_t *rate,
+                          int set);
+
 /* Total flux linkage of the first set, with that of the winding. */
 dq_t machine_flux_Wb(const machine_t *machine, const machine_state_t *state, const machine_point_t *point);
 
 double machine_energy_J(const machine_t *machine, const machine_state_t *state, const machine_point_t *point);
+
+/* Of the d axis from phase A or X: what the harmonics of a table turn by */
+static inline double machine_own_angle_rad(const machine_state_t *state, int set)
+{
+    return state->theta_e_rad - 0.52359877559829887308 * set;
+}
 
 static inline dq_t machine_current_A(const machine_t *m, dq_t psi_Wb)
 {

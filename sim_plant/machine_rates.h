@@ -37,6 +37,25 @@ INLINE dq_t times(machine_tangent_t m, dq_t x)
     return (dq_t){m.d * x.d + m.dq * x.q, m.dq * x.d + m.q * x.q};
 }
 
+/* What psi_0 of a table and the zero-sequence current make of it: map_zero.h */
+static inline void core_zero(const machine_t *m, const machine_state_t *s, dq_t i_A, map_point_t *at,
+                             core_t *core)
+{
+    map_zero_t zero;
+    double twice_A = 2.0 * s->u[m->winding.zero];
+    map_zero_eval(m->map, i_A, s->theta_e_rad, &zero);
+    at->psi_Wb.d += twice_A * zero.d_H;
+    at->psi_Wb.q += twice_A * zero.q_H;
+    at->L_d_H += twice_A * zero.dd_H_A;
+    at->L_dq_H += twice_A * zero.dq_H_A;
+    at->L_q_H += twice_A * zero.qq_H_A;
+    at->psi_theta_Wb.d += twice_A * zero.d_theta_H;
+    at->psi_theta_Wb.q += twice_A * zero.q_theta_H;
+    at->coenergy_theta_J += 1.5 * twice_A * zero.theta_Wb;
+    core->zero_H = (dq_t){zero.d_H, zero.q_H};
+    core->zero_theta_Wb = zero.theta_Wb;
+}
+
 /* Core of a set from its state. Returns the torque of a map that depends on the angle, less its cross
  * product. */
 INLINE double evaluate_core(const machine_t *m, const machine_state_t *s, int set, bool tangent, core_t *core)
@@ -45,6 +64,8 @@ INLINE double evaluate_core(const machine_t *m, const machine_state_t *s, int se
     machine_tangent_t gamma = {0};
     double torque_Nm = 0.0;
     core->psi_theta_Wb = (dq_t){0.0, 0.0};
+    core->zero_H = (dq_t){0.0, 0.0};
+    core->zero_theta_Wb = 0.0;
     if (m->map == NULL) {
         core->psi_Wb = u;
         core->i_A = machine_current_A(m, u);
@@ -53,7 +74,10 @@ INLINE double evaluate_core(const machine_t *m, const machine_state_t *s, int se
         }
     } else {
         map_point_t at;
-        map_table_eval(m->map, u, s->theta_e_rad, &at);
+        map_table_eval(m->map, u, machine_own_angle_rad(s, set), &at);
+        if (m->zero_map) {
+            core_zero(m, s, u, &at, core);
+        }
         core->psi_Wb = at.psi_Wb;
         core->i_A = u;
         core->psi_theta_Wb = at.psi_theta_Wb;
@@ -140,6 +164,13 @@ INLINE void inductance_matrix(const machine_state_t *s, const machine_point_t *p
         L[a + 1][a] += cross;
         L[a + 1][a + 1] += s2 * t.d + c2 * t.q + 2.0 * cs * t.dq;
     }
+    if (shape.sets == 1 && shape.legs == 6) { /* an open winding: psi_0 of a table, reciprocal */
+        ab_t zero = frame_to_ab(p->core[0].zero_H, s->rotor);
+        L[2][0] += zero.alpha;
+        L[2][1] += zero.beta;
+        L[0][2] += 2.0 * zero.alpha;
+        L[1][2] += 2.0 * zero.beta;
+    }
 }
 
 /* L x = b of two sets, in blocks of two: L = [A B; B' C], with the inverse of A and of C - B' A^-1 B. */
@@ -214,6 +245,9 @@ INLINE void right_side(const machine_t *m, const machine_state_t *s, const machi
         emf_V[2 * set + 1] = emf.beta;
         turning_A[2 * set] = -p->i_A[2 * set + 1];
         turning_A[2 * set + 1] = p->i_A[2 * set];
+    }
+    if (shape.sets == 1 && shape.legs == 6) {
+        emf_V[2] = omega * p->core[0].zero_theta_Wb;
     }
     for (int a = 0; a < n; a++) {
         double motion = p->series.psi_theta[a];

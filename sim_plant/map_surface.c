@@ -85,7 +85,7 @@ static map_node_t node_with_margin(const map_table_t *map, const map_node_t *nod
     return map_patch_extend(node, map->d.x_A[i] - map->d.x_A[near_i], map->q.x_A[j] - map->q.x_A[near_j]);
 }
 
-static void set_patches(map_table_t *map, const map_node_t *nodes)
+void map_surface_set_patches(map_table_t *map, const map_node_t *nodes)
 {
     int grid_nodes = (map->d.count - 2) * (map->q.count - 2);
     for (int i = 0; i + 1 < map->d.count; i++) {
@@ -221,7 +221,7 @@ bool map_surface_build(map_table_t *map, const map_node_t *nodes, double *L_min_
     double width_q_A = MARGIN * (map->q.high_A - map->q.low_A);
     map_axis_set_margin(&map->d, width_d_A);
     map_axis_set_margin(&map->q, width_q_A);
-    set_patches(map, nodes);
+    map_surface_set_patches(map, nodes);
     extremes_t grid = search(map, (cells_t){1, map->d.count - 2, 1, map->q.count - 2});
     *L_min_H = grid.tangent_H[0];
     bool good = grid.tangent_H[0] > CONDITION * grid.tangent_H[1];
@@ -231,7 +231,7 @@ bool map_surface_build(map_table_t *map, const map_node_t *nodes, double *L_min_
         width_q_A *= 0.5;
         map_axis_set_margin(&map->d, width_d_A);
         map_axis_set_margin(&map->q, width_q_A);
-        set_patches(map, nodes);
+        map_surface_set_patches(map, nodes);
     }
     set_end_inductances(map, nodes);
     set_zero(map);

@@ -11,7 +11,8 @@
 struct map_table {
     map_axis_t d, q;
     int layers, theta_order;
-    double *patch; /* [cell of i_d][cell of i_q][layer][coefficient] */
+    double *patch;          /* [cell of i_d][cell of i_q][layer][coefficient] */
+    struct map_table *zero; /* map_zero.h: psi_0 in the place of W'/1.5, on the axes of this; NULL: none */
 };
 
 /* One angle's cos and sin of the harmonics, in the order of the layers. */
@@ -22,6 +23,9 @@ typedef struct {
 map_series_t map_surface_series(const map_table_t *map, double theta_e_rad);
 
 double *map_surface_patch(const map_table_t *map, int cell_d, int cell_q); /* its layers */
+
+/* From nodes [layer][i_d][i_q] of the grid, with the margins as they are */
+void map_surface_set_patches(map_table_t *map, const map_node_t *nodes);
 
 /* The polynomial of a cell at one angle, and its derivative by the angle. */
 void map_surface_sum(const map_table_t *map, int cell_d, int cell_q, const map_series_t *series,

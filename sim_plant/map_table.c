@@ -81,6 +81,10 @@ static const char *grid_error(const map_grid_t *grid)
 void map_table_destroy(map_table_t *map)
 {
     if (map != NULL) {
+        if (map->zero != NULL) {
+            free(map->zero->patch);
+            free(map->zero);
+        }
         map_axis_free(&map->d);
         map_axis_free(&map->q);
         free(map->patch);

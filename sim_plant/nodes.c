@@ -45,6 +45,11 @@ static void all_nodes(const circuit_t *c, const point_t *p, const machine_state_
         machine_rates(m, state, point, omega_e, legs.v_V, &moved);
     }
     set_nodes(c, &legs, state->rotor, omega_e, point->i_A, moved.i_A_s, nodes);
+    for (int set = 0; set < m->winding.sets && m->winding.zero < 0; set++) {
+        double map_V = machine_map_zero_V(m, state, point, omega_e, &moved, set);
+        nodes->v_zero_V[set] += map_V;
+        nodes->v_neutral_V[set] -= map_V;
+    }
 }
 
 /* Where the field of the present point is known. */

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "tools/pmsim/flux_samples.h"
 #include "tools/pmsim/text.h"
 
 namespace pmsim
@@ -13,49 +14,13 @@ namespace pmsim
 namespace
 {
 
-const int first_count = 33, fit_count = 129, most_count = 193; // nodes a side; odd: one is at zero current
+const int first_count = 33, fit_count = 129, most_count = 193,
+          kinked_count = 385;   // nodes a side, without those of kinks; odd: one at 0
 const double accuracy = 1e-8;   // of the largest flux: then a finer grid is not tried
 const double kinked = 1e-5;     // more than this on the finest grid has another cause than its step
 const double reciprocal = 1e-6; // less is rounding and the error of the differences
 const double between = 0.2764;  // part of a cell where the error of a quintic's slope is largest
-const size_t points = 9;        // of a difference
-
-struct Samples {
-    size_t count; // a side
-    double step_A;
-    std::vector<double> i_A, psi_d, psi_q; // the fluxes: i_d slowest
-    double largest_Wb;
-};
-
-// Outwards from zero current, so that there is always a neighbour's flux to begin with.
-Samples sample(const FluxOfCurrent &flux, double i_max_A, int count)
-{
-    const size_t n = size_t(count), middle = n / 2;
-    Samples s{n,  2.0 * i_max_A / double(n - 1), {}, std::vector<double>(n * n), std::vector<double>(n * n),
-              0.0};
-    for (size_t k = 0; k < n; ++k) {
-        s.i_A.push_back(i_max_A * (double(k) / double(middle) - 1.0));
-    }
-    const auto take = [&](size_t i, size_t j, size_t from) {
-        const dq_t psi = flux({s.i_A[i], s.i_A[j]}, {s.psi_d[from], s.psi_q[from]});
-        s.psi_d[i * n + j] = psi.d;
-        s.psi_q[i * n + j] = psi.q;
-        s.largest_Wb = std::max({s.largest_Wb, std::fabs(psi.d), std::fabs(psi.q)});
-    };
-    for (size_t a = 0; a <= middle; ++a) {
-        for (const size_t i : {middle + a, middle - a}) {
-            const size_t inner = i > middle ? i - 1 : i + (a > 0 ? 1 : 0);
-            take(i, middle, inner * n + middle);
-            for (size_t j = middle; j-- > 0;) {
-                take(i, j, i * n + j + 1);
-            }
-            for (size_t j = middle + 1; j < n; ++j) {
-                take(i, j, i * n + j - 1);
-            }
-        }
-    }
-    return s;
-}
+const size_t points = difference_points;
 
 // Weights of the values at 0, 1, ..., 8 in the value and the first two derivatives at x (Fornberg 1988).
 std::array<std::array<double, points>, 3> difference_weights(double x)
@@ -86,9 +51,9 @@ std::array<std::array<double, points>, 3> difference_weights(double x)
 
 enum class Along { d, q };
 
-// Difference quotient of one node by nine points of a line, from low to high.
-double difference(const std::vector<double> &f, size_t node, size_t stride, size_t place, size_t low,
-                  size_t high, size_t order)
+// Difference quotient of one node by nine points of its stretch of a line.
+double difference(const std::vector<double> &f, size_t node, size_t stride, size_t place, const Stretch &in,
+                  size_t order)
 {
     static const auto weights = [] {
         std::array<std::array<std::array<double, points>, 3>, points> w;
@@ -97,16 +62,17 @@ double difference(const std::vector<double> &f, size_t node, size_t stride, size
         }
         return w;
     }();
-    const size_t first = std::clamp(place > points / 2 ? place - points / 2 : 0, low, high + 1 - points);
+    const size_t first =
+        std::clamp(place > points / 2 ? place - points / 2 : 0, in.first, in.last + 1 - points);
     const double *from = &f[node - (place - first) * stride];
     double sum = 0.0;
     for (size_t k = 0; k < points; ++k) {
         sum += weights[place - first][order][k] * from[k * stride];
     }
-    return sum;
+    return (order == 1 ? 1.0 / in.step_A : 1.0 / (in.step_A * in.step_A)) * sum;
 }
 
-// A derivative of node values; at zero current, where formulas with abs() have kinks, that of either side.
+// A derivative of node values; at the end of a stretch, where formulas have kinks, that of either side.
 struct Slope {
     std::vector<double> below, above;
     double mean(size_t k) const
@@ -117,16 +83,16 @@ struct Slope {
 
 Slope sides(const Samples &s, const std::vector<double> &f, Along along, size_t order)
 {
-    const size_t n = s.count, middle = n / 2, stride = along == Along::d ? n : 1;
-    const double scale = order == 1 ? 1.0 / s.step_A : 1.0 / (s.step_A * s.step_A);
-    Slope slope{std::vector<double>(n * n), std::vector<double>(n * n)};
-    for (size_t node = 0; node < n * n; ++node) {
-        const size_t place = along == Along::d ? node / n : node % n;
-        const bool up = place >= middle, down = place <= middle;
-        const double above = up ? scale * difference(f, node, stride, place, middle, n - 1, order) : 0.0;
-        const double below = down ? scale * difference(f, node, stride, place, 0, middle, order) : above;
+    const size_t n = s.d.i_A.size(), m = s.q.i_A.size(), stride = along == Along::d ? m : 1;
+    const SampleAxis &axis = along == Along::d ? s.d : s.q;
+    Slope slope{std::vector<double>(n * m), std::vector<double>(n * m)};
+    for (size_t node = 0; node < n * m; ++node) {
+        const size_t place = along == Along::d ? node / m : node % m;
+        const Stretch *up = axis.above(place), *down = axis.below(place);
+        const double above = up != nullptr ? difference(f, node, stride, place, *up, order) : 0.0;
+        const double below = down != nullptr ? difference(f, node, stride, place, *down, order) : above;
         slope.below[node] = below;
-        slope.above[node] = up ? above : below;
+        slope.above[node] = up != nullptr ? above : below;
     }
     return slope;
 }
@@ -184,14 +150,14 @@ double rise(double h, const std::vector<double> &f, const std::vector<double> &f
 
 std::vector<map_node_t> nodes_of(const Samples &s, const Derivatives &x)
 {
-    const size_t n = s.count;
+    const size_t m = s.q.i_A.size();
     std::vector<map_node_t> nodes;
-    for (size_t k = 0; k < n * n; ++k) {
+    for (size_t k = 0; k < s.psi_d.size(); ++k) {
         double W = 0.0;
-        if (k % n > 0) {
-            W = nodes[k - 1].W + rise(s.step_A, s.psi_q, x.qq, x.qqq, k - 1, k);
+        if (k % m > 0) {
+            W = nodes[k - 1].W + rise(s.q.cell_A(k % m - 1), s.psi_q, x.qq, x.qqq, k - 1, k);
         } else if (k > 0) {
-            W = nodes[k - n].W + rise(s.step_A, s.psi_d, x.dd, x.ddd, k - n, k);
+            W = nodes[k - m].W + rise(s.d.cell_A(k / m - 1), s.psi_d, x.dd, x.ddd, k - m, k);
         }
         nodes.push_back({W, s.psi_d[k], s.psi_q[k], x.dd[k], 0.5 * (x.dq[k] + x.qd[k]), x.qq[k], x.ddq[k],
                          x.dqq[k], x.ddqq[k]});
@@ -199,57 +165,90 @@ std::vector<map_node_t> nodes_of(const Samples &s, const Derivatives &x)
     return nodes;
 }
 
-// Largest difference from the formula at points within the cells, relative to the largest flux.
-double deviation(const map_table_t *map, const Samples &s, const FluxOfCurrent &flux)
+// Largest differences from the formula at points within the cells, relative to the largest flux: of all, and
+// of those that do not pass a step of the inductance.
+void compare(FluxFormulaMap &result, const map_table_t *map, const Samples &s, const FluxOfCurrent &flux)
 {
-    double largest = 0.0;
-    for (size_t i = 0; i + 1 < s.count; ++i) {
-        for (size_t j = 0; j + 1 < s.count; ++j) {
-            const dq_t i_A{s.i_A[i] + between * s.step_A, s.i_A[j + 1] - between * s.step_A};
-            const dq_t psi = flux(i_A, {s.psi_d[i * s.count + j], s.psi_q[i * s.count + j]});
+    const size_t m = s.q.i_A.size();
+    for (size_t i = 0; i + 1 < s.d.i_A.size(); ++i) {
+        for (size_t j = 0; j + 1 < m; ++j) {
+            const dq_t i_A{s.d.i_A[i] + between * s.d.cell_A(i), s.q.i_A[j + 1] - between * s.q.cell_A(j)};
+            const dq_t psi = flux(i_A, {s.psi_d[i * m + j], s.psi_q[i * m + j]});
             map_point_t found;
             map_table_eval(map, i_A, 0.0, &found);
-            largest =
-                std::max({largest, std::fabs(found.psi_Wb.d - psi.d), std::fabs(found.psi_Wb.q - psi.q)});
+            const double part =
+                std::max(std::fabs(found.psi_Wb.d - psi.d), std::fabs(found.psi_Wb.q - psi.q)) / s.largest_Wb;
+            result.deviation = std::max(result.deviation, part);
+            if (s.d.above(i) != nullptr && s.q.above(j) != nullptr) {
+                result.even_deviation = std::max(result.even_deviation, part);
+            }
         }
     }
-    return largest / s.largest_Wb;
 }
 
 void finish(FluxFormulaMap &result, map_table_t *map, const Samples &s, const FluxOfCurrent &flux)
 {
     result.map.reset(map);
     result.largest_Wb = s.largest_Wb;
-    result.deviation = map != nullptr ? deviation(map, s, flux) : 0.0;
+    if (map != nullptr) {
+        compare(result, map, s, flux);
+    }
 }
 
-FluxFormulaMap map_of_nodes(const Samples &s, const Derivatives &x, const FluxOfCurrent &flux)
+FluxFormulaMap map_of_nodes(const Samples &s, const FluxOfCurrent &flux)
 {
+    const Derivatives x(s);
     FluxFormulaMap result;
-    const int n = int(s.count);
-    const std::vector<map_node_t> nodes = nodes_of(s, x);
-    map_table_t *map =
-        map_table_from_nodes(n, n, s.i_A.data(), s.i_A.data(), nodes.data(), &result.report, &result.error);
-    result.report.reciprocity = x.reciprocity();
-    finish(result, map, s, flux);
+    if (x.reciprocity() < reciprocal) {
+        const std::vector<map_node_t> nodes = nodes_of(s, x);
+        map_table_t *map = map_table_from_nodes(int(s.d.i_A.size()), int(s.q.i_A.size()), s.d.i_A.data(),
+                                                s.q.i_A.data(), nodes.data(), &result.report, &result.error);
+        result.report.reciprocity = x.reciprocity();
+        finish(result, map, s, flux);
+    }
     return result;
 }
 
 FluxFormulaMap map_of_fit(const Samples &s, const FluxOfCurrent &flux)
 {
     FluxFormulaMap result;
-    const int n = int(s.count);
-    const map_table_data_t data = {n, n, 1, 1, s.i_A.data(), s.i_A.data(), s.psi_d.data(), s.psi_q.data()};
+    const map_table_data_t data = {
+        int(s.d.i_A.size()), int(s.q.i_A.size()), 1, 1, s.d.i_A.data(), s.q.i_A.data(),
+        s.psi_d.data(),      s.psi_q.data()};
     finish(result, map_table_create(&data, &result.report, &result.error), s, flux);
     return result;
 }
 
 // The deviation falls with the fifth power of the step.
-int finer(int count, double deviation)
+int finer(int count, double deviation, int most)
 {
     const int halves =
         int(0.6 * count * std::pow(deviation / accuracy, 0.2)); // 1.2 times what it should take
-    return std::clamp(2 * halves + 1, count + 16, most_count);
+    return std::clamp(2 * halves + 1, std::min(count + 16, most), most);
+}
+
+int next_count(int count, const FluxFormulaMap &map, int most)
+{
+    return map.map ? finer(count, map.even_deviation, most) : (count < fit_count ? fit_count : most);
+}
+
+bool good(int count, const FluxFormulaMap &map, int most)
+{
+    return map.map && (map.even_deviation < accuracy || (count == most && map.even_deviation < kinked));
+}
+
+// From a number of nodes on as many as it takes. The last one, if that is not enough; empty where the
+// formulas make no map of nodes.
+FluxFormulaMap refine(const FluxOfCurrent &flux, double i_max_A, const FluxKinks &kinks, int first, int most)
+{
+    for (int count = first;;) {
+        FluxFormulaMap map = map_of_nodes(
+            sample(flux, sample_axis(i_max_A, count, kinks.d), sample_axis(i_max_A, count, kinks.q)), flux);
+        if (good(count, map, most) || count == most) {
+            return map;
+        }
+        count = next_count(count, map, most);
+    }
 }
 
 std::string at(dq_t i_A)
@@ -274,23 +273,25 @@ FluxOfCurrent flux_of_current(const Expression &psi_d, const Expression &psi_q)
 
 FluxFormulaMap map_of_formula(const FluxOfCurrent &flux, double i_max_A)
 {
-    int count = first_count;
-    for (;;) {
-        const Samples s = sample(flux, i_max_A, count);
-        const Derivatives x(s);
-        FluxFormulaMap map;
-        if (x.reciprocity() < reciprocal) {
-            map = map_of_nodes(s, x, flux);
-        }
-        if (map.map && (map.deviation < accuracy || (count == most_count && map.deviation < kinked))) {
+    const SampleAxis even = sample_axis(i_max_A, first_count, {});
+    FluxFormulaMap first = map_of_nodes(sample(flux, even, even), flux);
+    if (good(first_count, first, most_count)) {
+        return first;
+    }
+    const FluxKinks kinks = find_flux_kinks(flux, i_max_A);
+    if (!kinks.d.empty() || !kinks.q.empty()) {
+        FluxFormulaMap map = refine(flux, i_max_A, kinks, first_count, kinked_count);
+        if (map.map && map.deviation < kinked) {
             return map;
         }
-        if (count == most_count) {
-            FluxFormulaMap fit = map_of_fit(s, flux);
-            return !map.map || (fit.map && fit.deviation < map.deviation) ? std::move(fit) : std::move(map);
-        }
-        count = map.map ? finer(count, map.deviation) : (count < fit_count ? fit_count : most_count);
     }
+    FluxFormulaMap map = refine(flux, i_max_A, {}, next_count(first_count, first, most_count), most_count);
+    if (good(most_count, map, most_count)) {
+        return map;
+    }
+    const SampleAxis finest = sample_axis(i_max_A, most_count, {});
+    FluxFormulaMap fit = map_of_fit(sample(flux, finest, finest), flux);
+    return !map.map || (fit.map && fit.deviation < map.deviation) ? std::move(fit) : std::move(map);
 }
 
 } // namespace pmsim

@@ -1,9 +1,10 @@
 // A flux map written as formulas, sampled over a square of currents -i_max ... i_max.
 //
 // The samples become nodes with derivatives by differences of nine points, on a grid as fine as it takes for
-// the map to follow the formula to 1e-8 of its largest flux; that is measured between the nodes. A formula
-// with kinks, or one that is not quite reciprocal, goes through the fit of map_table_create() instead. Tests:
-// flux_map_test.cpp.
+// the map to follow the formula to 1e-8 of its largest flux; that is measured between the nodes. Kinks at a
+// constant current get nodes of their own (flux_kinks.h); across a step of the inductance the map is within
+// 1e-5. A formula with other kinks, or one that is not quite reciprocal, goes through the fit of
+// map_table_create() instead. Tests: flux_map_test.cpp.
 #ifndef PMSIM_FLUX_FORMULA_H
 #define PMSIM_FLUX_FORMULA_H
 
@@ -28,7 +29,8 @@ struct FluxFormulaMap {
     FluxMapPointer map; // empty: refused
     map_table_report_t report{};
     const char *error = nullptr;
-    double deviation = 0.0; // largest found, relative to the largest flux
+    double deviation = 0.0;      // largest found, relative to the largest flux
+    double even_deviation = 0.0; // the same without the cells that pass a step of the inductance
     double largest_Wb = 0.0;
 };
 

@@ -129,6 +129,16 @@ std::string flux_unit(const std::string &path)
     return head.find("psi_d_Wb") != std::string::npos ? "_Wb" : "_Vs";
 }
 
+// psi_0(-i_q, -theta) = psi_0(i_q, theta); 60 or 180 degrees of data are half a period, after which it
+// changes its sign.
+double mirrored_psi_0(const FluxTable &table, size_t self, size_t image, size_t angle, bool below,
+                      bool own_image)
+{
+    const double sign = table.theta_order % 2 == 0 && angle > 0 ? -1.0 : 1.0;
+    const double mirrored = sign * table.psi_0_Wb[image];
+    return below ? mirrored : own_image ? 0.5 * (table.psi_0_Wb[self] + mirrored) : table.psi_0_Wb[self];
+}
+
 } // namespace
 
 map_table_data_t FluxTable::data() const
@@ -147,15 +157,30 @@ FluxTable read_flux_table(const std::string &path)
     const std::string unit = flux_unit(path);
     const Csv csv = Csv::from_file(path, {{"i_d_A", "i_q_A", "psi_d" + unit, "psi_q" + unit},
                                           {"theta_e_deg", "torque_Nm", "psi_0" + unit}});
-    const std::vector<double> &psi_d = csv.column("psi_d" + unit), &psi_q = csv.column("psi_q" + unit);
     Grid grid{axis_of(csv, "i_d_A"), axis_of(csv, "i_q_A"), {{0.0}, {0}}};
     if (csv.has("theta_e_deg")) {
         grid.theta = axis_of(csv, "theta_e_deg");
     }
-    FluxTable table{grid.d.x, grid.q.x, int(grid.theta.x.size()), theta_order(csv, grid.theta), {}, {}, {}};
-    for (const size_t row : rows_of(csv, grid)) {
-        table.psi_d_Wb.push_back(psi_d[row]);
-        table.psi_q_Wb.push_back(psi_q[row]);
+    FluxTable table;
+    table.i_d_A = grid.d.x;
+    table.i_q_A = grid.q.x;
+    table.count_theta = int(grid.theta.x.size());
+    table.theta_order = theta_order(csv, grid.theta);
+    const std::vector<size_t> rows = rows_of(csv, grid);
+    const auto sorted = [&](const std::string &name) {
+        std::vector<double> values;
+        for (size_t k = 0; csv.has(name) && k < rows.size(); ++k) {
+            values.push_back(csv.column(name)[rows[k]]);
+        }
+        return values;
+    };
+    table.psi_d_Wb = sorted("psi_d" + unit);
+    table.psi_q_Wb = sorted("psi_q" + unit);
+    table.torque_Nm = sorted("torque_Nm");
+    if (table.count_theta > 1) { // its mean over a turn is nothing
+        table.psi_0_Wb = sorted("psi_0" + unit);
+    }
+    for (const size_t row : rows) {
         table.lines.push_back(csv.line(row));
     }
     return table;
@@ -172,7 +197,10 @@ FluxTable mirror_flux_table(const FluxTable &table, const std::string &path)
     for (const double psi : table.psi_q_Wb) {
         largest = std::max(largest, std::fabs(psi));
     }
-    FluxTable full{table.i_d_A, {}, table.count_theta, table.theta_order, {}, {}, {}};
+    FluxTable full;
+    full.i_d_A = table.i_d_A;
+    full.count_theta = table.count_theta;
+    full.theta_order = table.theta_order;
     for (size_t j = 1; j < half; ++j) {
         full.i_q_A.push_back(-table.i_q_A[half - j]);
     }
@@ -197,6 +225,9 @@ FluxTable mirror_flux_table(const FluxTable &table, const std::string &path)
                 }
                 full.psi_d_Wb.push_back(psi_d);
                 full.psi_q_Wb.push_back(psi_q);
+                if (!table.psi_0_Wb.empty()) {
+                    full.psi_0_Wb.push_back(mirrored_psi_0(table, self, image, n, below, j + 1 == half));
+                }
                 full.lines.push_back(table.lines[self]);
             }
         }

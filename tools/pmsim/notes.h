@@ -21,6 +21,11 @@ inline void print_notes(const Setup &setup)
 {
     if (setup.flux_map) {
         print_note(setup.flux_map->note);
+        const std::string warning =
+            flux_table_warning(*setup.flux_map, setup.plant.machine.R_s_ohm, setup.plant.machine.pole_pairs);
+        if (!warning.empty()) {
+            std::fprintf(stderr, "warning: %s\n", warning.c_str());
+        }
     }
 }
 

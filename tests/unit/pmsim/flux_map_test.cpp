@@ -12,6 +12,7 @@
 
 #include "tests/support/temporary_file.h"
 #include "tests/unit/pmsim/support.h"
+#include "tools/pmsim/machine_file.h"
 
 namespace pmsim
 {
@@ -253,6 +254,71 @@ TEST_F(FluxMapTable, ReportsOrRefusesDataThatAreNotReciprocal)
     EXPECT_THAT(refusal(table(), "reciprocity_max: 2\n"), HasSubstr("m.yaml:2:18: 2 is out of range"));
 }
 
+// --- slips of axes and units ---
+
+// From the name of the table on.
+std::string without_folder(const std::string &warning)
+{
+    const size_t name = warning.find("map.csv");
+    return name == std::string::npos ? warning : warning.substr(name);
+}
+
+// A table over -12 ... 12 A, with a torque column (0: without) of a machine with 3 pole pairs.
+std::string machine_table(const Flux &flux, double torque, double by_flux = 1.0, double by_current = 1.0)
+{
+    std::string csv = torque != 0.0 ? "i_d_A,i_q_A,psi_d_Vs,psi_q_Vs,torque_Nm\n" : header;
+    for (int k = 0; k < 25; ++k) {
+        const double i_d = 6.0 * (k / 5) - 12.0, i_q = 6.0 * (k % 5) - 12.0;
+        const dq_t psi = flux(i_d, i_q, 0.0);
+        csv += std::to_string(by_current * i_d) + "," + std::to_string(by_current * i_q) + "," +
+               std::to_string(by_flux * psi.d) + "," + std::to_string(by_flux * psi.q);
+        csv += (torque != 0.0 ? "," + std::to_string(torque * 1.5 * 3 * (psi.d * i_q - psi.q * i_d)) : "") +
+               "\n";
+    }
+    return csv;
+}
+
+TEST_F(FluxMapTable, WarnsOfMagnetsOffTheirAxis)
+{
+    const auto warning = [this](const Flux &flux) {
+        return without_folder(flux_table_warning(read_csv(machine_table(flux, 0.0)), 1.0, 3));
+    };
+    const auto magnets = [](double d, double q) {
+        return Flux([=](double i_d, double i_q, double) { return dq_t{d + 0.004 * i_d, q + 0.006 * i_q}; });
+    };
+    EXPECT_EQ(warning(magnets(0.1, 0.0)), "");
+    EXPECT_EQ(warning(magnets(0.1, 0.01)), ""); // 6 degrees
+    EXPECT_EQ(warning(magnets(0.0, 0.0)), "");  // a reluctance machine
+    EXPECT_EQ(warning(magnets(0.0, 1e-3)), ""); // of 73 mVs: what a field solver leaves
+    EXPECT_EQ(warning(magnets(0.005, 0.1)),
+              "map.csv: at zero current psi_d = 0.005 Vs and psi_q = 0.1 Vs: the magnets "
+              "lie on the q axis; expected is +d, with q 90 degrees ahead");
+    EXPECT_THAT(warning(magnets(0.01, -0.1)), HasSubstr("psi_q = -0.1 Vs: the magnets lie on the q axis"));
+    EXPECT_THAT(warning(magnets(-0.1, 0.0)), HasSubstr("map.csv: at zero current psi_d = -0.1 Vs"));
+    EXPECT_THAT(warning(magnets(-0.1, 0.0)), HasSubstr("the magnets point along -d"));
+    EXPECT_THAT(warning(magnets(0.1, 0.0364)), HasSubstr("the magnets lie 20 degrees off the d axis"));
+}
+
+TEST_F(FluxMapTable, WarnsOfAScaleOffByAThousand)
+{
+    const auto warning = [this](double torque, double by_flux, double by_current) {
+        return without_folder(
+            flux_table_warning(read_csv(machine_table(linear, torque, by_flux, by_current)), 1.0, 3));
+    };
+    for (const double torque : {0.0, 1.0}) {
+        EXPECT_EQ(warning(torque, 1.0, 1.0), "");
+        for (const double by : {1e3, 1e-3}) {
+            EXPECT_THAT(warning(torque, by, 1.0), StartsWith("map.csv: ")) << torque << by;
+            EXPECT_THAT(warning(torque, by, 1.0), HasSubstr("off")) << torque << by;
+            EXPECT_THAT(warning(torque, 1.0, by), HasSubstr("in scale?")) << torque << by;
+        }
+    }
+    EXPECT_THAT(warning(1.0, 1e3, 1.0), HasSubstr("torque_Nm is 0.001 times 1.5 P (psi_d i_q - psi_q i_d)"));
+    EXPECT_THAT(warning(0.0, 1e3, 1.0), HasSubstr("off by 1000 in scale?"));
+    EXPECT_THAT(warning(-1.0, 1.0, 1.0), HasSubstr("torque_Nm has the other sign"));
+    EXPECT_THAT(flux_table_warning(read_csv(machine_table(linear, 1.0)), 1.0, 12), HasSubstr("pole_pairs"));
+}
+
 // --- formulas ---
 
 TEST(FluxMapFormula, OfCurrents)
@@ -309,17 +375,86 @@ TEST(FluxMapFormula, FormsAgree)
     }
 }
 
-TEST(FluxMapFormula, KinksAreFittedAndSaid)
+// Worst difference of a map's flux from that of formulas, over a square of currents.
+template <class Formula> double worst_Wb(const FluxMap &map, double i_max_A, Formula formula)
+{
+    double worst = 0.0;
+    for (double i_d = -i_max_A; i_d <= i_max_A; i_d += 0.0137 * i_max_A) {
+        for (double i_q = -i_max_A; i_q <= i_max_A; i_q += 0.0171 * i_max_A) {
+            const dq_t psi = formula(i_d, i_q), found = at(map, i_d, i_q).psi_Wb;
+            worst = std::max({worst, std::fabs(found.d - psi.d), std::fabs(found.q - psi.q)});
+        }
+    }
+    return worst;
+}
+
+// A step of the inductance at 2 A, which a map with continuous inductance passes within 1e-5 of its range.
+TEST(FluxMapFormula, StepsOfTheInductanceAreFollowed)
 {
     const FluxMap map = read("psi_d_Vs: 0.1 + 0.004*i_d\n"
                              "psi_q_Vs: \"abs(i_q) < 2 ? 0.006*i_q : 0.002*i_q + sign(i_q)*0.008\"\n"
                              "i_max_A: 8\n");
-    EXPECT_THAT(map.note, HasSubstr("m.yaml:1:11: the map follows the formulas to"));
-    for (double i_q = -8.0; i_q <= 8.0; i_q += 0.11) { // a kink spreads over two steps of 1/8 A
-        const double psi = std::fabs(i_q) < 2 ? 0.006 * i_q : 0.002 * i_q + std::copysign(0.008, i_q);
-        EXPECT_NEAR(at(map, 1.0, i_q).psi_Wb.q, psi, 0.004 * 0.125);
-        EXPECT_GT(at(map, 1.0, i_q).L_q_H, 0.9e-3);
+    const auto formula = [](double i_d, double i_q) {
+        return dq_t{0.1 + 0.004 * i_d,
+                    std::fabs(i_q) < 2 ? 0.006 * i_q : 0.002 * i_q + std::copysign(0.008, i_q)};
+    };
+    EXPECT_LT(worst_Wb(map, 8.0, formula), 1e-5 * 0.132);
+    for (const double i_q : {-2.001, -1.999, 0.0, 1.999, 2.001}) {
+        const double psi = formula(1.0, i_q).q;
+        EXPECT_NEAR(at(map, 1.0, i_q).psi_Wb.q, psi, 1e-5 * 0.132);
+        EXPECT_NEAR(at(map, 1.0, i_q).L_q_H, std::fabs(i_q) < 2 ? 0.006 : 0.002, 1e-6);
     }
+}
+
+// Saturation by |psi_d| and |psi_q|: where the magnets' flux is compensated, at i_d = -i_f and anywhere
+// between the nodes of an even grid, the inductance has a kink.
+struct Kinked {
+    double i_max_A, step; // 60 |psi_d| in i_d is a step of the inductance
+};
+
+class FluxMapKinks : public testing::TestWithParam<Kinked>
+{
+};
+INSTANTIATE_TEST_SUITE_P(Ranges, FluxMapKinks,
+                         testing::Values(Kinked{28, 0}, Kinked{40, 0}, Kinked{60, 0}, Kinked{40, 60}));
+
+TEST_P(FluxMapKinks, AreFollowed)
+{
+    const double i_max_A = GetParam().i_max_A, step = GetParam().step;
+    const FluxMap map = read(
+        "i_d_A: \"(100 + 400*abs(psi_d) + 300*abs(psi_d)*abs(psi_q)^3)*psi_d + step*abs(psi_d) - 17.3\"\n"
+        "i_q_A: \"(20 + 150*abs(psi_q) + 300*abs(psi_d)^3*abs(psi_q))*psi_q\"\n"
+        "i_max_A: " +
+        std::to_string(i_max_A) + "\nconstants: {step: " + std::to_string(step) + "}\n");
+    double worst = 0.0, most = 0.0;
+    for (double i_d = -i_max_A; i_d <= i_max_A; i_d += 0.0137 * i_max_A) {
+        for (double i_q = -i_max_A; i_q <= i_max_A; i_q += 0.0171 * i_max_A) {
+            const map_point_t m = at(map, i_d, i_q);
+            const double d = m.psi_Wb.d, q = m.psi_Wb.q, D = std::fabs(d), Q = std::fabs(q);
+            const double e_d = (100 + 400 * D + 300 * D * Q * Q * Q) * d + step * D - 17.3 - i_d;
+            const double e_q = (20 + 150 * Q + 300 * D * D * D * Q) * q - i_q;
+            worst = std::max({worst, std::fabs(m.L_d_H * e_d + m.L_dq_H * e_q),
+                              std::fabs(m.L_dq_H * e_d + m.L_q_H * e_q)});
+            most = std::max({most, D, Q});
+        }
+    }
+    std::printf("%g A: kinks followed to %.2g of the largest flux\n", i_max_A, worst / most);
+    EXPECT_LT(worst / most, 1e-5);
+}
+
+// One that is not at a constant current is smoothed, and said.
+TEST(FluxMapFormula, SlantingKinksAreFittedAndSaid)
+{
+    const FluxMap map = read("psi_d_Vs: \"0.1 + 0.004*i_d + 0.001*abs(i_d + 0.5*i_q - 1)\"\n"
+                             "psi_q_Vs: \"0.006*i_q + 0.0005*abs(i_d + 0.5*i_q - 1)\"\n"
+                             "i_max_A: 8\n");
+    EXPECT_THAT(map.note,
+                HasSubstr("made so by moving fluxes by up to")); // as a difference across it sees it
+    const auto formula = [](double i_d, double i_q) {
+        const double kink = std::fabs(i_d + 0.5 * i_q - 1);
+        return dq_t{0.1 + 0.004 * i_d + 0.001 * kink, 0.006 * i_q + 0.0005 * kink};
+    };
+    EXPECT_LT(worst_Wb(map, 8.0, formula), 0.001 * 0.125); // spread over two steps of 1/8 A
 }
 
 TEST(FluxMapFormula, NotReciprocal)
@@ -396,7 +531,41 @@ TEST(FluxMapData, Thor)
         EXPECT_NEAR(map.low_A.q, -66.11, 0.01);
         EXPECT_NEAR(map.report.reciprocity, 0.01, 0.004);
         EXPECT_THAT(map.note, HasSubstr("not reciprocal"));
+        EXPECT_EQ(flux_table_warning(map, 0.1967, 2), "");
     }
+}
+
+TEST(FluxMapData, Pm270IsNotWarnedOf)
+{
+    const char *given = std::getenv("PMDRIVE_DATA");
+    const fs::path folder = fs::absolute(given != nullptr ? given : "../shared/data");
+    if (!fs::exists(folder / "pm270l8_ipm_fea.csv")) {
+        GTEST_SKIP() << "no data of real machines: set PMDRIVE_DATA to their folder";
+    }
+    const FluxMap map = read("table: pm270l8_ipm_fea.csv\nmirror_q: true\n", (folder / "m.yaml").string());
+    EXPECT_EQ(flux_table_warning(map, 0.02, 4), "");
+}
+
+TEST(FluxMapData, NoMachineOfTheTreeIsWarnedOf)
+{
+    int maps = 0;
+    for (const char *folder : {"sim_plant/machines", "tests/data/machines"}) {
+        for (const auto &entry : fs::directory_iterator(folder)) {
+            try {
+                const pmsim::Setup setup = load_machine_file(entry.path().string());
+                if (setup.flux_map) {
+                    ++maps;
+                    EXPECT_EQ(flux_table_warning(*setup.flux_map, setup.plant.machine.R_s_ohm,
+                                                 setup.plant.machine.pole_pairs),
+                              "")
+                        << entry.path();
+                }
+            } catch (const InputError &error) { // the data of real machines are not in the tree
+                EXPECT_THAT(error.what(), HasSubstr("cannot be read")) << entry.path();
+            }
+        }
+    }
+    std::printf("%d maps\n", maps);
 }
 
 } // namespace
