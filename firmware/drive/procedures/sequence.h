@@ -13,6 +13,10 @@
 #include "firmware/math/frames.h"
 #include "firmware/math/procedure.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum {
     SEQUENCE_align,
     SEQUENCE_pulses,
@@ -49,5 +53,9 @@ typedef struct {
     pm_angle_t theta;  /* of the rotor, where the last position finding left it */
     pm_sigma_t margin; /* of that, the smallest */
 } sequence_t;
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
