@@ -6,6 +6,8 @@
 #define PULSES 6
 /* Periods with zero current before the next pulse: the current has ended and the converter shows it. */
 #define QUIET 3
+/* Of a quotient in Q28, a 64th of it, to PM_SIGMA_BITS. */
+#define PER_SIGMA 16384
 
 static const pm_angle_t axis[3] = {0, 1431655765U, 2863311531U}; /* 0, 120, 240 degrees */
 
@@ -64,7 +66,7 @@ static pm_procedure_t conclude(initial_pulses_t *self, const initial_pulses_conf
 pm_sigma_t initial_pulses_margin(const initial_pulses_t *self, const initial_pulses_config_t *config)
 {
     const pm_q_t least = pm_min(self->length, pm_abs(self->along));
-    return pm_div(least / 64, config->w_min) / (1 << (PM_Q_BITS - 6 - PM_SIGMA_BITS)) * 5;
+    return pm_div(least / 64, config->w_min) / PER_SIGMA * 5;
 }
 
 /* The output of a step acts over the next period, so a pulse commanded in n steps ends at step n + 1. */

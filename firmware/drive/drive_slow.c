@@ -21,18 +21,20 @@ PM_RARE static void switch_off(drive_t *drive)
     enter(drive, DRIVE_OFF, STAGE_OFF);
 }
 
-PM_RARE static void begin_step(drive_t *drive, uint32_t step)
+/* Called from drive_slow() itself: what begins needs the deepest stack of all. */
+PM_RARE static void begin_step(drive_t *drive)
 {
-    drive->sequence.step = (uint8_t)step;
+    sequence_t *self = &drive->sequence;
+    self->begins = false;
     drive->state_ms = 0;
     drive->still_ms = 0;
     drive->stall_ms = 0;
     drive->lost_ms = 0;
     drive->sum_ms = 0;
-    procedure_begin(drive, (procedure_id_t)sequence_step((sequence_id_t)drive->sequence.id, step)->procedure);
+    procedure_begin(drive, (procedure_id_t)sequence_step((sequence_id_t)self->id, self->step)->procedure);
 }
 
-PM_RARE static void begin_sequence(drive_t *drive)
+static void begin_sequence(drive_t *drive)
 {
     uint8_t id = drive->config.start;
     if (drive->command.mode == DRIVE_MODE_CURRENT) {
@@ -42,13 +44,12 @@ PM_RARE static void begin_sequence(drive_t *drive)
     } else {
         /* as configured */
     }
-    drive->sequence = (sequence_t){.id = id};
+    drive->sequence = (sequence_t){.id = id, .begins = true};
     drive->status.refusal = (drive_refusal_t){0};
-    begin_step(drive, 0);
 }
 
 /* The rotor stands at theta: injection takes over. */
-PM_RARE static void begin_injection(drive_t *drive, pm_angle_t theta)
+static void begin_injection(drive_t *drive, pm_angle_t theta)
 {
     position_reset(&drive->position, &drive->config.position, theta, drive->i_ab, true);
     current_control_reset(&drive->current, (pm_dq_t){0, 0});
@@ -68,7 +69,7 @@ static void begin_running(drive_t *drive)
 }
 
 /* A procedure has come to its end, this way or that. */
-PM_RARE static void advance(drive_t *drive, pm_procedure_t result)
+static void advance(drive_t *drive, pm_procedure_t result)
 {
     sequence_t *self = &drive->sequence;
     const uint32_t next = sequence_next(sequence_step((sequence_id_t)self->id, self->step), result);
@@ -88,7 +89,8 @@ PM_RARE static void advance(drive_t *drive, pm_procedure_t result)
         drive->stage = STAGE_OFF;
         break;
     default:
-        begin_step(drive, next);
+        self->step = (uint8_t)next;
+        self->begins = true;
         break;
     }
 }
@@ -240,6 +242,9 @@ void drive_slow(drive_t *drive, const drive_slow_in_t *in)
         }
         drive->state_ms = (uint16_t)(drive->state_ms + (drive->state_ms < UINT16_MAX ? 1U : 0U));
         move(drive);
+        if (drive->sequence.begins) {
+            begin_step(drive);
+        }
         protection_slow(drive);
     }
     if (drive->fault != DRIVE_FAULT_NONE) {

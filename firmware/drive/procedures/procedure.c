@@ -3,7 +3,6 @@
 #include <stddef.h>
 
 #include "firmware/drive/drive_parts.h"
-#include "firmware/math/compiler.h"
 #include "firmware/math/image.h"
 
 _Static_assert(offsetof(position_t, pll) == 0 && offsetof(procedure_t, pll) == 0,
@@ -25,7 +24,7 @@ static drive_state_t state_of(procedure_id_t id)
     return (drive_state_t)states[id];
 }
 
-PM_RARE void procedure_begin(drive_t *drive, procedure_id_t id)
+void procedure_begin(drive_t *drive, procedure_id_t id)
 {
     drive->state = state_of(id);
     drive->stage = STAGE_PROCEDURE;

@@ -32,6 +32,10 @@
 #include "firmware/math/procedure.h"
 #include "injection/initial_pulses.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum {
     PROCEDURE_NONE,
 #define PM_METHOD(name, help, traits, needs) PROCEDURE_##name,
@@ -80,5 +84,9 @@ typedef union {
 void procedure_begin(drive_t *drive, procedure_id_t id); /* the drive's state and stage, too */
 pm_procedure_t procedure_slow(drive_t *drive);
 void procedure_abort(drive_t *drive); /* from then on there is none */
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -10,8 +10,14 @@
 #ifndef DRIVE_PROCEDURES_SEQUENCE_H
 #define DRIVE_PROCEDURES_SEQUENCE_H
 
+#include <stdbool.h>
+
 #include "firmware/math/frames.h"
 #include "firmware/math/procedure.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 typedef enum {
     SEQUENCE_align,
@@ -45,9 +51,14 @@ uint32_t sequence_next(const sequence_step_t *step, pm_procedure_t result);
 /* The drive's place in it. */
 typedef struct {
     uint8_t id, step;
-    uint8_t procedure; /* at work, or PROCEDURE_COUNT */
+    uint8_t procedure; /* at work, or PROCEDURE_NONE */
+    bool begins;       /* the step does, in this millisecond */
     pm_angle_t theta;  /* of the rotor, where the last position finding left it */
     pm_sigma_t margin; /* of that, the smallest */
 } sequence_t;
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
