@@ -20,12 +20,11 @@ pm_q_t mismatch_step(const mismatch_t *self, mismatch_window_t *window, const mi
 }
 
 void mismatch_slow(mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
-                   const observer_model_t *model, const mismatch_in_t *in)
+                   const mismatch_in_t *in)
 {
     (void)self;
     (void)window;
     (void)config;
-    (void)model;
     (void)in;
 }
 
@@ -73,15 +72,16 @@ static pm_q_t real_product(pm_ab_t a, pm_ab_t b)
 }
 
 /* Oscillation of the rotor, rad per base current: -swing times the flux that makes the torque. */
-static pm_q_t rotor(const mismatch_config_t *config, const observer_model_t *model, pm_dq_t i)
+static pm_q_t rotor(const mismatch_config_t *config, pm_dq_t i)
 {
+    const observer_model_t *model = &config->model;
     const pm_q_t flux = config->id == (uint8_t)MISMATCH_Q_AXIS ? observer_active_flux(model, i)
                                                                : pm_mul(model->L_d - model->L_q, i.q);
     return -pm_shl(pm_sat(pm_mulh(flux, config->swing), 19), 12);
 }
 
 static void learn(mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
-                  const observer_model_t *model, const mismatch_in_t *in)
+                  const mismatch_in_t *in)
 {
     const pm_ab_t current = lifted(window->current);
     const pm_q_t square = real_product(current, current);
@@ -89,7 +89,7 @@ static void learn(mismatch_t *self, mismatch_window_t *window, const mismatch_co
         return;
     }
     const pm_q_t g = pm_div(real_product(lifted(window->angle), current), square);
-    const pm_q_t change = (rotor(config, model, in->i) - g) / (4 + (int32_t)(window->windows / 4U));
+    const pm_q_t change = (rotor(config, in->i) - g) / (4 + (int32_t)(window->windows / 4U));
     if (config->id == (uint8_t)MISMATCH_Q_AXIS) {
         self->k.q = pm_sat(self->k.q + change, PM_Q_BITS);
     } else {
@@ -140,7 +140,7 @@ static void begin_again(mismatch_window_t *self, const mismatch_config_t *config
 }
 
 static void listen(mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
-                   const observer_model_t *model, const mismatch_in_t *in)
+                   const mismatch_in_t *in)
 {
     (void)pm_lp1(&window->omega, in->pll->omega, K_MEAN);
     (void)pm_lp1(&window->i_q, in->i.q, K_MEAN);
@@ -158,14 +158,14 @@ static void listen(mismatch_t *self, mismatch_window_t *window, const mismatch_c
     } else {
         collect(window, config, x, i);
         if (window->count == (MISMATCH_PERIODS + 1U) * config->samples) {
-            learn(self, window, config, model, in);
+            learn(self, window, config, in);
             begin_window(window, x);
         }
     }
 }
 
 void mismatch_slow(mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
-                   const observer_model_t *model, const mismatch_in_t *in)
+                   const mismatch_in_t *in)
 {
     const pm_q_t omega = in->pll->omega;
     const pm_q_t k_d = pm_sat(pm_div(self->k_omega, pm_max(pm_abs(omega), LEAST)), PM_Q_BITS);
@@ -176,7 +176,7 @@ void mismatch_slow(mismatch_t *self, mismatch_window_t *window, const mismatch_c
     if (config->id == (uint8_t)MISMATCH_OFF) {
         *self = (mismatch_t){.k_omega = 0};
     } else if (window != NULL) {
-        listen(self, window, config, model, in);
+        listen(self, window, config, in);
     }
 }
 

@@ -56,7 +56,8 @@ typedef struct {
     uint8_t periods;  /* control periods per step */
     uint16_t samples; /* steps per period of the injection */
     pm_q_t i;         /* its amplitude */
-    int32_t swing;    /* 1.5 P^2 / (J w^2): rad per base flux and base current, Q20 */
+    observer_model_t model;
+    int32_t swing; /* 1.5 P^2 / (J w^2): rad per base flux and base current, Q20 */
 } mismatch_config_t;
 
 /* What has been learnt. */
@@ -100,7 +101,7 @@ pm_q_t mismatch_step(const mismatch_t *self, mismatch_window_t *window, const mi
 
 /* At 1 kHz. */
 void mismatch_slow(mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
-                   const observer_model_t *model, const mismatch_in_t *in);
+                   const mismatch_in_t *in);
 
 void make_mismatch(maker_t *m, mismatch_config_t *c);
 

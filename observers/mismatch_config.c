@@ -2,6 +2,7 @@
 
 #include "firmware/math/image.h"
 #include "firmware/params/maker.h"
+#include "observers/model_config.h"
 
 #if !PM_HAS(mismatch)
 
@@ -27,6 +28,7 @@ void make_mismatch(maker_t *m, mismatch_config_t *c)
     c->periods = (uint8_t)m->slow_divider;
     c->samples = (uint16_t)samples;
     c->i = per_unit(m, DRIVE_PARAM_mismatch_current, m->base.i);
+    make_model(m, &c->model);
     c->swing = 0;
     if (c->id != (uint8_t)MISMATCH_OFF) {
         c->swing = fixed(m, pm_num_div(acceleration, square(w)), SMALL_BITS, frequency);

@@ -154,7 +154,8 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     config->base = m.base;
     config->pole_pairs = pole_pairs(&m);
     config->slow_divider = m.slow_divider;
-    config->injection = params->start_method % 2 == 1 || (params->start_method == 0 && salient(&m));
+    config->injection =
+        params->start_method % 2 == 1 || (params->start_method == 0 && injection_sees_saliency(&m));
     config->start = (uint8_t)start_of(params, config->injection);
     make_modulator(&m, &config->modulator);
     make_current_control(&m, &config->current);
@@ -165,10 +166,10 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     make_position(&m, &config->position, config->injection);
     make_speed(&m, &config->speed_estimate);
     config->speed_estimate.k_theta = config->position.pll_low.k_theta;
-    config->position.special = config->position.second_harmonic.id != SECOND_HARMONIC_STAYS ||
-                               config->position.mismatch.id != MISMATCH_OFF ||
-                               config->position.loop.id != LOOP_PLL ||
-                               config->speed_estimate.id != SPEED_LOOP;
+    config->position.corrects = config->position.second_harmonic.id != SECOND_HARMONIC_STAYS ||
+                                config->position.mismatch.id != MISMATCH_OFF ||
+                                config->position.loop.id != LOOP_PLL ||
+                                config->speed_estimate.id != SPEED_LOOP;
     if (config->start != (uint8_t)SEQUENCE_align) {
         make_pulses(&m, &config->pulses);
     }

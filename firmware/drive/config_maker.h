@@ -10,7 +10,6 @@ extern "C" {
 #endif
 
 /* config_position.c */
-bool salient(const maker_t *m);
 void make_position(maker_t *m, position_config_t *c, bool injection);
 void make_pulses(maker_t *m, initial_pulses_config_t *c);
 

@@ -35,14 +35,15 @@ bool drive_same_frame(const drive_config_t *a, const drive_config_t *b)
     const drive_base_t *y = &b->base;
     return same(x->v, y->v) && same(x->i, y->i) && same(x->omega, y->omega) && same(x->t_s, y->t_s) &&
            same(a->pole_pairs, b->pole_pairs) && a->modulator.counts == b->modulator.counts &&
-           a->injection == b->injection && a->start == b->start;
+           a->injection == b->injection && a->position.injection.id == b->position.injection.id &&
+           a->start == b->start;
 }
 
 PM_RARE void drive_reconfigure(drive_t *drive, const drive_config_t *config)
 {
     const observer_id_t before = drive->config.position.observer.id;
     drive->config = *config;
-    drive->taken = false;
+    drive->references_ready = false;
     const position_config_t *position = &drive->config.position;
     if (position->observer.id != before && drive->stage >= STAGE_OPEN_LOOP) {
         position_change_observer(&drive->position, position, drive->i_ab, drive->status.i);
@@ -61,7 +62,7 @@ PM_RARE void drive_command(drive_t *drive, const drive_command_t *command)
     const bool same_references = command->speed_mrad_s == last->speed_mrad_s &&
                                  command->torque_uNm == last->torque_uNm &&
                                  command->current_mA == last->current_mA;
-    drive->taken = drive->taken && same_references;
+    drive->references_ready = drive->references_ready && same_references;
     drive->command = *command;
     drive->command.mode = mode;
     if (!command->enable && drive->stage == STAGE_PROCEDURE) {
@@ -197,7 +198,8 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
 static inline position_out_t imposed_frame(const drive_t *drive)
 {
     const pm_dir_t dir = pm_dir(drive->theta_open);
-    return (position_out_t){.dir = dir, .i = pm_park(drive->i_ab, dir), .omega = drive->omega_open};
+    return (position_out_t){
+        .ahead = pm_dir_sum(dir, drive->ahead), .i = pm_park(drive->i_ab, dir), .omega = drive->omega_open};
 }
 
 static inline void write_out(const modulator_out_t *m, drive_out_t *out)
@@ -215,19 +217,20 @@ static inline void control(drive_t *drive, const position_out_t *frame, drive_ou
     const drive_config_t *c = &drive->config;
     const pm_q_t v_dc = drive->status.v_dc;
     current_control_out_t u;
-    current_control_step(&drive->current, &c->current, frame->i, pm_pair_dq(&drive->i_ref), frame->omega,
-                         pm_unit(v_dc, drive->v_share), &u);
+    current_control_step(&drive->current, &drive->current_config, frame->i, pm_pair_dq(&drive->i_ref),
+                         frame->omega, pm_unit(v_dc, drive->v_share), &u);
     drive->u = u.wide;
     drive->status.i = frame->i;
 
-    pm_dq_t v = {.d = pm_shl(u.wide.d, 30 - PM_WIDE_BITS), .q = pm_shl(u.wide.q, 30 - PM_WIDE_BITS)};
+    const pm_dq_t v = {.d = pm_shl(u.wide.d, 30 - PM_WIDE_BITS), .q = pm_shl(u.wide.q, 30 - PM_WIDE_BITS)};
+    pm_ab_t v_ab = pm_park_inverse_quarter(v, frame->ahead);
     if (drive->carrier) {
-        v.d += pm_shl(pulsating_square_output(&drive->position.square, &c->position.square).d, 2);
+        v_ab.alpha += frame->carrier.alpha;
+        v_ab.beta += frame->carrier.beta;
     }
-    const pm_half_dir_t ahead = pm_dir_sum(frame->dir, drive->ahead);
     modulator_out_t m;
-    modulator_step(&drive->modulator, &c->modulator, pm_park_inverse_quarter(v, ahead), v_dc,
-                   pm_park_inverse_quarter(frame->i, ahead), &m);
+    modulator_step(&drive->modulator, &c->modulator, v_ab, v_dc,
+                   pm_park_inverse_quarter(frame->i, frame->ahead), &m);
     drive->v_next = m.v;
     write_out(&m, out);
 }
@@ -254,19 +257,38 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
         const pm_ab_t next = pm_pair_ab(&drive->v_next);
         drive->v_acting.alpha = next.alpha;
         drive->v_acting.beta = next.beta;
-        if (pm_rarely(drive->config.position.special)) {
+        if (pm_rarely(drive->config.position.corrects)) {
             collect_speed(drive, v);
         }
         position_out_t frame;
-        position_step(&drive->position, &drive->config.position, v, drive->i_ab, &frame);
+        position_step(&drive->position, &drive->config.position, v, drive->i_ab, drive->ahead, &frame);
         drive->status.theta = drive->position.pll.theta;
         if (drive->stage != STAGE_VECTOR) {
             drive->theta_open += (pm_angle_t)drive->turn_open;
-            if (!drive->led) {
+            if (!drive->forced) {
                 frame = imposed_frame(drive);
             }
         }
         control(drive, &frame, out);
+    }
+}
+
+static void slow_down(pm_pi_config_t *pi, pm_unit_t share)
+{
+    pi->kp = pm_unit(pi->kp, share);
+    pi->ki = pm_unit(pi->ki, share);
+}
+
+/* kp and ki are proportional to the bandwidth; the integrals are voltages and stay. */
+static void prepare_current_control(drive_t *drive)
+{
+    drive->current_config = drive->config.current;
+    if (drive->carrier) {
+        const pm_unit_t share = position_current_share(&drive->position, &drive->config.position);
+        if (share < PM_UNIT_MAX) {
+            slow_down(&drive->current_config.d, share);
+            slow_down(&drive->current_config.q, share);
+        }
     }
 }
 
@@ -280,18 +302,19 @@ PM_RARE void drive_prepare(drive_t *drive)
     const int32_t turn = pm_omega_to_angle(omega, c->k_theta);
     /* On an imposed angle an observer drifts at low speed, and on the way up it slips. */
     const pm_q_t lead_to = open_loop_ramps(drive) ? c->position.omega_high : c->position.omega_low;
-    drive->led = open && pm_abs(drive->omega_ramp) < lead_to;
-    if (drive->led) {
+    drive->forced = open && pm_abs(drive->omega_ramp) < lead_to;
+    if (drive->forced) {
         const pm_pll_t along = {.theta = drive->theta_open, .omega = omega};
-        position_lead(&drive->position, &c->position, &along);
+        position_force(&drive->position, &c->position, &along);
     }
     drive->turn_open = turn;
     drive->ahead = pm_dir((pm_angle_t)turn + (pm_angle_t)pm_half(turn));
     drive->carrier = drive->stage == STAGE_VECTOR && drive->position.inject;
     drive->v_share = c->v_linear;
     if (drive->carrier) { /* a sagging link must not leave nothing to control with */
-        const pm_unit_t taken = pm_ratio(pm_min(c->position.square.v_h, v_dc), v_dc);
-        drive->v_share = pm_max(c->v_linear - taken, c->v_linear / 4);
+        const pm_unit_t reserved = pm_ratio(pm_min(c->position.injection.reserve, v_dc), v_dc);
+        drive->v_share = pm_max(c->v_linear - reserved, c->v_linear / 4);
     }
+    prepare_current_control(drive);
     modulator_slow(&drive->modulator, &c->modulator, pm_max(v_dc, V_DC_LEAST));
 }

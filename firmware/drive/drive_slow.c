@@ -135,7 +135,7 @@ static void run(drive_t *drive)
     }
     reference_vector(drive);
     /* without injection nothing shows the position at low speed */
-    if (!c->injection && pm_abs(drive->speed.reference) < c->omega_low &&
+    if (!c->injects && pm_abs(drive->speed.reference) < c->omega_low &&
         pm_abs(drive->position.pll.omega) < c->omega_low) {
         open_loop_resume(drive);
     }
@@ -236,9 +236,9 @@ void drive_slow(drive_t *drive, const drive_slow_in_t *in)
     drive->current.limited = false;
     drive->modulator.limited = false;
     if (drive->fault == DRIVE_FAULT_NONE) {
-        if (!drive->taken && !is_alone(drive)) {
+        if (!drive->references_ready && !is_alone(drive)) {
             reference_take(drive);
-            drive->taken = true;
+            drive->references_ready = true;
         }
         drive->state_ms = (uint16_t)(drive->state_ms + (drive->state_ms < UINT16_MAX ? 1U : 0U));
         move(drive);

@@ -27,32 +27,36 @@ struct drive {
     pm_abc_t i_abc;
     pm_ab_t i_ab;
     bool hw_fault;
-    bool carrier;      /* injection is on */
-    bool led;          /* open loop: the observer is led along */
-    bool taken;        /* the command's references are in per-unit */
-    pm_dir_t ahead;    /* one and a half periods of rotation: from the sample to where the voltage acts */
-    pm_unit_t v_share; /* share of v_dc for current control */
-    pm_dq_t u;         /* voltage of the current control, without carrier; Q22 */
-    pm_ab_t v_acting;  /* commanded at k-1: acts over [k, k+1) */
-    pm_ab_t v_next;    /* commanded at k: acts over [k+1, k+2) */
+    bool carrier;          /* injection is on */
+    bool forced;           /* open loop: the observer is forced to the ramp angle */
+    bool references_ready; /* the command's references are in per-unit */
+    pm_dir_t ahead;        /* one and a half periods of rotation: from the sample to where the voltage acts */
+    pm_unit_t v_share;     /* share of v_dc for current control */
+    pm_dq_t u;             /* voltage of the current control, without carrier; Q22 */
+    pm_ab_t v_acting;      /* commanded at k-1: acts over [k, k+1) */
+    pm_ab_t v_next;        /* commanded at k: acts over [k+1, k+2) */
     modulator_t modulator;
 
+    current_control_t current;
+    current_control_config_t current_config; /* the configured one, slowed while injection asks for it */
+    pm_dq_t i_ref;
+    pm_angle_t theta_open; /* open loop: angle of the current vector, */
+    pm_q_t omega_open;     /* its speed, which yields to a swinging rotor, */
+    int32_t turn_open;     /* and the turn of a period at that speed */
+
+    /* behind what a period needs, so that this is within reach of one instruction */
     union {                    /* the stage says which: */
         pm_pll_t pll;          /* always, the first of both: angle and speed, zero below STAGE_OPEN_LOOP */
         position_t position;   /* from STAGE_OPEN_LOOP on */
         procedure_t procedure; /* in STAGE_PROCEDURE */
     };
-    current_control_t current;
+
+    /* of 1 kHz */
     speed_control_t speed;
     field_weakening_t field_weakening;
-
-    pm_dq_t i_ref;
-    pm_angle_t theta_open; /* open loop: angle of the current vector */
-    pm_q_t omega_ramp;     /* open loop: speed that is wanted, and ... */
-    pm_q_t omega_open;     /* ... that of the vector, which yields to a swinging rotor */
-    pm_q_t emf_open;       /* mean EMF beside that of the ramp */
-    int32_t turn_open;     /* of that speed in a period */
-    pm_q_t i_open;         /* open loop: its current; after the hand-over: what is left of it on the d-axis */
+    pm_q_t omega_ramp; /* open loop: speed that is wanted */
+    pm_q_t emf_open;   /* mean EMF beside that of the ramp */
+    pm_q_t i_open;     /* open loop: its current; after the hand-over: what is left of it on the d-axis */
 
     /* references in per-unit, made from the command when it is another */
     pm_q_t omega_target;

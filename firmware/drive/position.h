@@ -3,15 +3,18 @@
  *
  *   eps = eps_injection + weight (eps_observer - eps_injection)
  * weight rises from 0 at omega_low to 1 at omega_high; the carrier is on below omega_high and off above
- * 1.1 omega_high (hysteresis). The loop's bandwidth moves with the weight. Only this module knows both
- * sources. Quality: 1 while the sources agree with the measurement, 0 when the position is lost.
+ * 1.1 omega_high (hysteresis). The bandwidths of the loop and of current control move with the weight. Only
+ * this module knows both sources, the one of injection/injections.def and the one of observers/observers.def;
+ * both keep the contract of firmware/math/estimate.h. The low-speed source steps first: it separates the
+ * fundamental current, which the observer takes, from the answer to its carrier.
+ * Quality: 1 while the sources agree with the measurement, 0 when the position is lost.
  * Tests: tests/unit/drive/position_test.cpp, tests/scenario. */
 #ifndef DRIVE_POSITION_H
 #define DRIVE_POSITION_H
 
 #include "firmware/math/estimate.h"
 #include "firmware/math/pll.h"
-#include "injection/pulsating_square.h"
+#include "injection/injection.h"
 #include "observers/loop.h"
 #include "observers/mismatch.h"
 #include "observers/observer.h"
@@ -22,36 +25,38 @@ extern "C" {
 #endif
 
 typedef struct {
-    observer_config_t observer;
-    pulsating_square_config_t square;
+    observer_config_t observer;   /* the high-speed source */
+    injection_config_t injection; /* the low-speed source */
     pm_pll_config_t pll_low, pll_high;
     loop_config_t loop;
     second_harmonic_config_t second_harmonic;
     mismatch_config_t mismatch;
     pm_q_t omega_low, omega_high;
-    int32_t per_span; /* 1 / (omega_high - omega_low), Q20 */
-    bool injection;
-    bool special; /* something between source and loop, or of the speed, is to be looked after */
+    int32_t per_span;      /* 1 / (omega_high - omega_low), Q20 */
+    pm_unit_t current_low; /* share of the bandwidth of current control while injection leads */
+    bool injects;          /* the low-speed source leads at low speed; else the observer at all speeds */
+    bool corrects;         /* one of the optional stages between source and loop, or of the speed, is on */
 } position_config_t;
 
 typedef struct {
     pm_pll_t pll;
-    pm_pll_config_t gains; /* between pll_low and pll_high */
-    loop_t loop;
-    second_harmonic_t second_harmonic;
-    mismatch_t mismatch;
+    pm_pll_config_t gains; /* from pll_low to pll_high, with the weight */
+    pm_q_t weight;         /* 0: injection, 1: observer */
+    bool carrier;          /* may be injected; else the observer leads at all speeds */
+    bool inject;           /* carrier on */
     observer_t observer;
-    bool carrier; /* may be injected; else the observer leads at all speeds */
-    bool inject;  /* carrier on */
-    union {
-        pulsating_square_t square; /* with the carrier ... */
-        mismatch_window_t window;  /* ... and without */
-    };
-    pm_q_t omega_mean;               /* filtered for the weight */
-    pm_q_t observer_eps, square_eps; /* without noise, for the quality */
+    injection_t injection; /* while `inject` */
+
+    /* the optional stages, and what 1 kHz keeps */
+    mismatch_window_t window; /* while no carrier is injected */
+    mismatch_t mismatch;
+    second_harmonic_t second_harmonic;
+    loop_t loop;
+    pm_q_t omega_mean;   /* filtered for the weight */
+    pm_q_t observer_eps; /* without noise, for the quality */
+    pm_q_t injection_eps;
     pm_q_t eps_mean;
     pm_q_t misfit_mean;
-    pm_q_t weight; /* 0: injection, 1: observer */
     pm_q_t quality;
 } position_t;
 
@@ -61,13 +66,15 @@ void position_reset(position_t *self, const position_config_t *config, pm_angle_
                     bool carrier);
 
 typedef struct {
-    pm_dir_t dir; /* direction of the present position */
-    pm_dq_t i;    /* fundamental current in it */
+    pm_half_dir_t ahead; /* half of the direction of the estimated frame where the next voltage acts */
+    pm_dq_t i;           /* fundamental current in the frame at k */
     pm_q_t omega;
+    pm_ab_t carrier; /* to be added to that voltage; only while `inject` */
 } position_out_t;
 
-/* One period: v is the mean voltage over [k-1, k), i the current at k. */
-void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i,
+/* One period: v is the mean voltage over [k-1, k), i the current at k; the frame turns by `ahead` from k to
+ * the middle of the period in which the next voltage acts. */
+void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i, pm_dir_t ahead,
                    position_out_t *out);
 
 /* The configuration names another observer than before: it is seeded at the present position and speed, where
@@ -77,13 +84,23 @@ void position_change_observer(position_t *self, const position_config_t *config,
 
 /* While the rotor follows a given vector (align, open-loop start): the loop is opened, the position is
  * `imposed` and goes on with its speed, and the observer is tied to it. Up to the next position_slow(). */
-void position_lead(position_t *self, const position_config_t *config, const pm_pll_t *imposed);
+void position_force(position_t *self, const position_config_t *config, const pm_pll_t *imposed);
+
+/* Of the correction of wrong parameters: none while a carrier is injected. */
+static inline mismatch_window_t *position_window(position_t *self)
+{
+    return self->inject ? NULL : &self->window;
+}
 
 /* To be added to the current reference, on the axis of config->mismatch. */
 static inline pm_q_t position_injected(const position_t *self)
 {
     return self->inject ? 0 : self->window.injected;
 }
+
+/* Share of the bandwidth of current control: what a slow window of the low-speed source allows, more with the
+ * weight of the observer. */
+pm_unit_t position_current_share(const position_t *self, const position_config_t *config);
 
 /* At 1 kHz, with the current of the last step and the same in its frame: weight, carrier, loop gains,
  * quality. */

@@ -77,7 +77,7 @@ void protection_slow(drive_t *drive)
     }
     /* Also in open loop, where the rotor can lose synchronism, except during the ramp up to the speed from
      * which the observer's angle is used; not during identification. */
-    const bool ramp = drive->led && open_loop_ramps(drive);
+    const bool ramp = drive->forced && open_loop_ramps(drive);
     const bool judged = drive->state >= DRIVE_RUNNING && drive->command.mode < DRIVE_MODE_CURRENT && !ramp;
     if (lasts(&drive->lost_ms, judged && drive->position.quality == 0, c->lost_ms)) {
         drive_trip(drive, DRIVE_FAULT_POSITION_LOST);

@@ -5,7 +5,7 @@
 
 /* clang-format off */
 #define PM_IMAGE_NAME "small"
-#define PM_IMAGE_TRACE_NUMBERS 3840U
+#define PM_IMAGE_TRACE_NUMBERS 3740U
 
 #define PM_WITHOUT_mismatch 1
 #define PM_WITHOUT_ekf_full 1
@@ -13,5 +13,6 @@
 #define PM_WITHOUT_mras_current 1
 #define PM_WITHOUT_mras_voltage 1
 #define PM_WITHOUT_mras_simple 1
+#define PM_WITHOUT_rotating_sine 1
 
 #endif

@@ -2,11 +2,20 @@
  *
  * A source compares the measurement with the present position and reports by how much that position lags the
  * rotor; drive/position.c closes the loop. So a source has no angle of its own that could disagree.
- * All values belong to the sample instant k. */
+ * All values belong to the sample instant k. A source that speaks on events only (SOURCE_EVENTS) gives eps = 0
+ * in the periods between, and eps times the periods since its last event when one comes. */
 #ifndef PM_MATH_ESTIMATE_H
 #define PM_MATH_ESTIMATE_H
 
 #include "firmware/math/frames.h"
+
+/* Traits of a source, a sum; they stand in its row of a list. */
+enum {
+    SOURCE_HALF_TURN = 1,  /* eps is the same half a turn on: it cannot tell the poles apart */
+    SOURCE_THIRD_TURN = 2, /* eps is the same a third of a turn on */
+    SOURCE_EVENTS = 4,     /* speaks in some periods only */
+    SOURCE_ONE_WAY = 8,    /* its carrier turns one way: mirrored inputs do not give mirrored outputs */
+};
 
 typedef struct {
     pm_ab_t v;    /* mean voltage over [k-1, k), per-unit: what the bridge applied, dead time compensated */

@@ -68,8 +68,16 @@
     _Static_assert((PM_CHANNELS & (bit) & ~(channels)) == 0U,                                                \
                    "the image carries " what ", which this board does not " verb);
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Why a method is refused, by the first channel that is missing; "" for none. Static text. */
 const char *pm_need_text(uint32_t missing);
+
+#ifdef __cplusplus
+}
+#endif
 
 #define PM_LEGS     3
 #define PM_SAMPLES  2 /* further samples in a period */

@@ -28,7 +28,8 @@ class Project:
     def __enter__(self):
         self.folder = tempfile.TemporaryDirectory()
         self.root = Path(self.folder.name)
-        headers = [path.relative_to(ROOT).as_posix() for path in ROOT.glob("observers/*.h")]
+        headers = [path.relative_to(ROOT).as_posix()
+                   for folder in ("observers", "injection") for path in sorted(ROOT.glob(f"{folder}/*.[hd]*"))]
         for path in (generate.SOURCE, generate.FAULTS, generate.LEDGER, LIST, *headers, *generate.parts(ROOT)):
             (self.root / path).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / path, self.root / path)
@@ -276,7 +277,6 @@ class Parts(unittest.TestCase):
     def test_a_new_file_is_found(self):
         with Project() as project:
             member = 'record: position, sub: 90, name: tried, unit: "1", range: [0, 1], preset: 0, help: a trial'
-            (project.root / "injection").mkdir()
             (project.root / "injection/trial.h").write_text("", encoding="utf-8")
             (project.root / "injection/trial.yaml").write_text(f"members:\n- {{{member}}}\n", encoding="utf-8")
             entry = generate.read(project.root).named("tried")

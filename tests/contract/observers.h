@@ -69,4 +69,30 @@ inline std::vector<ObserverCase> observer_cases(const Machine &m = kIpmLinear, c
     };
 }
 
+struct InjectionCase {
+    std::string name;
+    unsigned traits;
+    injection_config_t config;
+};
+
+// Every low-speed source of injection/injections.def, as the drive makes it.
+inline std::vector<InjectionCase> injection_cases(const Machine &m = kIpmLinear, const Base &b = kIpmBase)
+{
+    std::vector<InjectionCase> all;
+    const auto add = [&](injection_id_t id, const char *name, unsigned traits) {
+        drive_params_t p = parameters(m, b);
+        p.injection = static_cast<int32_t>(id);
+        p.start_method = 1;
+        drive_config_t config = {};
+        const drive_result_t result = drive_configure(&config, &p, PM_CHANNELS);
+        all.push_back({result.ok ? name : name + (": " + std::string(drive_param_table[result.param].name)),
+                       traits,
+                       result.ok ? config.position.injection : injection_config_t{INJECTION_COUNT, 0, {}}});
+    };
+#define PM_METHOD(name, help, traits, needs) add(INJECTION_##name, #name, traits);
+#include "injection/injections.def"
+#undef PM_METHOD
+    return all;
+}
+
 } // namespace bench

@@ -27,7 +27,7 @@ static inline void record_layout(uint32_t layout[RECORD_LAYOUT])
         offsetof(drive_t, fault),
         offsetof(drive_t, stage),
         offsetof(drive_t, zero),
-        offsetof(drive_t, position.square),
+        offsetof(drive_t, position.injection),
         offsetof(drive_t, position.quality),
         offsetof(drive_t, procedure.initial_pulses),
         offsetof(drive_t, procedure.identify.of),

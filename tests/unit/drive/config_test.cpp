@@ -205,14 +205,15 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
         {"pll_high kp", c.position.pll_high.kp_turn, 32, 1.8 * w_p * T * 2 / kPi},
         {"pll_high ki", c.position.pll_high.ki, 32, w_p * w_p * T / W},
         {"k_theta", c.k_theta, 30, 16 * W * T / (2 * kPi)},
-        {"v_h", c.position.square.v_h, 28, 70 / V},
-        {"gain_0", c.position.square.gain_0, 20, g0},
-        {"gain_2", c.position.square.gain_2, 16, (gr - g0) / (i_r * i_r)},
-        {"lambda_1", c.position.square.lambda_1, 28, (4 * half - full) / i_r},
-        {"lambda_2", c.position.square.lambda_2, 28, 2 * (full - 2 * half) / (i_r * i_r)},
-        {"half_step", c.position.square.half_step, 32, T * W / 2},
-        {"h_d", c.position.square.h_d, 28, flux / L_d / I},
-        {"h_d_inverse", c.position.square.h_d_inverse, 20, I * L_d / flux},
+        {"v_h", c.position.injection.pulsating_square.v_h, 28, 70 / V},
+        {"gain_0", c.position.injection.pulsating_square.saliency.gain_0, 20, g0},
+        {"gain_2", c.position.injection.pulsating_square.saliency.gain_2, 16, (gr - g0) / (i_r * i_r)},
+        {"lambda_1", c.position.injection.pulsating_square.saliency.lambda_1, 28, (4 * half - full) / i_r},
+        {"lambda_2", c.position.injection.pulsating_square.saliency.lambda_2, 28,
+         2 * (full - 2 * half) / (i_r * i_r)},
+        {"half_step", c.position.injection.pulsating_square.half_step, 32, T * W / 2},
+        {"h_d", c.position.injection.pulsating_square.h_d, 28, flux / L_d / I},
+        {"h_d_inverse", c.position.injection.pulsating_square.h_d_inverse, 20, I * L_d / flux},
         {"pulse duty", c.pulses.duty, 28, exact / std::round(exact)},
         {"i_zero", c.pulses.i_zero, 28, 5 * 5e-3 / I},
         {"y_min", c.pulses.y_min, 28, 0.75 * (L_q - L_d) / L_q * 4 / I},
@@ -331,8 +332,8 @@ TEST(Config, SwitchesSwitch)
                   .position.observer.active_flux.resistance.k,
               0);
     const drive_config_t c = configure(changed({{DRIVE_PARAM_cross_coupling_comp, 0}}));
-    EXPECT_EQ(c.position.square.lambda_1, 0);
-    EXPECT_EQ(c.position.square.lambda_2, 0);
+    EXPECT_EQ(c.position.injection.pulsating_square.saliency.lambda_1, 0);
+    EXPECT_EQ(c.position.injection.pulsating_square.saliency.lambda_2, 0);
     EXPECT_EQ(configure(changed({{DRIVE_PARAM_i_fw_max, 0}})).field_weakening.i_max, 0);
 }
 
@@ -450,9 +451,9 @@ Names must_be_positive(const drive_config_t &c)
         x.push_back({"mismatch current", c.position.mismatch.i});
     }
     if (c.injection) {
-        const pulsating_square_config_t &s = c.position.square;
+        const pulsating_square_config_t &s = c.position.injection.pulsating_square;
         x.push_back({"v_h", s.v_h});
-        x.push_back({"gain_0", s.gain_0});
+        x.push_back({"gain_0", s.saliency.gain_0});
         x.push_back({"h_d", s.h_d});
         x.push_back({"h_d_inverse", s.h_d_inverse});
     }
@@ -468,7 +469,8 @@ Names must_be_positive(const drive_config_t &c)
 // Gain of the injection loop at a current: it must not turn round below the current limit.
 double square_gain(const drive_config_t &c, double i_q)
 {
-    return real(c.position.square.gain_0, 20) + real(c.position.square.gain_2, 16) * i_q * i_q;
+    return real(c.position.injection.pulsating_square.saliency.gain_0, 20) +
+           real(c.position.injection.pulsating_square.saliency.gain_2, 16) * i_q * i_q;
 }
 
 struct Survey {
@@ -533,12 +535,12 @@ TEST(Config, ModelReferenceLoopAndSpeed)
 // observers/mismatch.h for IPM-1000: 40 Hz are 25 steps of 1 kHz, 30 Hz become 1 / 33 ms.
 TEST(Config, CorrectionOfWrongParameters)
 {
-    EXPECT_FALSE(configure(changed({})).position.special);
+    EXPECT_FALSE(configure(changed({})).position.corrects);
     for (const auto &[frequency, samples] : {std::pair{40.0, 25}, {30.0, 33}, {2.0, 500}, {100.0, 10}}) {
         const drive_config_t c = configure(changed({{DRIVE_PARAM_mismatch_correction, MISMATCH_Q_AXIS},
                                                     {DRIVE_PARAM_mismatch_frequency, frequency}}));
         const mismatch_config_t &m = c.position.mismatch;
-        EXPECT_TRUE(c.position.special);
+        EXPECT_TRUE(c.position.corrects);
         EXPECT_EQ(m.id, MISMATCH_Q_AXIS);
         EXPECT_EQ(m.periods, 10);
         EXPECT_EQ(m.samples, samples);

@@ -164,12 +164,12 @@ TEST(Drive, ModeIsLatchedOnlyWhenOff)
     EXPECT_EQ(x.d.command.mode, DRIVE_MODE_TORQUE);
 }
 
-// One base register reaches all that a control period uses: LDRD's offset ends at 1020. State copied by a
-// trace is cheap.
+// One base register reaches all that a control period of the default sources uses: LDRD's offset ends at 1020.
+// Behind them is the window of a sine carrier.
 TEST(Drive, StateIsSmall)
 {
-    EXPECT_LE(offsetof(drive_t, command), 1020U);
-    EXPECT_LE(sizeof(drive_t), 1200U);
+    EXPECT_LE(offsetof(drive_t, position.injection) + sizeof(pulsating_square_t), 1020U);
+    EXPECT_LE(sizeof(drive_t), 1300U + sizeof(rotating_sine_t));
 }
 
 TEST(Drive, StaysOffWithoutACommand)

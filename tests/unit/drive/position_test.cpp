@@ -25,6 +25,9 @@ constexpr int kLost_ms = 60;
 
 constexpr double kLow = 0.12, kHigh = 0.24;
 
+// Where the voltage acts does not matter here.
+constexpr pm_dir_t kNoTurn = {PM_UNIT_MAX, 0};
+
 pm_pll_config_t loop(double hertz)
 {
     const double w = 2 * bench::kPi * hertz, t = bench::kIpmBase.period_s, base = bench::kIpmBase.omega_rad_s;
@@ -38,17 +41,19 @@ position_config_t config(bool injection = true)
     position_config_t c = {};
     c.observer.id = OBSERVER_active_flux;
     c.observer.active_flux = bench::flux_config(bench::kIpmLinear, bench::kIpmBase);
-    c.square.v_h = fixed(70 / 450.0, 28);
-    c.square.gain_0 = fixed(i * L_d * L_q / (flux * (L_q - L_d)), 20);
-    c.square.half_step = fixed(bench::kIpmBase.period_s * bench::kIpmBase.omega_rad_s / 2, 32);
-    c.square.h_d = fixed(flux / L_d / i, 28);
-    c.square.h_d_inverse = fixed(i * L_d / flux, 20);
+    c.injection.pulsating_square.v_h = fixed(70 / 450.0, 28);
+    c.injection.pulsating_square.saliency.gain_0 = fixed(i * L_d * L_q / (flux * (L_q - L_d)), 20);
+    c.injection.pulsating_square.half_step =
+        fixed(bench::kIpmBase.period_s * bench::kIpmBase.omega_rad_s / 2, 32);
+    c.injection.pulsating_square.h_d = fixed(flux / L_d / i, 28);
+    c.injection.pulsating_square.h_d_inverse = fixed(i * L_d / flux, 20);
     c.pll_low = loop(20);
     c.pll_high = loop(40);
     c.omega_low = fixed(kLow, 28);
     c.omega_high = fixed(kHigh, 28);
     c.per_span = fixed(1 / (kHigh - kLow), 20);
-    c.injection = injection;
+    c.injects = injection;
+    c.current_low = PM_UNIT_MAX;
     return c;
 }
 
@@ -147,9 +152,9 @@ class Running
             rotation.advance();
             const obs_in_t in = rotation.seen(rotation.theta_rad, rotation.omega_rad_s);
             if (imposed != nullptr && k % 10 == 0) {
-                position_lead(&self, &c_, imposed);
+                position_force(&self, &c_, imposed);
             }
-            position_step(&self, &c_, in.v, in.i, &out);
+            position_step(&self, &c_, in.v, in.i, kNoTurn, &out);
             if (k % 10 == 9) {
                 position_slow(&self, &c_, in.i, out.i);
             }
@@ -206,7 +211,7 @@ TEST(Position, QualityFallsWithoutAVoltageOrACurrentThatFits)
     int ms = 0;
     for (; r.self.quality > 0 && ms < 500; ++ms) {
         for (int k = 0; k < 10; ++k) {
-            position_step(&r.self, &c, {0, 0}, {0, 0}, &r.out);
+            position_step(&r.self, &c, {0, 0}, {0, 0}, kNoTurn, &r.out);
         }
         position_slow(&r.self, &c, {0, 0}, r.out.i);
     }
@@ -221,7 +226,7 @@ TEST(Position, QualityFallsWithoutTheCarrier)
     for (; self.quality > 0 && ms < 500; ++ms) {
         for (int k = 0; k < 10; ++k) {
             position_out_t out;
-            position_step(&self, &c, {0, 0}, {0, 0}, &out);
+            position_step(&self, &c, {0, 0}, {0, 0}, kNoTurn, &out);
         }
         position_slow(&self, &c, {0, 0}, {0, 0});
     }

@@ -53,11 +53,11 @@ pulsating_square_config_t config(const L &l, double i_q_A)
     const double h_d = kCarrier_V * kBase.period_s / kUnloaded.L_d_H / kBase.i_A;
     pulsating_square_config_t c = {};
     c.v_h = fixed(kCarrier_V / kBase.v_V, 28);
-    c.gain_0 = fixed(gain_0, 20);
+    c.saliency.gain_0 = fixed(gain_0, 20);
     if (i_q != 0) {
-        c.gain_2 = fixed((kBase.i_A / slope_A(l) - gain_0) / (i_q * i_q), 16);
-        c.lambda_1 = fixed(0.7 * l.L_dq_H / l.L_q_H / i_q, 28); // a share in each term
-        c.lambda_2 = fixed(0.3 * l.L_dq_H / l.L_q_H / (i_q * std::abs(i_q)), 28);
+        c.saliency.gain_2 = fixed((kBase.i_A / slope_A(l) - gain_0) / (i_q * i_q), 16);
+        c.saliency.lambda_1 = fixed(0.7 * l.L_dq_H / l.L_q_H / i_q, 28); // a share in each term
+        c.saliency.lambda_2 = fixed(0.3 * l.L_dq_H / l.L_q_H / (i_q * std::abs(i_q)), 28);
     }
     c.half_step = fixed(kBase.period_s * kBase.omega_rad_s / 2, 32);
     c.h_d = fixed(h_d, 28);
@@ -67,8 +67,8 @@ pulsating_square_config_t config(const L &l, double i_q_A)
 
 pulsating_square_config_t without_cross(pulsating_square_config_t c)
 {
-    c.lambda_1 = 0;
-    c.lambda_2 = 0;
+    c.saliency.lambda_1 = 0;
+    c.saliency.lambda_2 = 0;
     return c;
 }
 
@@ -80,34 +80,41 @@ class Carrier
             double i_q_A = 0)
         : c_(c), l_(l), error_(error_rad), omega_(omega_pu * kBase.omega_rad_s), i_q_A_(i_q_A)
     {
-        pulsating_square_reset(&self, &c_, measured());
+        obs_in_t in = {};
+        in.i = measured();
+        pulsating_square_reset(&self, &c_, &in);
     }
 
-    // Sample k: demodulation, then the voltage for [k+1, k+2), in the frame of its middle.
+    // Sample k: demodulation, and the voltage for [k+1, k+2), in the frame of its middle; 1 kHz every tenth.
     obs_out_t step()
     {
         const double theta_hat = theta_ - error_;
-        obs_in_t in = {};
+        const double ahead = theta_hat + 1.5 * omega_ * kBase.period_s;
+        if (k_++ % 10 == 0) {
+            obs_in_t slow = {};
+            slow.omega = fixed(omega_ / kBase.omega_rad_s, 28);
+            slow.i_dq = bench::dq(i_fundamental() / kBase.i_A * std::polar(1.0, -theta_hat));
+            pulsating_square_slow(&self, &c_, &slow);
+        }
+        injection_in_t in = {};
         in.i = measured();
         in.dir = bench::direction(theta_hat);
         in.omega = fixed(omega_ / kBase.omega_rad_s, 28);
-        in.i_dq = bench::dq(i_fundamental() / kBase.i_A * std::polar(1.0, -theta_hat));
-        pulsating_square_slow(&self, &c_, &in);
-        fundamental = bench::complex(pulsating_square_fundamental_twice(&self, in.i)) * kBase.i_A / 2.0;
-        obs_out_t out;
-        pulsating_square_demodulate(&self, &c_, &in, &out);
-        const pm_dq_t v = pulsating_square_output(&self, &c_);
-        const Complex commanded =
-            bench::complex(v) * kBase.v_V * std::polar(1.0, theta_hat + 1.5 * omega_ * kBase.period_s);
+        in.ahead = {fixed(std::cos(ahead), 30), fixed(std::sin(ahead), 30)};
+        injection_out_t out;
+        pulsating_square_step(&self, &c_, &in, &out);
+        const obs_out_t last = pulsating_square_last(&self, &c_);
+        EXPECT_EQ(last.eps, out.eps);
+        fundamental = bench::complex(out.i) * kBase.i_A * std::polar(1.0, theta_hat);
         run(applying_);
-        applying_ = commanded;
-        return out;
+        applying_ = bench::complex(out.v) * kBase.v_V;
+        return last;
     }
 
     obs_out_t settled()
     {
         obs_out_t out = {};
-        for (int k = 0; k < 12; ++k) {
+        for (int k = 0; k < 22; ++k) {
             out = step();
         }
         return out;
@@ -145,6 +152,7 @@ class Carrier
     L l_;
     double error_, omega_, i_q_A_;
     double theta_ = 0.3;
+    int k_ = 0;
     Complex i_carrier_A_ = 0, applying_ = 0;
 };
 
@@ -259,17 +267,18 @@ TEST(PulsatingSquare, EverySampleHasTheRightSignFromTheFirst)
 TEST(PulsatingSquare, VoltageAlternatesAlongD)
 {
     const pulsating_square_config_t c = config(kUnloaded, 0);
+    const double ahead = 0.7;
+    const obs_in_t none = {};
+    injection_in_t in = {};
+    in.ahead = {fixed(std::cos(ahead), 30), fixed(std::sin(ahead), 30)};
     pulsating_square_t self;
-    pulsating_square_reset(&self, &c, {0, 0});
-    pm_q_t last = 0;
+    pulsating_square_reset(&self, &c, &none);
     for (int k = 0; k < 10; ++k) {
-        const pm_dq_t v = pulsating_square_output(&self, &c);
-        EXPECT_EQ(std::abs(v.d), c.v_h);
-        EXPECT_EQ(v.q, 0);
-        if (k > 0) {
-            EXPECT_EQ(v.d, -last);
-        }
-        last = v.d;
+        injection_out_t out;
+        pulsating_square_step(&self, &c, &in, &out);
+        const Complex v = bench::complex(out.v) * kBase.v_V * std::polar(1.0, -ahead);
+        EXPECT_NEAR(v.real(), k % 2 == 0 ? kCarrier_V : -kCarrier_V, 1e-5) << k;
+        EXPECT_NEAR(v.imag(), 0, 1e-5) << k;
     }
 }
 

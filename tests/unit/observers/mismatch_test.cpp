@@ -47,17 +47,6 @@ double swing(int samples)
     return kPerBase * kPsi_Wb / std::pow(injection_rad_s(samples), 2);
 }
 
-mismatch_config_t config_of(mismatch_id_t id, int samples = 25)
-{
-    mismatch_config_t c = {};
-    c.id = static_cast<uint8_t>(id);
-    c.periods = kPeriods;
-    c.samples = static_cast<uint16_t>(samples);
-    c.i = fixed(kInjected_A / kBase_A, 28);
-    c.swing = fixed(kPerBase * kBase_Wb * kBase_A / std::pow(injection_rad_s(samples), 2), 20);
-    return c;
-}
-
 observer_model_t model_of()
 {
     observer_model_t m = {};
@@ -65,6 +54,18 @@ observer_model_t model_of()
     m.L_d = fixed(3e-3 * kBase_A / kBase_Wb, 28);
     m.L_q = fixed((3e-3 - kSaliency_H) * kBase_A / kBase_Wb, 28);
     return m;
+}
+
+mismatch_config_t config_of(mismatch_id_t id, int samples = 25)
+{
+    mismatch_config_t c = {};
+    c.model = model_of();
+    c.id = static_cast<uint8_t>(id);
+    c.periods = kPeriods;
+    c.samples = static_cast<uint16_t>(samples);
+    c.i = fixed(kInjected_A / kBase_A, 28);
+    c.swing = fixed(kPerBase * kBase_Wb * kBase_A / std::pow(injection_rad_s(samples), 2), 20);
+    return c;
 }
 
 // The formulas of the header in double precision, k in rad/A.
@@ -154,7 +155,6 @@ class Drive
     }
 
     mismatch_config_t config;
-    observer_model_t model = model_of();
     mismatch_t state = {};
     mismatch_window_t window = {};
     double d_resistance = 0, d_inductance = 0; // machine minus parameter
@@ -197,7 +197,7 @@ class Drive
         hat_ += 1.8 * kW_n * kPeriod_s * eps;
         hat_omega_ += kW_n * kW_n * kPeriod_s * eps;
         if (++count_ % kPeriods == 0) {
-            mismatch_slow(&state, leads ? &window : nullptr, &config, &model, &in);
+            mismatch_slow(&state, leads ? &window : nullptr, &config, &in);
             if (reference != nullptr) {
                 reference->slow();
             }
@@ -277,8 +277,8 @@ TEST(Mismatch, AmplitudeOfAToneInNoise)
     for (int draw = 0; draw < 20; ++draw) {
         Drive drive(MISMATCH_Q_AXIS);
         drive.d_inductance = k * kPsi_Wb;
-        drive.model.psi_m = 0; // and nothing to be taken out
-        drive.model.L_d = drive.model.L_q;
+        drive.config.model.psi_m = 0; // and nothing to be taken out
+        drive.config.model.L_d = drive.config.model.L_q;
         drive.held = true;
         drive.noise = 0.3 * kDegree;
         drive.run(0.5 + 0.01 * draw); // other noise
@@ -391,8 +391,7 @@ TEST(Mismatch, LargestInputsSaturate)
         mismatch_config_t c = config_of(id, 10);
         c.i = fixed(0.9, 28);
         c.swing = INT32_MAX;
-        observer_model_t model = model_of();
-        model.psi_m = INT32_MAX;
+        c.model.psi_m = INT32_MAX;
         mismatch_t state = {};
         mismatch_window_t window = {};
         for (int n = 0; n < 20000; ++n) {
@@ -402,7 +401,7 @@ TEST(Mismatch, LargestInputsSaturate)
             for (int k = 0; k < kPeriods; ++k) {
                 mismatch_step(&state, &window, &c, &in, PM_ONE, n % 3 == 0 ? PM_ONE / 12 : -PM_ONE / 12);
             }
-            mismatch_slow(&state, &window, &c, &model, &in);
+            mismatch_slow(&state, &window, &c, &in);
             ASSERT_LE(std::abs(real(state.k.d)), 1.0) << id;
             ASSERT_LE(std::abs(real(state.k.q)), 1.0) << id;
         }

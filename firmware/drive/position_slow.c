@@ -1,0 +1,124 @@
+/* The position at 1 kHz and at its beginning. */
+#include "firmware/drive/position.h"
+#include "firmware/math/filter.h"
+#include "firmware/math/trig.h"
+
+/* Means of |eps| and |misfit| at 1 kHz: 20 ms. */
+#define K_MEAN PM_FRAC(0.05)
+/* The position counts as lost when the mean error signal reaches 0.3 rad or the model is off by 0.5. */
+#define PER_EPS_LOST    PM_Q(1.0 / 0.3)
+#define PER_MISFIT_LOST PM_Q(1.0 / 0.5)
+/* Noise of a single error signal: 3 ms. */
+#define K_NOISE PM_FRAC(0.3)
+/* The weight follows the speed through 5 ms, so that noise of the speed does not move it. */
+#define K_SPEED PM_FRAC(0.2)
+
+void position_reset(position_t *self, const position_config_t *config, pm_angle_t theta, pm_ab_t i,
+                    bool carrier)
+{
+    const bool inject = carrier && config->injects;
+    *self = (position_t){.pll.theta = theta,
+                         .weight = inject ? 0 : PM_ONE,
+                         .carrier = inject,
+                         .inject = inject,
+                         .gains = inject ? config->pll_low : config->pll_high,
+                         .quality = PM_ONE};
+    const pm_dir_t dir = pm_dir(theta);
+    const obs_in_t in = {.i = i, .dir = dir, .i_dq = pm_park(i, dir)};
+    observer_reset(&self->observer, &config->observer, &in);
+    if (self->inject) {
+        injection_reset(&self->injection, &config->injection, &in);
+    }
+}
+
+void position_change_observer(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq)
+{
+    const obs_in_t in = {.i = i, .dir = pm_dir(self->pll.theta), .omega = self->pll.omega, .i_dq = i_dq};
+    observer_reset(&self->observer, &config->observer, &in);
+}
+
+void position_force(position_t *self, const position_config_t *config, const pm_pll_t *imposed)
+{
+    observer_tie(&self->observer, &config->observer);
+    loop_reset(&self->loop);
+    second_harmonic_reset(&self->second_harmonic);
+    self->pll = *imposed;
+    self->gains.kp_turn = 0;
+    self->gains.ki = 0;
+}
+
+static void set_weight(position_t *self, const position_config_t *config, const obs_in_t *in)
+{
+    const pm_q_t speed = pm_abs(pm_lp1(&self->omega_mean, self->pll.omega, K_SPEED));
+    if (!self->carrier) {
+        self->weight = PM_ONE;
+        return;
+    }
+    self->weight = pm_max(0, pm_small_gain(pm_small(speed - config->omega_low), config->per_span));
+    if (speed > config->omega_high) {
+        self->weight = PM_ONE;
+    }
+    if (!self->inject && speed < config->omega_high) {
+        self->inject = true;
+        injection_reset(&self->injection, &config->injection, in);
+    } else if (self->inject && speed > config->omega_high + config->omega_high / 8) {
+        self->inject = false;
+        self->window = (mismatch_window_t){.count = 0};
+    }
+}
+
+static int32_t blend(int32_t low, int32_t high, pm_q_t weight)
+{
+    return low + pm_mul(high - low, weight);
+}
+
+pm_unit_t position_current_share(const position_t *self, const position_config_t *config)
+{
+    return blend(config->current_low, PM_UNIT_MAX, self->weight);
+}
+
+static pm_q_t magnitude_after(pm_q_t *filter, pm_q_t x)
+{
+    return pm_abs(pm_lp1(filter, x, K_NOISE));
+}
+
+/* Means of magnitudes: a source that has slipped shows errors of either sign, slower than the noise that is
+ * filtered before. Whichever leads, both must agree. */
+static void set_quality(position_t *self, const position_config_t *config, const obs_out_t *seen, pm_dq_t i)
+{
+    obs_out_t low = {0};
+    if (self->inject) {
+        low = injection_last(&self->injection, &config->injection);
+    }
+    const pm_q_t low_eps = magnitude_after(&self->injection_eps, low.eps);
+    /* also while the observer is tied: an EMF that the position does not explain */
+    pm_q_t eps = magnitude_after(&self->observer_eps, seen->eps + mismatch_eps(&self->mismatch, i));
+    pm_q_t misfit = self->weight > 0 ? pm_abs(seen->misfit) : 0;
+    if (self->weight < PM_ONE) {
+        eps = pm_max(eps, low_eps);
+        misfit = pm_max(misfit, pm_abs(low.misfit));
+    }
+    (void)pm_lp1(&self->eps_mean, eps, K_MEAN);
+    (void)pm_lp1(&self->misfit_mean, misfit, K_MEAN);
+    const pm_q_t worst =
+        pm_max(pm_mul(self->eps_mean, PER_EPS_LOST), pm_mul(self->misfit_mean, PER_MISFIT_LOST));
+    self->quality = pm_max(0, PM_ONE - worst);
+}
+
+void position_slow(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq)
+{
+    const obs_in_t in = {.dir = pm_dir(self->pll.theta), .omega = self->pll.omega, .i = i, .i_dq = i_dq};
+    const obs_out_t seen = observer_last(&self->observer, &config->observer);
+    set_weight(self, config, &in);
+    if (self->inject) {
+        injection_slow(&self->injection, &config->injection, &in);
+    }
+    self->gains.kp_turn = blend(config->pll_low.kp_turn, config->pll_high.kp_turn, self->weight);
+    self->gains.ki = blend(config->pll_low.ki, config->pll_high.ki, self->weight);
+    loop_slow(&self->loop, &config->loop, self->weight);
+    second_harmonic_slow(&self->second_harmonic, &config->second_harmonic, self->pll.omega, self->weight);
+    const mismatch_in_t at = {.pll = &self->pll, .k_theta = self->gains.k_theta, .i = i_dq};
+    mismatch_slow(&self->mismatch, position_window(self), &config->mismatch, &at);
+    observer_slow(&self->observer, &config->observer, &in, &seen, self->weight);
+    set_quality(self, config, &seen, i_dq);
+}

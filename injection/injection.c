@@ -1,0 +1,66 @@
+#include "injection/injection.h"
+
+#include "firmware/math/compiler.h"
+#include "firmware/math/image.h"
+
+/* One case for each of the list that the image has. */
+
+void injection_reset(injection_t *self, const injection_config_t *config, const obs_in_t *in)
+{
+    switch (config->id) {
+#define PM_METHOD(name, help, traits, needs)                                                                 \
+    PM_IN_IMAGE(name, case INJECTION_##name : name##_reset(&self->name, &config->name, in); break;)
+#include "injection/injections.def"
+#undef PM_METHOD
+    case INJECTION_COUNT:
+    default:
+        break;
+    }
+}
+
+/* The one that injection_step() has compiled into its caller is not called here a second time. */
+#define OTHER_STEP(name)                                                                                     \
+    if (INJECTION_##name != INJECTION_INLINE) {                                                              \
+        name##_step(&self->name, &config->name, in, out);                                                    \
+    }
+
+PM_APART void injection_step_other(injection_t *self, const injection_config_t *config,
+                                   const injection_in_t *in, injection_out_t *out)
+{
+    switch (config->id) {
+#define PM_METHOD(name, help, traits, needs)                                                                 \
+    PM_IN_IMAGE(name, case INJECTION_##name : OTHER_STEP(name) break;)
+#include "injection/injections.def"
+#undef PM_METHOD
+    case INJECTION_COUNT:
+    default:
+        *out = (injection_out_t){.v = {0, 0}};
+        break;
+    }
+}
+
+void injection_slow(injection_t *self, const injection_config_t *config, const obs_in_t *in)
+{
+    switch (config->id) {
+#define PM_METHOD(name, help, traits, needs)                                                                 \
+    PM_IN_IMAGE(name, case INJECTION_##name : name##_slow(&self->name, &config->name, in); break;)
+#include "injection/injections.def"
+#undef PM_METHOD
+    case INJECTION_COUNT:
+    default:
+        break;
+    }
+}
+
+obs_out_t injection_last(const injection_t *self, const injection_config_t *config)
+{
+    switch (config->id) {
+#define PM_METHOD(name, help, traits, needs)                                                                 \
+    PM_IN_IMAGE(name, case INJECTION_##name : return name##_last(&self->name, &config->name);)
+#include "injection/injections.def"
+#undef PM_METHOD
+    case INJECTION_COUNT:
+    default:
+        return (obs_out_t){0};
+    }
+}

@@ -1,0 +1,87 @@
+/* Any of the low-speed sources, chosen by the configuration (METHODS.md chapters 4 and 5).
+ *
+ * A source is an excitation (carrier.h) and a demodulator of what it measures (difference of two samples;
+ * window.h), with the saliency of the machine under load (saliency.h). It owes the contract of every position
+ * source (firmware/math/estimate.h), and as it disturbs the current that it measures, it says what the
+ * fundamental current is and what voltage it adds:
+ *   x_reset(self, config, in)             seeds every member with the current of `in`; warm-up begins
+ *   x_step(self, config, in, out)         one period, before the observer, which takes the fundamental current
+ *                                         out->i. No division, no root
+ *   x_last(self)                          eps, misfit and vector of the last step again
+ *   x_slow(self, config, in)              at 1 kHz, also after a reset: what depends on load and speed, for
+ *                                         i_dq and omega of the last step
+ *   make_x(maker, config, limits)         configuration from SI parameters, and what the source asks of the
+ *                                         loops while it leads (x_config.c)
+ *   x_answer(maker)                       amplitude of the answer at 45 degrees of error without load, in A
+ *                                         of one sample with the noise of one sample
+ * In period k the step takes the current sampled at k and gives the voltage for [k+1, k+2).
+ *
+ * Cost of the dispatch: three instructions for the default, which is compiled into the caller; a call for
+ * the others. Tests: tests/contract/injection_contract_test.cpp runs all of the list. */
+#ifndef INJECTION_INJECTION_H
+#define INJECTION_INJECTION_H
+
+#include "firmware/math/image.h"
+#include "injection/pulsating_square.h"
+#include "injection/rotating_sine.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum {
+#define PM_METHOD(name, help, traits, needs) INJECTION_##name,
+#include "injection/injections.def"
+#undef PM_METHOD
+    INJECTION_COUNT
+} injection_id_t;
+
+#define INJECTION_INLINE INJECTION_pulsating_square /* the default costs no call */
+
+typedef struct {
+    injection_id_t id;
+    pm_q_t reserve; /* voltage amplitude that control leaves to the carrier */
+    union {
+#define PM_METHOD(name, help, traits, needs) PM_IN_IMAGE(name, name##_config_t name;)
+#include "injection/injections.def"
+#undef PM_METHOD
+    };
+} injection_config_t;
+
+typedef union {
+#define PM_METHOD(name, help, traits, needs) PM_IN_IMAGE(name, name##_t name;)
+#include "injection/injections.def"
+#undef PM_METHOD
+} injection_t;
+
+void injection_reset(injection_t *self, const injection_config_t *config, const obs_in_t *in);
+void injection_slow(injection_t *self, const injection_config_t *config, const obs_in_t *in);
+obs_out_t injection_last(const injection_t *self, const injection_config_t *config);
+
+/* Of the source that the parameter `injection` names. injection_sees_saliency(): the answer at 45 degrees of
+ * error without load is four times the noise, and some saliency is left at rated current. */
+void make_injection(maker_t *m, injection_config_t *c, injection_limits_t *limits);
+bool injection_sees_saliency(const maker_t *m);
+
+/* injection_step() of all but INJECTION_INLINE. */
+void injection_step_other(injection_t *self, const injection_config_t *config, const injection_in_t *in,
+                          injection_out_t *out);
+
+static inline void injection_step(injection_t *self, const injection_config_t *config,
+                                  const injection_in_t *in, injection_out_t *out)
+{
+    if (__builtin_expect(config->id == INJECTION_INLINE, 1) != 0) {
+        pulsating_square_step(&self->pulsating_square, &config->pulsating_square, in, out);
+    } else {
+        const injection_in_t given = *in; /* only this path needs it in memory */
+        injection_out_t result;
+        injection_step_other(self, config, &given, &result);
+        *out = result;
+    }
+}
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

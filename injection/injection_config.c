@@ -1,0 +1,55 @@
+#include "firmware/math/image.h"
+#include "injection/injection.h"
+#include "injection/saliency_config.h"
+
+/* Carrier and control share the voltage vector: at most 0.6 of v_dc / sqrt(3) may go to the carrier. */
+static void check_carrier(maker_t *m)
+{
+    const pm_num_t linear = pm_num_mul(si(m, DRIVE_PARAM_v_dc_nominal), pm_num_sqrt(pm_num_ratio(1, 3)));
+    if (pm_num_cmp(si(m, DRIVE_PARAM_v_injection), pm_num_mul(linear, pm_num_ratio(3, 5))) > 0) {
+        refuse(m, DRIVE_PARAM_v_injection, "leaves too little of v_dc_nominal for control");
+    }
+}
+
+void make_injection(maker_t *m, injection_config_t *c, injection_limits_t *limits)
+{
+    check_carrier(m);
+    c->id = (injection_id_t)m->params->injection;
+    c->reserve = per_unit(m, DRIVE_PARAM_v_injection, m->base.v);
+    switch (c->id) {
+#define PM_METHOD(name, help, traits, needs)                                                                 \
+    PM_IN_IMAGE(name, case INJECTION_##name                                                                  \
+                : require(m, needs, DRIVE_PARAM_injection);                                                  \
+                make_##name(m, &c->name, limits); break;)
+#include "injection/injections.def"
+#undef PM_METHOD
+    case INJECTION_COUNT:
+    default: /* excluded by the range of the parameter */
+        refuse(m, DRIVE_PARAM_injection, "is not in this image");
+        break;
+    }
+}
+
+static pm_num_t answer(const maker_t *m)
+{
+    switch ((injection_id_t)m->params->injection) {
+#define PM_METHOD(name, help, traits, needs)                                                                 \
+    PM_IN_IMAGE(name, case INJECTION_##name : return name##_answer(m);)
+#include "injection/injections.def"
+#undef PM_METHOD
+    case INJECTION_COUNT:
+    default:
+        return pm_num(0);
+    }
+}
+
+/* The answer must be four times the noise, the saliency 5 %, and some of it must be left at rated current. */
+bool injection_sees_saliency(const maker_t *m)
+{
+    const inductances_t L = inductances_at_zero(m);
+    const inductances_t rated = inductances_at_rated(m);
+    const pm_num_t dL = pm_num_sub(L.L_q, L.L_d);
+    const pm_num_t noise = pm_num_mul(pm_num(4), si(m, DRIVE_PARAM_i_noise));
+    return pm_num_cmp(answer(m), noise) > 0 && pm_num_cmp(dL, pm_num_mul(L.L_q, pm_num_ratio(1, 20))) > 0 &&
+           pm_num_cmp(slope_across(&rated, pm_num(1)), pm_num(0)) > 0;
+}

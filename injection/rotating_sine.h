@@ -1,0 +1,73 @@
+/* Rotating sine injection, negative sequence demodulated, with what the inverter and the resistance do to it
+ * taken from the positive sequence (METHODS.md 4.4.1, 5.6.4.2, 5.7; row 39).
+ *
+ * Added in the estimated frame (carrier.h), f_h = f_pwm / N:
+ *   v = V_h e^{j phi_k}
+ * The answer in that frame, a = 2 pi / N, delay of 1.5 periods from command to sample:
+ *   i   = i_f + I_p e^{j (phi' + rho)} + I_n e^{j (-phi' + 2 e + theta_m - 2 rho')}
+ *   phi' = phi_k - 1.5 a - pi / 2,  e: position error
+ *   F   = V_h T_s / (2 sin(a / 2)),  I_p = F L_sa / D,  I_n = F K / D
+ * rho comes from the resistance and from what dead time and leg capacitance add to it. A window of N samples
+ * (window.h) gives the fundamental current i_f and the complex amplitudes of both sequences:
+ *   rho_m = arg of the positive sequence,  rho_0 = R / (omega_h L_p): without the inverter
+ *   rho'  = rho_0 + p (rho_m - rho_m0),  rho_m0 = rho_0 (1 + kappa^2): the part of rho_0 in rho_m
+ *   p     = 3/4 + (1 / (2 kappa) - 3/4) |i_f|^2 / (|i_f|^2 + I_p^2),  kappa = I_n / I_p
+ *   eps   = gain(i_q) Im[negative e^{j (2 rho' - theta_m)}],  gain = 1 / (2 I_n)
+ * Without load all phases are governed by the carrier and p = 3/4; under load one phase at a time crosses zero.
+ * Of a nearly round machine, kappa < 0.1, the second amplifies every error of rho_0: p stays 3/4.
+ *
+ * eps is exact for small e and 1/2 sin 2e beyond. misfit: the positive sequence against I_p(i_q), relative. The
+ * fundamental current is (N - 1) / 2 periods old: current control is slowed while this source leads, to a phase
+ * of 0.4 rad, and the position loop may have 0.3 rad. Each period 120 instructions; rho' at 1 kHz.
+ * State 400 bytes. Functions as injection.h says. Tests: tests/unit/injection/rotating_sine_test.cpp,
+ * tests/scenario/injection. */
+#ifndef INJECTION_ROTATING_SINE_H
+#define INJECTION_ROTATING_SINE_H
+
+#include "firmware/math/window.h"
+#include "injection/carrier.h"
+#include "injection/saliency.h"
+#include "injection/source.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct {
+    pm_q_t v_h;
+    saliency_config_t saliency;
+    pm_q_t rho_0;    /* rad */
+    pm_q_t rho_m0;   /* rho_0 (1 + kappa^2) */
+    pm_frac_t per_n; /* 1 / N */
+    pm_angle_t step; /* a */
+    pm_angle_t lag;  /* 1.5 a + a quarter of a turn */
+    uint16_t n;
+    bool with_load;         /* p depends on the load */
+    bool positive_sequence; /* rho' from rho_m; else rho_0 alone */
+} rotating_sine_config_t;
+
+typedef struct {
+    window_t window;
+    pm_dir_t turn; /* e^{j (2 rho' - theta_m)} */
+    int32_t gain;  /* rad per unit of current, Q20 */
+    pm_dq_t negative;
+    pm_q_t eps;
+    pm_q_t misfit;
+    carrier_phase_t phase;
+    uint16_t warm; /* periods until the window holds nothing but answers to the carrier */
+} rotating_sine_t;
+
+void rotating_sine_reset(rotating_sine_t *self, const rotating_sine_config_t *config, const obs_in_t *in);
+void rotating_sine_step(rotating_sine_t *self, const rotating_sine_config_t *config, const injection_in_t *in,
+                        injection_out_t *out);
+void rotating_sine_slow(rotating_sine_t *self, const rotating_sine_config_t *config, const obs_in_t *in);
+obs_out_t rotating_sine_last(const rotating_sine_t *self, const rotating_sine_config_t *config);
+
+void make_rotating_sine(maker_t *m, rotating_sine_config_t *c, injection_limits_t *limits);
+pm_num_t rotating_sine_answer(const maker_t *m);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
