@@ -29,9 +29,9 @@ COST(pm_q_t, mismatch, mismatch_t *self, mismatch_window_t *window, const mismat
 }
 
 COST(void, mismatch_slow, mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *c,
-     const observer_model_t *model, const mismatch_in_t *in)
+     const mismatch_in_t *in)
 {
-    mismatch_slow(self, window, c, model, in);
+    mismatch_slow(self, window, c, in);
 }
 
 COST(pm_q_t, speed, speed_t *self, const speed_config_t *c, const speed_in_t *in)
@@ -67,12 +67,15 @@ int main(void)
     }
     static mismatch_t mismatch;
     static mismatch_window_t window;
-    const mismatch_config_t wrong = {.id = MISMATCH_Q_AXIS, .periods = 10, .samples = 10, .i = PM_Q(0.04)};
-    const observer_model_t model = {.L_d = PM_Q(0.22), .L_q = PM_Q(0.25), .psi_m = PM_Q(0.58)};
+    const mismatch_config_t wrong = {.id = MISMATCH_Q_AXIS,
+                                     .periods = 10,
+                                     .samples = 10,
+                                     .i = PM_Q(0.04),
+                                     .model = {.L_d = PM_Q(0.22), .L_q = PM_Q(0.25), .psi_m = PM_Q(0.58)}};
     for (uint32_t k = 0; k < 200; k++) { /* at the end of windows too */
         const mismatch_in_t in = {.pll = &pll, .k_theta = PM_Q(0.55), .i = {0, window.injected}};
         sink = cost_mismatch(&mismatch, &window, &wrong, &in, 0);
-        cost_mismatch_slow(&mismatch, &window, &wrong, &model, &in);
+        cost_mismatch_slow(&mismatch, &window, &wrong, &in);
     }
     static speed_t speed;
     const speed_config_t c = {.id = SPEED_COMBINED,
