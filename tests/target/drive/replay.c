@@ -69,7 +69,8 @@ static bool open_record(FILE *file, record_header_t *header)
         header->parameters != DRIVE_PARAM_COUNT || header->period_bytes != sizeof(record_period_t)) {
         return false;
     }
-    return fread(&params, sizeof params, 1, file) == 1 && drive_init(&drive, &params, PM_CHANNELS).ok;
+    return fread(&params, sizeof(int32_t), DRIVE_PARAM_COUNT, file) == DRIVE_PARAM_COUNT &&
+           drive_init(&drive, &params, PM_CHANNELS).ok;
 }
 
 static bool same_layout(const record_header_t *header)
