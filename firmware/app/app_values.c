@@ -6,6 +6,10 @@
 
 #define THOUSAND 1000
 
+/* Raw 32768 of a traced signal. */
+#define RAW_FULL (2 * PM_ONE)
+_Static_assert(TRACE_SHIFT == PM_Q_BITS - 14, "of twice the base");
+
 /* Signal times base, times 10^exponent, as an integer; what does not fit is limited. */
 int32_t app_in_units(pm_q_t x, pm_num_t base, int exponent)
 {
@@ -120,7 +124,7 @@ bool trace_host_find(void *context, uint16_t index, uint8_t sub, trace_signal_t 
     }
     if (entry->slot == (uint16_t)OD_LIVE_THETA) {
         *signal = (trace_signal_t){
-            .source = (const volatile int32_t *)&app->drive.status.theta, .shift = 16, .scale = INT32_MAX};
+            .source = (const volatile int32_t *)&app->drive.status.theta, .scale = INT32_MAX, .angle = true};
         return true;
     }
     const signal_row_t *row = signal_of(entry->slot);
@@ -128,8 +132,8 @@ bool trace_host_find(void *context, uint16_t index, uint8_t sub, trace_signal_t 
         return false;
     }
     const unit_t unit = unit_of(app, row->unit);
-    const int32_t scale = app_in_units(2 * PM_ONE, unit.base, unit.exponent);
-    *signal = (trace_signal_t){.source = place_of(app, row), .shift = PM_Q_BITS - 14, .scale = scale};
+    const int32_t scale = app_in_units(RAW_FULL, unit.base, unit.exponent);
+    *signal = (trace_signal_t){.source = place_of(app, row), .scale = scale};
     return true;
 }
 

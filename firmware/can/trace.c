@@ -2,29 +2,43 @@
 
 #include <stddef.h>
 
+#include "firmware/math/compiler.h"
+#include "firmware/math/pair.h"
+
+/* Shifted and limited to 16 bits. */
 static inline int32_t limited(int32_t x)
 {
 #if defined(__ARM_FEATURE_SAT)
     int32_t r;
-    __asm__("ssat %0, #16, %1" : "=r"(r) : "r"(x));
+    __asm__("ssat %0, #16, %1, asr %2" : "=r"(r) : "r"(x), "I"(TRACE_SHIFT));
     return r;
 #else
-    const int32_t low = x < -32768 ? -32768 : x;
+    const int32_t raw = x >> TRACE_SHIFT;
+    const int32_t low = raw < -32768 ? -32768 : raw;
     return low > 32767 ? 32767 : low;
 #endif
 }
 
+/* The address in a register of its own: the members are in reach of short instructions, and of LDRD. */
+static inline trace_t *near(trace_t *trace)
+{
+    trace_t *base = trace;
+#if PM_HAS_DSP
+    __asm__("" : "+r"(base));
+#endif
+    return base;
+}
+
 static inline void put(const trace_t *trace, int16_t *sample, uint32_t n)
 {
-    const trace_channel_t *channel = &trace->channel[n];
-    sample[n] = (int16_t)limited(*channel->source >> channel->shift);
+    sample[n] = (int16_t)limited(*trace->source[n]);
 }
 
 /* Straight-line code, entered at the number of signals. */
 static inline void take(const trace_t *trace, int16_t *sample)
 {
-    switch (trace->count % TRACE_SIGNALS) {
-    case 0:
+    switch (trace->count) {
+    case 8:
         put(trace, sample, 7);
         __attribute__((fallthrough));
     case 7:
@@ -45,54 +59,70 @@ static inline void take(const trace_t *trace, int16_t *sample)
     case 2:
         put(trace, sample, 1);
         __attribute__((fallthrough));
-    default:
+    case 1:
         put(trace, sample, 0);
         break;
+    default:
+        pm_assume(false);
+        break;
+    }
+    if (trace->angle != NULL) {
+        sample[trace->angle_at] = *trace->angle;
     }
 }
 
-/* Not negative: the trigger signal has reached the level. */
-static inline int32_t above(const trace_t *trace, const int16_t *sample)
+/* The trigger signal against the level: negative when the edge has come, between the last sample and this one. */
+static inline int32_t edge(trace_t *trace, const int16_t *sample)
 {
-    return sample[trace->trigger] - trace->level;
+    const pm_pair_t at = pm_pair(&trace->trigger, &trace->level);
+    const pm_pair_t edges = pm_pair(&trace->falling, &trace->either);
+    const int32_t now = (sample[at.first] - at.second) ^ edges.first;
+    const int32_t before = trace->before;
+    trace->before = now;
+    return (before ^ now) & (before | edges.second);
 }
 
-/* Enough samples before the trigger, or after it. */
-static inline void advance(trace_t *trace, const int16_t *sample)
+/* Up to enough samples before the trigger; an edge may lie between the last of them and the next. */
+static inline void fill(trace_t *trace, const int16_t *sample)
 {
-    if (trace->state == TRACE_TRIGGERED) {
+    trace->before_left--;
+    if (pm_rarely(trace->before_left == 0U)) {
+        (void)edge(trace, sample);
+        trace->state = TRACE_WAITING;
+    }
+}
+
+static inline void await(trace_t *trace, const int16_t *sample)
+{
+    if ((edge(trace, sample) | trace->forced) < 0) {
+        trace->state = TRACE_TRIGGERED;
+    }
+}
+
+static inline void finish(trace_t *trace)
+{
+    trace->after_left--;
+    if (pm_rarely(trace->after_left == 0U)) {
         trace->countdown = 0;
         trace->state = TRACE_COMPLETE;
-        return;
     }
-    const int32_t now = above(trace, sample);
-    if (trace->edge == TRACE_BOTH) { /* the one that can come next */
-        trace->falling = now < 0 ? 0 : -1;
-    }
-    trace->before = now ^ trace->falling;
-    trace->left = trace->after;
-    trace->state = TRACE_WAITING;
 }
 
-void trace_record(trace_t *trace)
+void trace_record(trace_t *given)
 {
+    trace_t *trace = near(given);
     int16_t *sample = trace->next;
     trace->countdown = trace->divider;
     take(trace, sample);
     int16_t *next = &sample[trace->count];
     trace->next = next == trace->end ? trace->ring : next;
-    if (trace->state == TRACE_WAITING) {
-        const int32_t now = above(trace, sample) ^ trace->falling;
-        const int32_t passed = trace->before & ~now;
-        trace->before = now;
-        if (passed >= 0 && !trace->forced) {
-            return;
-        }
-        trace->state = TRACE_TRIGGERED;
-    }
-    trace->left--;
-    if (__builtin_expect(trace->left == 0U, 0) != 0) {
-        advance(trace, sample);
+    const trace_state_t state = trace->state;
+    if (state == TRACE_WAITING) {
+        await(trace, sample);
+    } else if (state == TRACE_FILLING) {
+        fill(trace, sample);
+    } else {
+        finish(trace);
     }
 }
 

@@ -1,16 +1,17 @@
 /* Trace: up to eight signals, sampled in the control interrupt into a ring, around a trigger. The
  * oscilloscope of the drive.
  *
- * A signal is a 32-bit number in memory, chosen by its index in the dictionary; it is kept as 16 bits:
- * shifted right, and limited. `scale` is its value at raw 32768, in the unit of the dictionary. All signals
- * of a sample are taken in the same call.
+ * A signal is a 32-bit number in memory, chosen by its index in the dictionary; it is kept as 16 bits: shifted
+ * right by TRACE_SHIFT and limited, or of an angle, the upper half; one signal of a trace can be an angle.
+ * `scale` is its value at raw 32768, in the unit of the dictionary. All signals of a sample are taken in the
+ * same call.
  *
  *   trace_init(t, ring, length, context)   the ring is the caller's, `length` numbers in all
  *   trace_sample(t)    control interrupt, at its end; cost: docs/performance.md
  *   trace_put(), trace_get(), trace_read()       thread: objects 3100h to 3103h by slot (OD_LIVE_...)
  *
  * Order: set up, arm (command 1), wait for state 4, upload. While armed, settings are refused. The divider
- * counts calls per sample. `pretrigger` permille of the length lie before the trigger. Level and edge compare
+ * counts calls per sample. `pretrigger` permille of the length lie before the trigger, at least one, and at least one behind it. Level and edge compare
  * successive samples of the trigger signal. Tests: tests/unit/can/trace_test.cpp. */
 #ifndef CAN_TRACE_H
 #define CAN_TRACE_H
@@ -25,6 +26,7 @@ extern "C" {
 #endif
 
 #define TRACE_SIGNALS 8U
+#define TRACE_SHIFT   14
 
 typedef enum {
     TRACE_OFF,
@@ -38,18 +40,12 @@ typedef enum { TRACE_RISING, TRACE_FALLING, TRACE_BOTH } trace_edge_t;
 
 typedef struct {
     const volatile int32_t *source;
-    int32_t shift; /* to the right */
     int32_t scale; /* value at raw 32768 */
+    bool angle;    /* of 32 bits to the turn */
 } trace_signal_t;
 
 /* Where a dictionary entry lives; false: it cannot be traced. */
 bool trace_host_find(void *context, uint16_t index, uint8_t sub, trace_signal_t *signal);
-
-/* What the interrupt needs of a signal. */
-typedef struct {
-    const volatile int32_t *source;
-    int32_t shift;
-} trace_channel_t;
 
 typedef struct {
     volatile uint32_t countdown; /* periods up to the next sample; 0: not armed */
@@ -58,16 +54,19 @@ typedef struct {
     int16_t *next;  /* where the next sample goes */
     int16_t *end;   /* of what is used of the ring: whole samples */
     int16_t *ring;
-    uint32_t left; /* samples up to the next state; while waiting, those from the trigger on */
+    const volatile int32_t *source[TRACE_SIGNALS];
+    const volatile int16_t *angle; /* the upper half of the one that is an angle; NULL: there is none */
+    uint32_t angle_at;             /* its place */
     volatile trace_state_t state;
-    uint32_t trigger;     /* signal */
-    int32_t falling;      /* -1: the edge that counts is falling */
-    int32_t level;        /* raw */
-    int32_t before;       /* the last sample: negative, the edge can come */
-    volatile bool forced; /* trigger as soon as there is enough before */
-    trace_channel_t channel[TRACE_SIGNALS];
-    trace_edge_t edge;
-    uint32_t after; /* samples from the trigger on */
+    uint32_t before_left;    /* samples up to WAITING, */
+    uint32_t after_left;     /* and after the trigger's, up to COMPLETE */
+    int32_t trigger;         /* place of the signal */
+    int32_t level;           /* raw */
+    int32_t falling;         /* -1: the edge that counts is falling */
+    int32_t either;          /* -1: both count */
+    int32_t before;          /* the last sample: negative, the edge can come */
+    volatile int32_t forced; /* -1: trigger as soon as there is enough before */
+    uint32_t place;          /* of the trigger's sample */
 
     /* as set */
     uint32_t size; /* of the ring */
@@ -79,7 +78,7 @@ typedef struct {
 } trace_t;
 
 void trace_init(trace_t *trace, int16_t ring[], uint32_t length, void *context);
-void trace_record(trace_t *trace);
+void trace_record(trace_t *given);
 
 static inline void trace_sample(trace_t *trace)
 {

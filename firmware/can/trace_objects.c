@@ -9,6 +9,9 @@
 #define INCOMPATIBLE 0x06040043U
 #define STATE        0x08000022U
 
+/* Samples: one before the trigger, for an edge, the trigger's and one after it. */
+#define LEAST 3U
+
 enum { COMMAND_OFF, COMMAND_ARM, COMMAND_TRIGGER };
 
 void trace_init(trace_t *trace, int16_t ring[], uint32_t length, void *context)
@@ -65,8 +68,8 @@ static uint32_t set_trigger(trace_t *trace)
 {
     trace->trigger = 0;
     trace->level = 0;
-    trace->forced = trace->set_trigger == 0U;
-    if (trace->forced) {
+    trace->forced = trace->set_trigger == 0U ? -1 : 0;
+    if (trace->set_trigger == 0U) {
         return OK;
     }
     /* signals that are not set are left out of the samples */
@@ -77,10 +80,35 @@ static uint32_t set_trigger(trace_t *trace)
     if (trace->object[trace->set_trigger - 1U] == 0U) {
         return INCOMPATIBLE;
     }
-    trace->trigger = place;
+    trace->trigger = (int32_t)place;
     trace_signal_t signal = {.scale = 0};
     (void)find(trace, trace->object[trace->set_trigger - 1U], &signal);
     trace->level = raw_level(trace, &signal);
+    return OK;
+}
+
+/* Sources of the signals that are set. */
+static uint32_t gather(trace_t *trace)
+{
+    trace->count = 0;
+    trace->angle = NULL;
+    for (uint32_t n = 0; n < TRACE_SIGNALS; n++) {
+        trace_signal_t signal;
+        if (trace->object[n] != 0U) {
+            if (!find(trace, trace->object[n], &signal)) {
+                return NOT_MAPPABLE;
+            }
+            if (signal.angle && trace->angle != NULL) {
+                return INCOMPATIBLE;
+            }
+            if (signal.angle) {
+                trace->angle = &((const volatile int16_t *)signal.source)[1]; /* little-endian */
+                trace->angle_at = trace->count;
+            }
+            trace->source[trace->count] = signal.source;
+            trace->count++;
+        }
+    }
     return OK;
 }
 
@@ -88,30 +116,24 @@ static uint32_t arm(trace_t *trace)
 {
     trace->countdown = 0;
     trace->state = TRACE_OFF;
-    trace->count = 0;
-    for (uint32_t n = 0; n < TRACE_SIGNALS; n++) {
-        trace_signal_t signal;
-        if (trace->object[n] != 0U) {
-            if (!find(trace, trace->object[n], &signal)) {
-                return NOT_MAPPABLE;
-            }
-            trace->channel[trace->count] = (trace_channel_t){.source = signal.source, .shift = signal.shift};
-            trace->count++;
-        }
+    const uint32_t code = gather(trace);
+    if (code != OK) {
+        return code;
     }
     const uint32_t length = length_of(trace);
-    if (length < 2U || set_trigger(trace) != OK) {
+    if (length < LEAST || set_trigger(trace) != OK) {
         return INCOMPATIBLE;
     }
     uint32_t before = (length * trace->pretrigger) / 1000U;
-    before = before >= length ? length - 1U : before;
-    before = before == 0U ? 1U : before; /* an edge needs one */
-    trace->after = length - before;
+    before = before > length - 2U ? length - 2U : before;
+    before = before == 0U ? 1U : before;
+    trace->before_left = before;
+    trace->after_left = length - before - 1U;
+    trace->place = before;
     trace->end = &trace->ring[length * trace->count];
     trace->next = trace->ring;
-    trace->left = before;
-    trace->edge = (trace_edge_t)trace->set_edge;
-    trace->falling = trace->edge == TRACE_FALLING ? -1 : 0;
+    trace->falling = trace->set_edge == (uint8_t)TRACE_FALLING ? -1 : 0;
+    trace->either = trace->set_edge == (uint8_t)TRACE_BOTH ? -1 : 0;
     trace->divider = trace->set_divider;
     trace->state = TRACE_FILLING;
     __atomic_signal_fence(__ATOMIC_RELEASE); /* the interrupt reads this alone, so it is written last */
@@ -133,7 +155,7 @@ static uint32_t command(trace_t *trace, int32_t value)
         if (trace->countdown == 0U) {
             return STATE;
         }
-        trace->forced = true;
+        trace->forced = -1;
         return OK;
     }
 }
@@ -243,7 +265,7 @@ bool trace_get(const trace_t *trace, uint16_t slot, int32_t *value)
         *value = (int32_t)length_of(trace);
         return true;
     case OD_LIVE_TRACE_AT:
-        *value = trace->state == TRACE_COMPLETE ? (int32_t)(length_of(trace) - trace->after) : 0;
+        *value = trace->state == TRACE_COMPLETE ? (int32_t)trace->place : 0;
         return true;
     default:
         if (slot >= (uint16_t)OD_LIVE_TRACE_SIGNAL_1 && slot <= (uint16_t)OD_LIVE_TRACE_SCALE_8) {

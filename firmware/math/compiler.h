@@ -8,6 +8,14 @@
 #define PM_RARE   __attribute__((noinline, cold))
 #define PM_APART  __attribute__((noinline)) /* called from rare code, but not rare itself */
 
+/* What the compiler cannot know: with it, it leaves out what would only matter otherwise. */
+static inline void pm_assume(bool x)
+{
+    if (!x) {
+        __builtin_unreachable();
+    }
+}
+
 /* A condition of the control period that is almost never true. */
 static inline bool pm_rarely(bool x)
 {

@@ -146,7 +146,7 @@ bool find(void *context, uint16_t index, uint8_t sub, trace_signal_t *signal)
     if (index != 0x2900 || sub == 0 || sub > 8) {
         return false;
     }
-    *signal = {&d.sources[sub - 1], sub, sub % 2 == 0 ? 32768 : 1};
+    *signal = {&d.sources[sub - 1], sub % 2 == 0 ? 32768 : 1, sub > 6};
     return true;
 }
 

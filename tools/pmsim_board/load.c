@@ -8,8 +8,8 @@
 #define NODE_ID        1U
 #define REQUEST_ID     (0x600U + NODE_ID)
 #define ANSWER_ID      (0x580U + NODE_ID)
-#define REQUEST_EVERY  30U /* periods: each finds the last one answered */
-#define REPEAT_EVERY   1200U
+#define REQUEST_EVERY  30U                                     /* periods: each finds the last one answered */
+#define REPEAT_EVERY   540U                                    /* of the trace's ring of some 4000 numbers */
 #define DOWNLOAD(size) ((uint8_t)(0x23U | (4U - (size)) << 2)) /* expedited */
 #define ABORT          0x80U
 
@@ -23,12 +23,16 @@ typedef struct {
     int32_t value;
 } request_t;
 
-/* Currents and speed; the trigger is the q-axis current passing zero. */
+/* As many signals as there can be, the angle among them; the trigger is the q-axis current passing zero. */
 static const request_t setup[] = {
     {TRACE_SIGNALS, 1, 4, SIGNALS * 0x10000 + 0x100},
     {TRACE_SIGNALS, 2, 4, SIGNALS * 0x10000 + 0x200},
-    {TRACE_SIGNALS, 3, 4, SIGNALS * 0x10000 + 0x500},
-    {TRACE_SIGNALS, 4, 4, SIGNALS * 0x10000 + 0xB00},
+    {TRACE_SIGNALS, 3, 4, SIGNALS * 0x10000 + 0x300},
+    {TRACE_SIGNALS, 4, 4, SIGNALS * 0x10000 + 0x400},
+    {TRACE_SIGNALS, 5, 4, SIGNALS * 0x10000 + 0x500},
+    {TRACE_SIGNALS, 6, 4, SIGNALS * 0x10000 + 0x600},
+    {TRACE_SIGNALS, 7, 4, SIGNALS * 0x10000 + 0xA00},
+    {TRACE_SIGNALS, 8, 4, SIGNALS * 0x10000 + 0xB00},
     {TRACE, TRIGGER, 1, 2},
     {TRACE, EDGE, 1, 0},
     {TRACE, LEVEL, 4, 0},

@@ -1,4 +1,4 @@
-/* A bus that keeps the image busy while a scenario runs: a trace of four signals in every period, armed again
+/* A bus that keeps the image busy while a scenario runs: a trace of eight signals in every period, armed again
  * as soon as it may be complete, with a level that is crossed often; and a parameter written now and then, so
  * that the drive takes a new set. One SDO request at a time, one every few periods. */
 #ifndef PMSIM_BOARD_LOAD_H

@@ -132,7 +132,7 @@ int main(int argc, char **argv)
         ->words({{"babble", BUS_BABBLE}, {"garbage", BUS_GARBAGE}});
     app.add_flag(
         "--busy", board.busy,
-        "beside the scenario, the bus keeps the image busy: a trace of four signals in every period, "
+        "beside the scenario, the bus keeps the image busy: a trace of eight signals in every period, "
         "armed again and again, and a parameter written now and then");
     app.add_option("--figures", board.figures,
                    "write instructions, cycles, stack and load to this file (JSON)");

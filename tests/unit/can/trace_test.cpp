@@ -13,6 +13,7 @@ namespace
 {
 
 const uint32_t RING = 96;
+const int32_t kRaw = 1 << TRACE_SHIFT;
 
 class Scope
 {
@@ -44,11 +45,11 @@ class Scope
         }
     }
 
-    // One control period; source 1 is x, the others follow from it
+    // One control period; source 1 is raw x, the others follow from it
     void step(int32_t x)
     {
         for (int k = 0; k < 8; ++k) {
-            source[k] = x + 100 * k;
+            source[k] = (x + 100 * k) * kRaw;
         }
         trace_sample(&t);
     }
@@ -70,7 +71,8 @@ class Scope
     trace_t t;
     int16_t ring[RING + 1] = {};
     int32_t source[8] = {};
-    int32_t shift = 0, scale = 32768;
+    int32_t scale = 32768;
+    int angle = 0; // number of the source that is one
 
     static bool find(void *context, uint16_t index, uint8_t sub, trace_signal_t *signal)
     {
@@ -78,7 +80,7 @@ class Scope
         if (index != 0x2900 || sub < 1 || sub > 8) {
             return false;
         }
-        *signal = {&s.source[sub - 1], s.shift, s.scale};
+        *signal = {&s.source[sub - 1], s.scale, sub == s.angle};
         return true;
     }
 };
@@ -143,7 +145,7 @@ TEST(Trace, TriggersOnLevelAndEdge)
             const auto data = x.data();
             ASSERT_EQ(data.size(), RING);
             const int at = x.get(OD_LIVE_TRACE_AT);
-            EXPECT_EQ(at, std::min(47, std::max(1, 48 * permille / 1000)));
+            EXPECT_EQ(at, std::min(46, std::max(1, 48 * permille / 1000)));
             const int before = data[size_t(2 * (at - 1))], now = data[size_t(2 * at)];
             const bool rises = before < 55 && now >= 55, falls = before >= 55 && now < 55;
             EXPECT_TRUE(edge == TRACE_RISING    ? rises
@@ -197,10 +199,10 @@ TEST(Trace, DividerTakesEverySoManieth)
 TEST(Trace, ShiftsAndLimits)
 {
     Scope x;
-    x.shift = 4;
     x.choose(1);
     x.put(OD_LIVE_TRACE_COMMAND, 1);
-    const int32_t values[] = {INT32_MAX, INT32_MIN, 16 * 32767, 16 * 32768, -16 * 32768, -16 * 32769, -1, 15};
+    const int32_t values[] = {INT32_MAX,     INT32_MIN,     32767 * kRaw, 32768 * kRaw,
+                              -32768 * kRaw, -32769 * kRaw, -1,           kRaw - 1};
     const int16_t raw[] = {32767, -32768, 32767, 32767, -32768, -32768, -1, 0};
     for (int n = 0; n < 96; ++n) {
         x.source[0] = values[n % 8];
@@ -208,6 +210,29 @@ TEST(Trace, ShiftsAndLimits)
     }
     for (size_t n = 0; n < 8; ++n) {
         EXPECT_EQ(x.data()[n], raw[n]);
+    }
+}
+
+TEST(Trace, OneSignalMayBeAnAngle)
+{
+    for (int place = 1; place <= 8; ++place) {
+        Scope x;
+        x.angle = place;
+        x.choose(8);
+        x.put(OD_LIVE_TRACE_COMMAND, 1);
+        for (int n = 0; n < 12; ++n) {
+            for (int k = 0; k < 8; ++k) {
+                x.source[k] = k + 1 == place ? int32_t(uint32_t(n) * 0x30000000U) : k * kRaw;
+            }
+            trace_sample(&x.t);
+        }
+        ASSERT_EQ(x.data().size(), RING);
+        for (size_t n = 0; n < RING; ++n) {
+            const int k = int(n % 8);
+            EXPECT_EQ(x.data()[n], k + 1 == place ? int16_t(uint16_t(n / 8 * 0x3000U)) : k);
+        }
+        x.put(OD_LIVE_TRACE_SIGNAL_1 + place % 8, 0x29000000 | place << 8); // a second time
+        EXPECT_EQ(x.put(OD_LIVE_TRACE_COMMAND, 1), 0x06040043U);
     }
 }
 
