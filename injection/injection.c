@@ -21,14 +21,12 @@ void injection_reset(injection_t *self, const injection_config_t *config, const 
 /* The one that injection_step() has compiled into its caller is not called here a second time. */
 #define OTHER_STEP(name)                                                                                     \
     if (INJECTION_##name != INJECTION_INLINE) {                                                              \
-        name##_step(&self->name, &config->name, &in, &out);                                                  \
+        name##_step(&self->name, &config->name, in, out);                                                    \
     }
 
-PM_APART injection_out_t injection_step_other(injection_t *self, const injection_config_t *config, pm_ab_t i,
-                                              pm_dir_t dir, pm_q_t omega, pm_half_dir_t ahead)
+PM_APART void injection_step_other(injection_t *self, const injection_config_t *config,
+                                   const injection_in_t *in, injection_out_t *out)
 {
-    const injection_in_t in = {.i = i, .dir = dir, .omega = omega, .ahead = ahead};
-    injection_out_t out = {.v = {0, 0}};
     switch (config->id) {
 #define PM_METHOD(name, help, traits, needs)                                                                 \
     PM_IN_IMAGE(name, case INJECTION_##name : OTHER_STEP(name) break;)
@@ -36,10 +34,9 @@ PM_APART injection_out_t injection_step_other(injection_t *self, const injection
 #undef PM_METHOD
     case INJECTION_COUNT:
     default:
+        *out = (injection_out_t){0};
         break;
     }
-    (void)in;
-    return out;
 }
 
 void injection_slow(injection_t *self, const injection_config_t *config, const obs_in_t *in)

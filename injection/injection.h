@@ -63,10 +63,9 @@ obs_out_t injection_last(const injection_t *self, const injection_config_t *conf
 void make_injection(maker_t *m, injection_config_t *c, injection_limits_t *limits);
 bool injection_sees_saliency(const maker_t *m);
 
-/* injection_step() of all but INJECTION_INLINE; by value, so that the members of `in` stay in registers where the
- * default runs. */
-injection_out_t injection_step_other(injection_t *self, const injection_config_t *config, pm_ab_t i,
-                                     pm_dir_t dir, pm_q_t omega, pm_half_dir_t ahead);
+/* injection_step() of all but INJECTION_INLINE. */
+void injection_step_other(injection_t *self, const injection_config_t *config, const injection_in_t *in,
+                          injection_out_t *out);
 
 static inline void injection_step(injection_t *self, const injection_config_t *config,
                                   const injection_in_t *in, injection_out_t *out)
@@ -74,7 +73,12 @@ static inline void injection_step(injection_t *self, const injection_config_t *c
     if (__builtin_expect(config->id == INJECTION_INLINE, 1) != 0) {
         pulsating_square_step(&self->pulsating_square, &config->pulsating_square, in, out);
     } else {
-        *out = injection_step_other(self, config, in->i, in->dir, in->omega, in->ahead);
+        /* Only this path needs them in memory; copied by members, so that elsewhere they stay in registers. */
+        const injection_in_t given = {
+            {in->i.alpha, in->i.beta}, {in->dir.cos, in->dir.sin}, in->omega, {in->ahead.cos, in->ahead.sin}};
+        injection_out_t result;
+        injection_step_other(self, config, &given, &result);
+        *out = result;
     }
 }
 

@@ -3,17 +3,13 @@
 #include "firmware/math/pair.h"
 #include "injection/carrier.h"
 
-/* Commanded at k, applied over [k+1, k+2), seen at k+2; the second difference needs one more: the fifth step is
- * the first that counts. */
-#define WARM_UP 5
-
 void pulsating_square_reset(pulsating_square_t *self, const pulsating_square_config_t *config,
                             const obs_in_t *in)
 {
     *self = (pulsating_square_t){.i = in->i,
                                  .carrier = -pm_shl(config->v_h, 30 - PM_Q_BITS),
                                  .gain = config->saliency.gain_0,
-                                 .warm = WARM_UP};
+                                 .h = {.d = -config->h_d, .q = 0}}; /* as seen with that sign */
 }
 
 void pulsating_square_slow(pulsating_square_t *self, const pulsating_square_config_t *config,
@@ -38,29 +34,22 @@ void pulsating_square_step(pulsating_square_t *self, const pulsating_square_conf
     const pm_ab_t change = {.alpha = in->i.alpha - past.alpha, .beta = in->i.beta - past.beta};
     const pm_dq_t half_delta = pm_park_half(change, in->dir);
     const pm_dq_t h = {.d = half_delta.d - past_delta.d, .q = half_delta.q - past_delta.q};
-    self->i = in->i;
+    self->i.alpha = in->i.alpha; /* by members: they stay in registers */
+    self->i.beta = in->i.beta;
     self->half_delta = half_delta;
     self->h = h;
     /* the sign of two periods ago is that of the period now to be commanded */
     self->carrier = -k.first;
     self->gain = -k.second;
-    if (self->warm > 0U) {
-        self->warm--;
-    }
-    self->eps = 0;
-    if (self->warm == 0U) {
-        self->eps = pm_small_gain(pm_small(h.q + pm_unit(h.d, self->lambda)), k.second);
-    }
-    out->eps = self->eps;
+    const pm_q_t eps = pm_small_gain(pm_small(h.q + pm_unit(h.d, self->lambda)), k.second);
+    self->eps = eps;
+    out->eps = eps;
     out->i = pm_park_half(twice, in->dir);
     out->v = carrier_along_d(-k.first, in->ahead);
 }
 
 obs_out_t pulsating_square_last(const pulsating_square_t *self, const pulsating_square_config_t *config)
 {
-    if (self->warm > 0U) {
-        return (obs_out_t){0};
-    }
     /* seen with the sign of the carrier that has been commanded since */
     const bool reversed = self->carrier < 0;
     const pm_dq_t h = self->h;

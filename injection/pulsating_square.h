@@ -13,6 +13,7 @@
  * Without it the position lags by L_q / (L_q - L_d) times as much.
  *
  * eps is exact for small e and 1/2 sin 2e beyond: stable at 0 and 180 degrees, so the polarity must be known.
+ * Commanded at k, a voltage is seen at k+2: of the first three steps eps is noise, in the fourth half of the error.
  * misfit: distance of h_d from its value without load, relative. The fundamental current is the mean of two
  * samples. Each period 57 instructions, without the Park transform that it replaces. Functions as injection.h says.
  * Tests: tests/unit/injection/pulsating_square_test.cpp, tests/scenario. */
@@ -40,7 +41,6 @@ typedef struct {
     int32_t carrier;    /* commanded in the last period: +-v_h, Q30 */
     int32_t gain;       /* at the present current, Q20, with the sign of the answer that comes next */
     pm_unit_t lambda;   /* at the present current and speed */
-    uint32_t warm;      /* periods until two valid differences exist */
     pm_dq_t h;          /* of the last step, either sign */
     pm_q_t eps;         /* of the last step */
 } pulsating_square_t;

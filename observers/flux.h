@@ -15,7 +15,8 @@ static inline pm_ab_t flux_integrate(active_flux_t *self, const obs_in_t *in)
     const pm_pair_t k = pm_pair(&self->step, &self->drop);
     psi.alpha = pm_mulh_sub(pm_mulh_add(psi.alpha, in->v.alpha, k.first), past.alpha, k.second);
     psi.beta = pm_mulh_sub(pm_mulh_add(psi.beta, in->v.beta, k.first), past.beta, k.second);
-    self->i = in->i;
+    self->i.alpha = in->i.alpha; /* by members: they stay in registers */
+    self->i.beta = in->i.beta;
     return psi;
 }
 

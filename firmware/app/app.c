@@ -5,8 +5,6 @@
 
 #include "firmware/app/app_parts.h"
 
-/* The main loop counts as stalled when a round takes longer. */
-#define TURN_MS 100U
 /* Period of a round without any event: timers of the bus count in ms. */
 #define ROUND_US 250U
 
@@ -69,7 +67,6 @@ drive_result_t app_configure(app_t *app, hal_t *hal, const drive_params_t *param
     (void)memset(app, 0, sizeof *app);
     app->hal = hal;
     app->slow_divider = 1;
-    app->slow_at = 1;
     app->params = *params;
     app->f_pwm = params->f_pwm;
     app->stored = stored;
@@ -87,53 +84,6 @@ drive_result_t app_configure(app_t *app, hal_t *hal, const drive_params_t *param
     app_bus_init(app);
     app->round_us = hal_time_us(hal) - ROUND_US;
     return result;
-}
-
-void app_control(app_t *app)
-{
-    hal_measure(app->hal, &app->in);
-    if (app->slow_busy) {
-        drive_trip(&app->drive, DRIVE_FAULT_OVERRUN);
-    }
-    drive_step(&app->drive, &app->in, &app->out);
-    hal_bridge_write(app->hal, &app->out);
-    trace_sample(&app->trace);
-    const uint32_t periods = app->periods + 1U;
-    app->periods = periods;
-    if (periods == app->slow_at) {
-        app->slow_at = periods + app->slow_divider;
-        app->slow_busy = true;
-        hal_pend_slow(app->hal);
-    }
-}
-
-void app_slow(app_t *app)
-{
-    app_take_parameters(app);
-    hal_measure_slow(app->hal, &app->slow);
-    if (app->slow.temperature_missing) {
-        drive_trip(&app->drive, DRIVE_FAULT_TEMPERATURE_SENSOR);
-    }
-    const drive_slow_in_t in = {.temperature_dC = app->slow.temperature_dC};
-    drive_slow(&app->drive, &in);
-    app->slow_busy = false;
-}
-
-void app_monitor(app_t *app)
-{
-    const uint32_t periods = app->periods;
-    const bool alive = periods != app->seen_periods || !app->hardware;
-    app->seen_periods = periods;
-    if (!alive && !app->stalled) {
-        hal_bridge_off(app->hal);
-        app->stalled = true;
-    }
-    if (app->turn_age_ms < TURN_MS) {
-        app->turn_age_ms++;
-    }
-    if (alive && app->turn_age_ms < TURN_MS) {
-        hal_watchdog(app->hal);
-    }
 }
 
 void app_trip(app_t *app, drive_fault_t fault)

@@ -56,9 +56,9 @@ struct app {
     hal_slow_t slow;
 
     hal_t *hal;
-    uint32_t slow_divider, slow_at; /* periods per app_slow(), and of the next */
-    volatile uint32_t periods;      /* control interrupts since start */
-    volatile bool slow_busy;        /* from its pending to its end */
+    uint32_t slow_divider;   /* periods per app_slow() */
+    uint32_t slow_at;        /* drive.period that pends the next, or that follows the one at work */
+    volatile bool slow_busy; /* from its pending to its end */
 
     volatile bool stalled;         /* the monitor has found that control has ceased */
     uint32_t seen_periods;         /* by the monitor */

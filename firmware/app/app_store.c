@@ -213,7 +213,8 @@ bool app_save(hal_t *hal, const drive_params_t *params)
 static void rest_slow(app_t *app, bool rest)
 {
     hal_lock(app->hal);
-    app->slow_at = app->periods + (rest ? 0U : app->slow_divider); /* the former would take days */
+    app->slow_at =
+        app->drive.period + (rest ? UINT32_MAX : app->slow_divider); /* the former would take days */
     hal_unlock(app->hal);
 }
 

@@ -55,7 +55,7 @@ static void make_protection(maker_t *m, protection_config_t *c)
     c->v_dc_max = per_unit(m, DRIVE_PARAM_v_dc_max, m->base.v);
     c->v_dc_min = per_unit(m, DRIVE_PARAM_v_dc_min, m->base.v);
     c->i_trip_squared = pm_mulh(c->i_trip, c->i_trip);
-    c->v_dc_span = (uint32_t)c->v_dc_max - (uint32_t)c->v_dc_min;
+    c->v_dc_span = c->v_dc_max - c->v_dc_min;
     c->v_dc_derate = per_unit(m, DRIVE_PARAM_v_dc_derate, m->base.v);
     c->i_sum = PM_Q(0.1);
     c->offset_max =
@@ -164,12 +164,6 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     m.i_d_rated = i_d_rated(&m, &config->mtpa);
     make_field_weakening(&m, &config->field_weakening);
     make_position(&m, &config->position, config->injection);
-    make_speed(&m, &config->speed_estimate);
-    config->speed_estimate.k_theta = config->position.pll_low.k_theta;
-    config->position.corrects = config->position.second_harmonic.id != SECOND_HARMONIC_STAYS ||
-                                config->position.mismatch.id != MISMATCH_OFF ||
-                                config->position.loop.id != LOOP_PLL ||
-                                config->speed_estimate.id != SPEED_LOOP;
     if (config->start != (uint8_t)SEQUENCE_align) {
         make_pulses(&m, &config->pulses);
     }

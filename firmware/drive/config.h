@@ -15,7 +15,6 @@
 #include "firmware/math/num.h"
 #include "firmware/params/types.h"
 #include "injection/initial_pulses.h"
-#include "observers/speed.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -24,7 +23,7 @@ extern "C" {
 typedef struct {
     int32_t i_trip_squared; /* Q24 */
     pm_q_t v_dc_min;
-    uint32_t v_dc_span; /* v_dc_max - v_dc_min */
+    int32_t v_dc_span; /* v_dc_max - v_dc_min */
     pm_q_t i_trip;
     pm_q_t v_dc_max, v_dc_derate;
     pm_q_t i_sum;       /* largest believable sum of the phase currents */
@@ -51,7 +50,6 @@ typedef struct {
     modulator_config_t modulator;
     current_control_config_t current;
     speed_control_config_t speed;
-    speed_config_t speed_estimate;
     mtpa_config_t mtpa;
     field_weakening_config_t field_weakening;
     position_config_t position;

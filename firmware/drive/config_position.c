@@ -36,6 +36,10 @@ void make_position(maker_t *m, position_config_t *c, bool injection)
     make_loop(m, &c->loop, &c->pll_low, &c->pll_high);
     make_second_harmonic(m, &c->second_harmonic);
     make_mismatch(m, &c->mismatch);
+    make_speed(m, &c->speed);
+    c->speed.k_theta = c->pll_low.k_theta;
+    c->corrects = c->second_harmonic.id != SECOND_HARMONIC_STAYS || c->mismatch.id != MISMATCH_OFF ||
+                  c->loop.id != LOOP_PLL || c->speed.id != SPEED_LOOP;
     if (m->params->speed_high <= m->params->speed_low) {
         refuse(m, DRIVE_PARAM_speed_high, "must be above speed_low");
         return;

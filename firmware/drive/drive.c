@@ -198,15 +198,16 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
 static inline position_out_t imposed_frame(const drive_t *drive)
 {
     const pm_dir_t dir = pm_dir(drive->theta_open);
-    return (position_out_t){
-        .ahead = pm_dir_sum(dir, drive->ahead), .i = pm_park(drive->i_ab, dir), .omega = drive->omega_open};
+    return (position_out_t){.ahead = pm_dir_sum(dir, pm_pair_dir(&drive->ahead)),
+                            .i = pm_park(drive->i_ab, dir),
+                            .omega = drive->omega_open};
 }
 
 static inline void write_out(const modulator_out_t *m, drive_out_t *out)
 {
-    pm_store_twice(out->compare[0], m->on[0]);
-    pm_store_twice(out->compare[1], m->on[1]);
-    pm_store_twice(out->compare[2], m->on[2]);
+    drive_write_leg(out->compare[0], m->on[0]);
+    drive_write_leg(out->compare[1], m->on[1]);
+    drive_write_leg(out->compare[2], m->on[2]);
     out->legs = PM_LEGS_PWM;
     out->trip = 0;
 }
@@ -235,17 +236,6 @@ static inline void control(drive_t *drive, const position_out_t *frame, drive_ou
     write_out(&m, out);
 }
 
-/* In the frame of the step that follows. */
-PM_RARE static void collect_speed(drive_t *drive, pm_ab_t v)
-{
-    if (drive->config.speed_estimate.id == (uint8_t)SPEED_LOOP) {
-        return;
-    }
-    pm_pll_t pll = drive->position.pll;
-    pm_pll_predict(&pll, &drive->position.gains);
-    speed_collect(&drive->speed_estimate, pm_park(v, pm_dir(pll.theta)).q);
-}
-
 void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
 {
     drive->period++;
@@ -253,15 +243,12 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
     if (drive->stage < STAGE_OPEN_LOOP || in->hw_fault || !protection_passed(drive)) {
         without_control(drive, in, out);
     } else {
-        const pm_ab_t v = pm_pair_ab(&drive->v_acting);
+        position_out_t frame;
+        position_step(&drive->position, &drive->config.position, &drive->v_acting, drive->i_ab, &drive->ahead,
+                      &frame);
         const pm_ab_t next = pm_pair_ab(&drive->v_next);
         drive->v_acting.alpha = next.alpha;
         drive->v_acting.beta = next.beta;
-        if (pm_rarely(drive->config.position.corrects)) {
-            collect_speed(drive, v);
-        }
-        position_out_t frame;
-        position_step(&drive->position, &drive->config.position, v, drive->i_ab, drive->ahead, &frame);
         drive->status.theta = drive->position.pll.theta;
         if (drive->stage != STAGE_VECTOR) {
             drive->theta_open += (pm_angle_t)drive->turn_open;

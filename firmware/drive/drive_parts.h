@@ -3,10 +3,22 @@
 #define DRIVE_DRIVE_PARTS_H
 
 #include "firmware/drive/drive_state.h"
+#include "firmware/math/pair.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+/* On-time of a leg, in both halves of the carrier alike; a port without NEEDS_HALVES reads the first alone. */
+static inline void drive_write_leg(uint16_t compare[2], int32_t on) /* 0 <= on < 2^16 */
+{
+#if PM_CARRIES(NEEDS_HALVES)
+    pm_store_twice(compare, on);
+#else
+    pm_assume(on >= 0 && on <= UINT16_MAX);
+    compare[0] = (uint16_t)on;
+#endif
+}
 
 /* Each period while the bridge is driven: currents and DC link within their limits. */
 static inline bool protection_currents_passed(const drive_t *drive)
@@ -22,8 +34,9 @@ static inline bool protection_currents_passed(const drive_t *drive)
 static inline bool protection_passed(const drive_t *drive)
 {
     const protection_config_t *c = &drive->config.protection;
-    const uint32_t above = (uint32_t)drive->status.v_dc - (uint32_t)c->v_dc_min;
-    return above <= c->v_dc_span && protection_currents_passed(drive);
+    const pm_pair_t v_dc = pm_pair(&c->v_dc_min, &c->v_dc_span);
+    const uint32_t above = (uint32_t)drive->status.v_dc - (uint32_t)v_dc.first;
+    return above <= (uint32_t)v_dc.second && protection_currents_passed(drive);
 }
 
 /* drive.c: at 1 kHz, what the step needs of the present operating point and stage. */

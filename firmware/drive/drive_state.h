@@ -73,7 +73,6 @@ struct drive {
     drive_command_t command;
     drive_fault_record_t record;
     commissioning_report_t commissioning_report;
-    speed_t speed_estimate;
     sequence_t sequence;
     procedure_beside_t beside;
 };

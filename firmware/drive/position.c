@@ -4,8 +4,12 @@
 #include "firmware/math/trig.h"
 
 /* Optional stages: one branch per period for all of them. */
-PM_RARE static pm_q_t corrected_eps(position_t *self, const position_config_t *config, pm_dq_t i, pm_q_t eps)
+PM_RARE static pm_q_t corrected_eps(position_t *self, const position_config_t *config, const pm_ab_t *v,
+                                    pm_dq_t i, pm_q_t eps)
 {
+    if (config->speed.id != (uint8_t)SPEED_LOOP) {
+        speed_collect(&self->speed, pm_park(*v, pm_dir(self->pll.theta)).q);
+    }
     if (config->second_harmonic.id != SECOND_HARMONIC_STAYS) {
         eps = second_harmonic_step(&self->second_harmonic, &config->second_harmonic, pm_dir(self->pll.theta),
                                    eps);
@@ -18,13 +22,13 @@ PM_RARE static pm_q_t corrected_eps(position_t *self, const position_config_t *c
     return loop_eps(&self->loop, &config->loop, &self->pll, &self->gains, eps);
 }
 
-void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i, pm_dir_t ahead,
-                   position_out_t *out)
+void position_step(position_t *self, const position_config_t *config, const pm_ab_t *v, pm_ab_t i,
+                   const pm_dir_t *ahead, position_out_t *out)
 {
     pm_pll_t pll = self->pll;
     pm_pll_predict(&pll, &self->gains);
     const pm_dir_t dir = pm_dir(pll.theta);
-    const pm_half_dir_t frame_ahead = pm_dir_sum(dir, ahead);
+    const pm_half_dir_t frame_ahead = pm_dir_sum(dir, pm_pair_dir(ahead));
     const bool inject = self->inject;
     pm_dq_t i_dq;
     pm_q_t low_eps = 0;
@@ -38,7 +42,7 @@ void position_step(position_t *self, const position_config_t *config, pm_ab_t v,
     } else {
         i_dq = pm_park(i, dir);
     }
-    const obs_in_t in = {.v = v, .i = i, .dir = dir, .omega = pll.omega, .i_dq = i_dq};
+    const obs_in_t in = {.v = pm_pair_ab(v), .i = i, .dir = dir, .omega = pll.omega, .i_dq = i_dq};
     obs_out_t high;
     observer_step(&self->observer, &config->observer, &in, &high);
     pm_q_t eps = high.eps;
@@ -47,7 +51,7 @@ void position_step(position_t *self, const position_config_t *config, pm_ab_t v,
     }
     if (pm_rarely(config->corrects)) {
         self->pll = pll; /* through memory, so that otherwise it stays in registers */
-        eps = corrected_eps(self, config, i_dq, eps);
+        eps = corrected_eps(self, config, v, i_dq, eps);
         pll = self->pll;
     }
     pm_pll_correct(&pll, &self->gains, eps);

@@ -19,6 +19,7 @@
 #include "observers/mismatch.h"
 #include "observers/observer.h"
 #include "observers/second_harmonic.h"
+#include "observers/speed.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -31,11 +32,12 @@ typedef struct {
     loop_config_t loop;
     second_harmonic_config_t second_harmonic;
     mismatch_config_t mismatch;
+    speed_config_t speed;
     pm_q_t omega_low, omega_high;
     int32_t per_span;      /* 1 / (omega_high - omega_low), Q20 */
     pm_unit_t current_low; /* share of the bandwidth of current control while injection leads */
     bool injects;          /* the low-speed source leads at low speed; else the observer at all speeds */
-    bool corrects;         /* one of the optional stages between source and loop, or of the speed, is on */
+    bool corrects;         /* one of the optional stages is on */
 } position_config_t;
 
 typedef struct {
@@ -47,11 +49,12 @@ typedef struct {
     observer_t observer;
     injection_t injection; /* while `inject` */
 
-    /* the optional stages, and what 1 kHz keeps */
+    /* the optional stages, between source and loop and for the speed, and what 1 kHz keeps */
     mismatch_window_t window; /* while no carrier is injected */
     mismatch_t mismatch;
     second_harmonic_t second_harmonic;
     loop_t loop;
+    speed_t speed;
     pm_q_t omega_mean;   /* filtered for the weight */
     pm_q_t observer_eps; /* without noise, for the quality */
     pm_q_t injection_eps;
@@ -74,8 +77,8 @@ typedef struct {
 
 /* One period: v is the mean voltage over [k-1, k), i the current at k; the frame turns by `ahead` from k to
  * the middle of the period in which the next voltage acts. */
-void position_step(position_t *self, const position_config_t *config, pm_ab_t v, pm_ab_t i, pm_dir_t ahead,
-                   position_out_t *out);
+void position_step(position_t *self, const position_config_t *config, const pm_ab_t *v, pm_ab_t i,
+                   const pm_dir_t *ahead, position_out_t *out);
 
 /* The configuration names another observer than before: it is seeded at the present position and speed, where
  * the loop had settled with the old one, so nothing jumps. What the old one had learnt of R and of the

@@ -24,7 +24,7 @@ void reference_take(drive_t *drive)
 void reference_reset(drive_t *drive, pm_q_t i_q)
 {
     speed_control_reset(&drive->speed, drive->position.pll.omega, i_q);
-    drive->speed_estimate.ready = false;
+    drive->position.speed.ready = false;
     drive->field_weakening.i_d = 0;
     drive->i_open = 0;
     drive->i_ref = (pm_dq_t){.d = 0, .q = i_q};
@@ -55,7 +55,7 @@ static pm_q_t measured_speed(drive_t *drive)
 {
     const pm_pll_t *p = &drive->position.pll;
     const speed_in_t in = {.theta = p->theta, .omega = p->omega, .i = drive->status.i};
-    return speed_step(&drive->speed_estimate, &drive->config.speed_estimate, &in);
+    return speed_step(&drive->position.speed, &drive->config.position.speed, &in);
 }
 
 void reference_vector(drive_t *drive)

@@ -10,6 +10,8 @@
 
 #include <stdint.h>
 
+#include "firmware/math/compiler.h"
+
 #if defined(__ARM_FEATURE_DSP) && __ARM_FEATURE_DSP && defined(__thumb2__)
 #define PM_HAS_DSP 1
 #else
@@ -96,6 +98,7 @@ static inline int32_t pm_mulh_add(int32_t c, int32_t a, int32_t b) /* c + a b / 
 /* x in both places: one store of a word where the compiler would make two. */
 static inline void pm_store_twice(uint16_t *both, int32_t x) /* 0 <= x < 2^16 */
 {
+    pm_assume(x >= 0 && x <= UINT16_MAX);
     const uint32_t word = (uint32_t)x | ((uint32_t)x << 16);
     __builtin_memcpy(both, &word, sizeof word);
 }

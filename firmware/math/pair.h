@@ -43,6 +43,13 @@ static inline pm_ab_t pm_pair_ab(const pm_ab_t *x)
     return y;
 }
 
+static inline pm_dir_t pm_pair_dir(const pm_dir_t *x)
+{
+    const pm_pair_t r = pm_pair(&x->cos, &x->sin);
+    const pm_dir_t y = {r.first, r.second};
+    return y;
+}
+
 static inline pm_dq_t pm_pair_dq(const pm_dq_t *x)
 {
     const pm_pair_t r = pm_pair(&x->d, &x->q);

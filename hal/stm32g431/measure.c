@@ -73,11 +73,28 @@ uint32_t hal_channels(const hal_t *hal)
     return PORT_CHANNELS;
 }
 
+/* A code has 16 bits, which the compiler cannot know of a conversion. */
+static uint16_t code_of(uint32_t x)
+{
+    uint32_t code = x;
+    __asm__("" : "+r"(code)); /* else it sees the two steps, and makes sure */
+    if (code > UINT16_MAX) {
+        __builtin_unreachable();
+    }
+    return (uint16_t)code;
+}
+
 /* The shunt is between leg and ground: a current into the motor makes the code fall. One below the exact
  * complement, so that the smallest fits; the calibration takes that as an offset. */
 static uint16_t current_code(uint32_t converted)
 {
-    return (uint16_t)(0xFFFFU - converted * 16U);
+    return code_of(0xFFFFU - converted * 16U);
+}
+
+/* Once reported; they are set again while the cause lasts. */
+__attribute__((noinline, cold)) static void clear_breaks(uint32_t breaks)
+{
+    TIM1.SR = ~breaks;
 }
 
 void hal_measure(hal_t *hal, drive_in_t *in)
@@ -86,12 +103,12 @@ void hal_measure(hal_t *hal, drive_in_t *in)
     in->i_leg[0] = current_code(ADC1.JDR1);
     in->i_leg[1] = current_code(ADC2.JDR1);
     in->i_leg[2] = current_code(ADC1.JDR2);
-    in->v_dc = (uint16_t)(ADC2.JDR2 * 16U);
-    const uint32_t breaks = TIM1.SR & BREAKS;
+    in->v_dc = code_of(ADC2.JDR2 * 16U);
     in->hw_fault = false;
-    if (__builtin_expect((long)breaks, 0L) != 0L) {
+    const uint32_t breaks = TIM1.SR & BREAKS;
+    if (breaks != 0U) {
         in->hw_fault = true;
-        TIM1.SR = ~breaks; /* once reported; set again while the cause lasts */
+        clear_breaks(breaks);
     }
 }
 

@@ -33,8 +33,10 @@ constexpr double kTurned = 5e-5;
 // Seeded at the truth. The run starts with a step of the sampled voltage and a mean current half a period
 // old, of which 0.013 are left.
 constexpr double kSeeded_rad = 0.02;
-// A carrier begins out of its steady state; what that leaves in the current decays with L/R, 7 ms.
-constexpr double kStarted_rad = 0.05;
+// A carrier begins with an offset of the current, I_p - I_n across d, that decays with L/R, 7 ms. A window of
+// N T = 3 ms that begins with it takes (1 - exp(-N T R / L)) / (2 pi) of it for an answer, so the first eps errs by
+// up to (I_p - I_n) / (2 I_n) 0.056, with I_n = 0.27 I_p.
+constexpr double kStarted_rad = 0.075;
 // eps is exact for small errors: its largest value after a change of the frame, when the old carrier is gone and
 // a filter of 300 Hz has settled. A flux observer follows the frame from then on.
 constexpr double kSlope = 0.05;

@@ -175,12 +175,12 @@ bool rig_step_drive(rig_t *rig, const record_period_t *record)
     for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
         in.i_leg[leg] = record->i_leg[leg];
     }
+    const bool slow_follows = app->drive.period % app->slow_divider == 0U;
     drive_step(&app->drive, &in, &app->out);
-    if (app->periods % app->slow_divider == 0U) {
+    if (slow_follows) {
         const drive_slow_in_t slow = {.temperature_dC = record->temperature_dC};
         drive_slow(&app->drive, &slow);
     }
-    app->periods++;
     bool same = true;
     for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
         same = same && app->out.compare[leg][0] == record->compare[leg][0] &&

@@ -48,7 +48,7 @@ static inline void write_leg(int32_t share, int32_t parts, int32_t *rest, uint16
     const pm_unit_t within = pm_share_to_unit(pm_sat_positive(share, PM_SHARE_BITS));
     const uint32_t wanted = (uint32_t)pm_mulh_add(*rest, within, parts);
     *rest = (int32_t)(wanted % PART);
-    pm_store_twice(compare, (int32_t)(wanted / PART));
+    drive_write_leg(compare, (int32_t)(wanted / PART));
 }
 
 static inline void write_legs(drive_t *drive, pm_abc_t u, drive_out_t *out)

@@ -15,8 +15,7 @@ pm_procedure_t procedure_initial_pulses_step(drive_t *drive, const drive_in_t *i
     const pm_procedure_t result = initial_pulses_step(self, &c->pulses, drive->i_ab, &pulse);
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
         const int32_t on = pm_mulh(pulse.duty[x], pm_shl(c->modulator.counts, 32 - PM_Q_BITS));
-        out->compare[x][0] = (uint16_t)on;
-        out->compare[x][1] = (uint16_t)on;
+        drive_write_leg(out->compare[x], on);
     }
     out->legs = pulse.driven ? PM_LEGS_PWM : PM_LEGS_OFF;
     return result;

@@ -119,7 +119,7 @@ class Gdb(unittest.TestCase):
     def test_break_in_main_and_in_the_control_interrupt(self):
         text, board = self.run_gdb(
             "info symbol $pc", "break main", "continue", "info symbol $pc", "delete", "break port_control",
-            "continue", "ignore 2 9", "print app_instance.periods", "continue", "print app_instance.periods",
+            "continue", "ignore 2 9", "print app_instance.drive.period", "continue", "print app_instance.drive.period",
             "print $xpsr & 0x1ff", "delete", "detach")
         self.assertIn("port_reset in section", text)
         self.assertRegex(text, r"Breakpoint 1, .*main")

@@ -32,14 +32,20 @@ static void step(const drive_in_t *in, drive_out_t *out)
     }
 }
 
+/* A target without NEEDS_HALVES gives the first half of the carrier alone, for both. */
+static bool same_leg(const uint16_t given[2], const uint16_t recorded[2])
+{
+    const uint16_t second = PM_CARRIES(NEEDS_HALVES) ? given[1] : given[0];
+    return given[0] == recorded[0] && second == recorded[1];
+}
+
 static bool same(const record_period_t *r, const drive_out_t *out)
 {
     for (uint32_t x = 0; x < RECORD_LEGS; x++) {
         if ((pm_leg(out->legs, x) != PM_LEG_OFF) != (r->driven[x] != 0U)) {
             return false;
         }
-        if (pm_leg(out->legs, x) != PM_LEG_OFF &&
-            (out->compare[x][0] != r->compare[x][0] || out->compare[x][1] != r->compare[x][1])) {
+        if (pm_leg(out->legs, x) != PM_LEG_OFF && !same_leg(out->compare[x], r->compare[x])) {
             return false;
         }
     }

@@ -267,6 +267,7 @@ TEST(App, SlowThatHasNotEndedIsAnOverrun)
     x.boot(&params);
     x.run_enabled_ms(600);
     x.loop.app.slow_busy = true;
+    x.loop.app.slow_at = x.loop.app.drive.period; // as the period has left it that pended the slow interrupt
     app_control(&x.loop.app);
     EXPECT_EQ(x.fault(), DRIVE_FAULT_OVERRUN);
 }
@@ -284,7 +285,7 @@ TEST(App, SlowRestsWhileFlashIsWritten)
     EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
     x.run_ms(2);
     EXPECT_EQ(x.loop.app.slow.temperature_dC, 612);
-    EXPECT_LE(x.loop.app.slow_at - x.loop.app.periods, x.loop.app.slow_divider);
+    EXPECT_LE(x.loop.app.slow_at - x.loop.app.drive.period, x.loop.app.slow_divider);
 }
 
 // The converters hang, so control does not come: the monitor opens the bridge and lets the dog bite.
@@ -311,15 +312,15 @@ TEST(App, WatchdogIsNotFedWhenTheMainLoopHangs)
     x.boot(&params);
     x.run_ms(10);
     for (int ms = 0; ms < 99; ++ms) {
-        x.loop.app.periods++;
+        x.loop.app.drive.period++;
         app_monitor(&x.loop.app);
     }
     const uint32_t fed = x.loop.hal.watchdog_fed;
-    x.loop.app.periods++;
+    x.loop.app.drive.period++;
     app_monitor(&x.loop.app);
     EXPECT_EQ(x.loop.hal.watchdog_fed, fed);
     app_turn(&x.loop.app);
-    x.loop.app.periods++;
+    x.loop.app.drive.period++;
     app_monitor(&x.loop.app);
     EXPECT_EQ(x.loop.hal.watchdog_fed, fed + 1);
 }

@@ -381,7 +381,7 @@ TEST(BusTrace, RecordsTheStart)
     EXPECT_EQ(x.set(0x3101, 5, 0x60410000), 0x06040041U);
     ASSERT_EQ(x.set(0x3100, 1, 1), 0U);
     std::vector<std::vector<int32_t>> truth;
-    const uint32_t first = x.loop.app.periods;
+    const uint32_t first = x.loop.app.drive.period;
     while (x.loop.app.trace.state != TRACE_COMPLETE && truth.size() < 3000) {
         sim_loop_step(&x.loop);
         const drive_t &d = x.loop.app.drive;
@@ -391,7 +391,7 @@ TEST(BusTrace, RecordsTheStart)
             x.control(0x0F);
         }
     }
-    EXPECT_GT(x.loop.app.periods, first);
+    EXPECT_GT(x.loop.app.drive.period, first);
     const size_t samples = APP_TRACE_NUMBERS / 4;
     ASSERT_GE(truth.size(), samples - 24); // the first were taken while the answer was waited for
     ASSERT_EQ(x.get(0x3100, 2) & 0xFF, uint32_t(TRACE_COMPLETE));

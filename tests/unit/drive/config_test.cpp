@@ -527,8 +527,8 @@ TEST(Config, ModelReferenceLoopAndSpeed)
         EXPECT_NEAR(real(c.position.second_harmonic.k_i), 2 * r * r / W / W, 1e-7);
         EXPECT_NEAR(real(c.position.second_harmonic.k_1), std::pow(r / W, 3), 1e-7);
         EXPECT_NEAR(real(c.position.second_harmonic.mu, 32), 40 * T, 1e-8);
-        EXPECT_NEAR(real(c.speed_estimate.per_turn, 26), 2 * M_PI / (6e-3 * W), 1e-6);
-        EXPECT_NEAR(real(c.speed_estimate.k_mean, 32), 2 * M_PI * 5e-3, 1e-8);
+        EXPECT_NEAR(real(c.position.speed.per_turn, 26), 2 * M_PI / (6e-3 * W), 1e-6);
+        EXPECT_NEAR(real(c.position.speed.k_mean, 32), 2 * M_PI * 5e-3, 1e-8);
     }
 }
 

@@ -56,7 +56,7 @@ class Closed
             }
             if (s == DRIVE_OFF || s == DRIVE_CALIBRATING || s == DRIVE_FAULT) {
                 driven_while_off +=
-                    driven && loop.app.periods % 10 != 1 ? 1 : 0; // it changes after this step
+                    driven && loop.app.drive.period % 10 != 1 ? 1 : 0; // it changes after this step
             }
         }
     }

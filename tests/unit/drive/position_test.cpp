@@ -27,6 +27,7 @@ constexpr double kLow = 0.12, kHigh = 0.24;
 
 // Where the voltage acts does not matter here.
 constexpr pm_dir_t kNoTurn = {PM_UNIT_MAX, 0};
+constexpr pm_ab_t kNoVoltage = {0, 0};
 
 pm_pll_config_t loop(double hertz)
 {
@@ -154,7 +155,7 @@ class Running
             if (imposed != nullptr && k % 10 == 0) {
                 position_force(&self, &c_, imposed);
             }
-            position_step(&self, &c_, in.v, in.i, kNoTurn, &out);
+            position_step(&self, &c_, &in.v, in.i, &kNoTurn, &out);
             if (k % 10 == 9) {
                 position_slow(&self, &c_, in.i, out.i);
             }
@@ -211,7 +212,7 @@ TEST(Position, QualityFallsWithoutAVoltageOrACurrentThatFits)
     int ms = 0;
     for (; r.self.quality > 0 && ms < 500; ++ms) {
         for (int k = 0; k < 10; ++k) {
-            position_step(&r.self, &c, {0, 0}, {0, 0}, kNoTurn, &r.out);
+            position_step(&r.self, &c, &kNoVoltage, {0, 0}, &kNoTurn, &r.out);
         }
         position_slow(&r.self, &c, {0, 0}, r.out.i);
     }
@@ -226,7 +227,7 @@ TEST(Position, QualityFallsWithoutTheCarrier)
     for (; self.quality > 0 && ms < 500; ++ms) {
         for (int k = 0; k < 10; ++k) {
             position_out_t out;
-            position_step(&self, &c, {0, 0}, {0, 0}, kNoTurn, &out);
+            position_step(&self, &c, &kNoVoltage, {0, 0}, &kNoTurn, &out);
         }
         position_slow(&self, &c, {0, 0}, {0, 0});
     }
