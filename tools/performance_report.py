@@ -29,13 +29,23 @@ def output(command):
     return subprocess.run(command, check=True, cwd=ROOT, capture_output=True, text=True).stdout
 
 
-def count_step(folder):
-    """Mode -> {mean, max} of the instructions of drive_step() under QEMU."""
+def count_step(folder, image):
+    """Mode -> {mean, max} of the instructions of an image's drive_step() under QEMU."""
     record = folder / "demo.rec"
     output([PMSIM, "record", SCENARIOS / "demo.yaml", "--out", record])
-    elf = TARGET / "tests/target/drive/drive_replay.elf"
+    elf = TARGET / f"tests/target/drive/drive_replay_{image.name}.elf"
     return json.loads(output([sys.executable, ROOT / "tests/target/count.py", elf, "--function", "step_*", "--json", "-",
                               "--", record]))["functions"]
+
+
+def step_rows(steps):
+    for what, key, budget in (("active flux, high speed", "step_flux", "drive_step_flux"),
+                              ("square-wave injection", "step_injection", "drive_step_injection"),
+                              ("off, calibration, pulses", "step_start", None)):
+        row = [what]
+        for image, step in steps:
+            row += [f"{step[key]['mean']:.0f}", f"{step[key]['max']}", f"{image.budgets[budget]}" if budget else ""]
+        yield row
 
 
 def run_board(folder, *words, image=SMALL):
@@ -100,7 +110,7 @@ def observer_rows(folder):
 def main():
     with tempfile.TemporaryDirectory(prefix="pm_performance") as name:
         folder = Path(name)
-        step = count_step(folder)
+        steps = [(image, count_step(folder, image)) for image in IMAGES]
         demo = run_board(folder, SCENARIOS / "demo.yaml")
         fast = run_board(folder, *FAST)
         modes = run_board(folder, MODES_RUN)
@@ -118,18 +128,17 @@ def main():
                         for x in ("mean", "worst")), *traced]
 
     parts = [
-        table(["`drive_step()`, executed instructions", "mean", "worst", "budget, mean"],
-              [["active flux, high speed", f"{step['step_flux']['mean']:.0f}", f"{step['step_flux']['max']}", "300"],
-               ["square-wave injection", f"{step['step_injection']['mean']:.0f}", f"{step['step_injection']['max']}", "380"],
-               ["off, calibration, pulses", f"{step['step_start']['mean']:.0f}", f"{step['step_start']['max']}", ""]]),
-        table(["whole control interrupt, with its register accesses", "mean", "worst", "cycles, mean", "cycles, worst"],
+        table(["`drive_step()`, executed instructions",
+               *(f"`{image.name}`, {word}" for image in IMAGES for word in ("mean", "worst", "budget, mean"))],
+              step_rows(steps)),
+        table(["whole control interrupt of `small`, with its register accesses", "mean", "worst", "cycles, mean", "cycles, worst"],
               [["active flux, high speed", *mode("flux")], ["square-wave injection", *mode("injection")],
                ["initial-position pulses", *mode("pulses")],
                ["all of the demonstration; budget 420 and 480", f"{demo['control.mean']:.0f}",
                 f"{demo['control.worst']:.0f}", f"{demo['control.cycles']:.0f}", f"{demo['control.cycles_worst']:.0f}"],
                ["1 kHz interrupt (speed, state machine)", f"{demo['slow.mean']:.0f}", f"{demo['slow.worst']:.0f}",
                 f"{demo['slow.cycles']:.0f}", f"{demo['slow.cycles_worst']:.0f}"]]),
-        table(["whole control interrupt by mode; budget 420 and 480", "mean", "worst", "mean, traced", "worst, traced"],
+        table(["whole control interrupt of `small` by mode; budget 420 and 480", "mean", "worst", "mean, traced", "worst, traced"],
               [by_mode(key, what) for key, what in MODES]),
         table(["at 20 kHz, 170 MHz", "measured", "budget"],
               [["worst control interrupt, share of the period", f"{fast['control.worst_percent']:.1f} %", "12 %"],

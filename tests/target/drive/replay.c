@@ -67,20 +67,45 @@ static void give(const record_period_t *r)
     }
 }
 
+static bool read_param(FILE *file, int32_t *value, uint32_t *count)
+{
+    (*count)++;
+    return fread(value, sizeof *value, 1, file) == 1;
+}
+
+/* The host recorded all; those that an image does not have are left out. */
+static bool read_params(FILE *file, drive_params_t *params, uint32_t expected)
+{
+    bool good = true;
+    uint32_t count = 0;
+    int32_t absent;
+#define PM_PARAM(name, unit, exp10, min, def, max, help)                                                     \
+    good = good && read_param(file, &params->name, &count);
+#define PM_NO_PARAM(name) good = good && read_param(file, &absent, &count);
+#include "firmware/params/parameters.def"
+#undef PM_PARAM
+    (void)absent;
+    params->absent = 0;
+    return good && count == expected;
+}
+
 static bool open_record(FILE *file, record_header_t *header)
 {
     drive_params_t params;
     if (fread(header, sizeof *header, 1, file) != 1 ||
         memcmp(header->magic, RECORD_MAGIC, sizeof header->magic) != 0 ||
-        header->parameters != DRIVE_PARAM_COUNT || header->period_bytes != sizeof(record_period_t)) {
+        header->period_bytes != sizeof(record_period_t)) {
         return false;
     }
-    return fread(&params, sizeof(int32_t), DRIVE_PARAM_COUNT, file) == DRIVE_PARAM_COUNT &&
-           drive_init(&drive, &params, PM_CHANNELS).ok;
+    return read_params(file, &params, header->parameters) && drive_init(&drive, &params, PM_CHANNELS).ok;
 }
 
+/* Of a program with all methods; another has less memory. */
 static bool same_layout(const record_header_t *header)
 {
+    if (header->parameters != DRIVE_PARAM_COUNT) {
+        return true;
+    }
     uint32_t layout[RECORD_LAYOUT];
     record_layout(layout);
     bool same = true;
