@@ -22,8 +22,7 @@
 #define INJECTION_INJECTION_H
 
 #include "firmware/math/image.h"
-#include "injection/pulsating_square.h"
-#include "injection/rotating_sine.h"
+#include "injection/methods.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -23,17 +23,7 @@
 #define OBSERVERS_OBSERVER_H
 
 #include "firmware/math/image.h"
-#include "observers/active_flux.h"
-#include "observers/back_emf.h"
-#include "observers/ekf_full.h"
-#include "observers/ekf_reduced.h"
-#include "observers/extended_emf.h"
-#include "observers/extended_emf_ab.h"
-#include "observers/flux_linkage.h"
-#include "observers/mras_current.h"
-#include "observers/mras_simple.h"
-#include "observers/mras_voltage.h"
-#include "observers/sliding_mode.h"
+#include "observers/methods.h"
 
 #ifdef __cplusplus
 extern "C" {

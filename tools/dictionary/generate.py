@@ -12,6 +12,9 @@ FAULTS = "firmware/drive/fault.def"
 PACKAGE = "tools/pmdrive/pmdrive"
 BYTES = "firmware/can/dictionary_bytes.c"
 LEDGER = "firmware/params/allocations.txt"
+# Lists whose methods are all beside them: METHODS_H of the folder has their headers.
+LISTS = "observers/observers.def", "injection/injections.def"
+METHODS_H = "methods.h"
 # Beside a method x.h stands x.yaml with its parameters.
 METHODS = "observers/*.yaml", "injection/**/*.yaml", "bldc/**/*.yaml", "firmware/control/*.yaml", "firmware/drive/**/*.yaml"
 
@@ -28,7 +31,9 @@ def _environment():
 
 
 def _c_files(render, dictionary, sheet):
-    of_image = emit_c.image_methods(dictionary, methods.known(ROOT))
+    known = methods.known(ROOT)
+    of_image = emit_c.image_methods(dictionary, known)
+    _headers(render, known)
     groups = [(obj.name, emit_c.runs([e for e in obj.entries if e.lives == "parameter"], of_image)) for obj in dictionary.objects
              if obj.entries[-1].lives == "parameter" and not obj.entries[-1].alias]
     render("firmware/params/parameters.def", "parameters.def.j2", parts=groups)
@@ -42,6 +47,13 @@ def _c_files(render, dictionary, sheet):
            values=emit_c.all_values(dictionary), schema=emit_c.schema(dictionary))
     render(BYTES, "dictionary_bytes.c.j2",
            constants=emit_c.constants(dictionary, sheet))
+
+
+def _headers(render, known):
+    for path in LISTS:
+        folder = path.rpartition("/")[0]
+        render(f"{folder}/{METHODS_H}", "methods.h.j2", list=path, folder=folder, guard=f"{folder.upper()}_METHODS_H",
+               methods=sorted(name for name, found in known.items() if found == path))
 
 
 def stored_eds(text):

@@ -44,7 +44,7 @@ TEST(BoardRun, ArmsAndItsCompareValuesAreTheDrives)
     for (int n = 0; n < 20; n++) {
         b.run_ms(0.1); // its end is the update event that takes over what the control interrupt has written
         const tim1_t *tim = &board_inside(b.board)->tim1;
-        for (int leg = 0; leg < DRIVE_LEGS; leg++) {
+        for (uint32_t leg = 0; leg < DRIVE_LEGS; leg++) {
             EXPECT_EQ(tim->compare[leg], b.watched()->out.compare[leg][0]);
             EXPECT_EQ(pm_leg(b.watched()->out.legs, leg), PM_LEG_PWM);
         }
