@@ -213,8 +213,8 @@ bool app_save(hal_t *hal, const drive_params_t *params)
 static void rest_slow(app_t *app, bool rest)
 {
     hal_lock(app->hal);
-    app->slow_at =
-        app->drive.period + (rest ? UINT32_MAX : app->slow_divider); /* the former would take days */
+    /* a period that has passed comes again in days */
+    app->slow_at = rest ? app->drive.period - 1U : app->drive.period + app->slow_divider;
     hal_unlock(app->hal);
 }
 

@@ -11,8 +11,8 @@
  *   trace_put(), trace_get(), trace_read()       thread: objects 3100h to 3103h by slot (OD_LIVE_...)
  *
  * Order: set up, arm (command 1), wait for state 4, upload. While armed, settings are refused. The divider
- * counts calls per sample. `pretrigger` permille of the length lie before the trigger, at least one, and at least one behind it. Level and edge compare
- * successive samples of the trigger signal. Tests: tests/unit/can/trace_test.cpp. */
+ * counts calls per sample. `pretrigger` permille of the length lie before the trigger, at least one sample, and at
+ * least one behind it. Level and edge compare successive samples of the trigger signal. Tests: tests/unit/can/trace_test.cpp. */
 #ifndef CAN_TRACE_H
 #define CAN_TRACE_H
 

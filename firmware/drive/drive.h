@@ -45,7 +45,7 @@ typedef struct {
 
 typedef struct {
     /* timer counts of the rising- and falling-edge half of the carrier: on-time of the upper switch in that
-     * half */
+     * half; the second is written only in programs that carry NEEDS_HALVES */
     uint16_t compare[DRIVE_LEGS][2];
     uint16_t legs; /* PM_LEGS_... */
     uint16_t trip; /* 1, a fault: the port opens the bridge now, not at the update event */
