@@ -12,7 +12,8 @@
  *
  * Order: set up, arm (command 1), wait for state 4, upload. While armed, settings are refused. The divider
  * counts calls per sample. `pretrigger` permille of the length lie before the trigger, at least one sample, and at
- * least one behind it. Level and edge compare successive samples of the trigger signal. Tests: tests/unit/can/trace_test.cpp. */
+ * least one behind it. Level and edge compare successive samples of the trigger signal.
+ * Tests: tests/unit/can/trace_test.cpp. */
 #ifndef CAN_TRACE_H
 #define CAN_TRACE_H
 
