@@ -196,6 +196,9 @@ const char *config_sensor_fault(const plant_sensor_t *s, double period_s)
             "sensor.comparator_reference must be mean, half_link or neutral")
     REQUIRE(not_negative(s->comparator_blanking_s) && s->comparator_blanking_s < period_s,
             "sensor.comparator_blanking_s must be less than a PWM period and not negative")
+    REQUIRE(not_negative(s->i_dc_full_scale_A) && not_negative(s->i_dc_filter_s) &&
+                isfinite(s->i_dc_gain_error) && isfinite(s->i_dc_offset_A),
+            "sensor.i_dc_*: range and filter must be finite and not negative, gain error and offset finite")
     REQUIRE(isfinite(s->v_dc_offset_V) && isfinite(s->v_zero_offset_V) && isfinite(s->v_zero_gain_error),
             "sensor: offsets and gain errors must be finite")
     REQUIRE(not_negative(s->i_filter_s) && not_negative(s->v_zero_filter_s),

@@ -89,7 +89,7 @@ double steps_locate(const circuit_t *c, double h_late, steps_retake_t *retake, c
 
 static void lag_inputs(const circuit_t *c, const point_t *p, const circuit_nodes_t *nodes, lagged_t *inputs)
 {
-    *inputs = (lagged_t){{0.0}, {0.0}};
+    *inputs = (lagged_t){.i_dc_A = nodes->i_dc_A};
     for (int set = 0; set < c->machine.winding.sets; set++) {
         inputs->v_zero_V[set] = lags_zero_V(&c->lags, set, nodes->v_zero_V[set], nodes->v_leg_V);
     }

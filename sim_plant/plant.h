@@ -51,6 +51,7 @@ typedef struct {
     uint16_t v_leg[PLANT_LEGS];
     uint16_t v_neutral[PLANT_SETS];
     uint16_t v_zero[PLANT_SETS]; /* mid-scale is none */
+    uint16_t i_dc;               /* of a sensor beside those of the legs; mid-scale is none */
     uint16_t temperature;
     uint8_t settled; /* bit k: i_leg[k] was sampled in its valid window */
 } plant_adc_t;

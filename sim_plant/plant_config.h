@@ -136,6 +136,10 @@ typedef struct {
     double v_zero_filter_s;                  /* RC; 0: none */
     double v_zero_noise_lsb;                 /* rms, of its own converter; */
     int v_zero_bits;                         /* 0: bits */
+    /* Sensor of the DC-link current beside those of the legs (i_dc_A of plant_truth_t). */
+    double i_dc_full_scale_A;              /* codes span -fs ... +fs; 0: the board has none */
+    double i_dc_gain_error, i_dc_offset_A; /* relative; behind the gain */
+    double i_dc_filter_s;                  /* RC; 0: none */
 } plant_sensor_t;
 
 typedef struct map_table map_table_t; /* map_table.h */

@@ -116,6 +116,10 @@ const std::vector<Field> &setup_fields()
         PM_FIELD("sensor", "v_zero_filter_s", 0, 10e-3, optional, plant.sensor.v_zero_filter_s),
         PM_FIELD("sensor", "v_zero_noise_lsb", 0, 100, optional, plant.sensor.v_zero_noise_lsb),
         PM_FIELD("sensor", "v_zero_bits", 0, 16, optional, plant.sensor.v_zero_bits),
+        PM_FIELD("sensor", "i_dc_full_scale_A", 0, 1e5, optional, plant.sensor.i_dc_full_scale_A),
+        PM_FIELD("sensor", "i_dc_gain_error", -1, 1, optional, plant.sensor.i_dc_gain_error),
+        PM_FIELD("sensor", "i_dc_offset_A", -1e5, 1e5, optional, plant.sensor.i_dc_offset_A),
+        PM_FIELD("sensor", "i_dc_filter_s", 0, 10e-3, optional, plant.sensor.i_dc_filter_s),
         PM_FIELD("sensor", "t_full_scale_degC", 0, 1e3, optional, plant.sensor.t_full_scale_degC),
 
         PM_FIELD("dclink", "v_source_V", 0, 2000, optional, plant.dclink.v_source_V),

@@ -63,7 +63,8 @@ TEST(WindingSection, ValuesReachThePlant)
                 "inverter: {turn_off_s: 1.0e-7, c_leg_F: 2.0e-9}\n"
                 "sensor: {shunt: low_side, neutral_divider_error: [0.02], divider_error: [0.01, 0, 0],\n"
                 "  comparator_reference: half_link, comparator_offset_V: [0, 0, -0.1], "
-                "comparator_blanking_s: 2.0e-6}\n"
+                "comparator_blanking_s: 2.0e-6,\n"
+                "  i_dc_full_scale_A: 20, i_dc_filter_s: 1.0e-4}\n"
                 "dclink: {ripple_V: 3, ripple_Hz: 300}\n")
             .plant;
     EXPECT_EQ(plant.winding.emf[0].order, 5);
@@ -84,6 +85,8 @@ TEST(WindingSection, ValuesReachThePlant)
     EXPECT_EQ(plant.sensor.comparator_reference, PLANT_REFERENCE_HALF_LINK);
     EXPECT_EQ(plant.sensor.comparator_offset_V[2], -0.1);
     EXPECT_EQ(plant.sensor.comparator_blanking_s, 2.0e-6);
+    EXPECT_EQ(plant.sensor.i_dc_full_scale_A, 20.0);
+    EXPECT_EQ(plant.sensor.i_dc_filter_s, 1.0e-4);
     EXPECT_EQ(plant.sensor.divider_error[0], 0.01);
     EXPECT_EQ(plant.sensor.divider_error[PLANT_LEGS], 0.02);
     EXPECT_EQ(plant.dclink.ripple_Hz, 300.0);

@@ -187,6 +187,8 @@ const Garbage garbage[] = {
          c.winding.connection = PLANT_OPEN;
          c.winding.L_0_H = 5e-3;
      }},
+    {"i_dc_", [](plant_config_t &c) { c.sensor.i_dc_filter_s = -1e-6; }},
+    {"i_dc_", [](plant_config_t &c) { c.sensor.i_dc_offset_A = nan; }},
     {"comparator_offset_V", [](plant_config_t &c) { c.sensor.comparator_offset_V[1] = inf; }},
     {"comparator_blanking_s", [](plant_config_t &c) { c.sensor.comparator_blanking_s = 100e-6; }},
     {"comparator_blanking_s", [](plant_config_t &c) { c.sensor.comparator_blanking_s = -1e-6; }},
