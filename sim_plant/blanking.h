@@ -1,8 +1,8 @@
 /* Blanking of the terminal comparators after commanded switching edges (METHODS.md 0.2 E18).
  *
- * A window begins with each edge and ends length_s later; windows that overlap are one. Times are seconds since
- * the start of the period. An edge may be announced before the circuit gets there, in order of time. What lies
- * less than 0.1 ns ahead of an edge belongs to its window, as the circuit's time is a sum of steps.
+ * A window begins with each edge and ends length_s later; windows that overlap are one. Times are seconds
+ * since the start of the period. An edge may be announced before the circuit gets there, in order of time.
+ * What lies less than 0.1 ns ahead of an edge belongs to its window, as the circuit's time is a sum of steps.
  * Tests: blanking_test.cpp. */
 #ifndef PLANT_BLANKING_H
 #define PLANT_BLANKING_H

@@ -96,8 +96,8 @@ typedef struct {
 
 typedef enum { PLANT_IN_LINE, PLANT_LOW_SIDE, PLANT_SINGLE_SHUNT } plant_shunt_t;
 
-/* What the comparator of a terminal compares with: mean of the terminals of its set, half the DC-link voltage,
- * or the star point of its set, which an open winding does not have. */
+/* What the comparator of a terminal compares with: mean of the terminals of its set, half the DC-link
+ * voltage, or the star point of its set, which an open winding does not have. */
 typedef enum { PLANT_REFERENCE_MEAN, PLANT_REFERENCE_HALF_LINK, PLANT_REFERENCE_NEUTRAL } plant_reference_t;
 
 typedef struct {

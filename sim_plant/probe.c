@@ -185,8 +185,8 @@ static void unblank(probe_t *probe, int k, double from_s, double to_s)
     }
 }
 
-/* Over a stretch of the step in which the response moves one way only. *seen_s: the comparator's last change, or
- * the start of the step. */
+/* Over a stretch of the step in which the response moves one way only. *seen_s: the comparator's last change,
+ * or the start of the step. */
 static void compare(probe_t *probe, int k, const step_t *step, const response_t *response, double from,
                     double from_V, double to, double to_V, double *seen_s)
 {

@@ -12,14 +12,14 @@
  *   (1 + divider_error) v_k - v_ref + comparator_offset_V
  *
  * with v_ref behind the same RC: the mean of the terminals of its set of three, a virtual neutral without
- * error; half the DC-link voltage; or the neutral of its set, with the error of that divider. It goes high above
- * +hysteresis_V / 2 and low below the negative of that, and starts low. The instant is that of the exact
- * response, rounded down to counts of capture_s; an instant on a count but for rounding belongs to that count.
- * While it is blanked (blanking.h) a comparator goes on, but its output to the timer holds; where the two differ
- * at the end of the window, the edge has that instant.
+ * error; half the DC-link voltage; or the neutral of its set, with the error of that divider. It goes high
+ * above +hysteresis_V / 2 and low below the negative of that, and starts low. The instant is that of the
+ * exact response, rounded down to counts of capture_s; an instant on a count but for rounding belongs to that
+ * count. While it is blanked (blanking.h) a comparator goes on, but its output to the timer holds; where the
+ * two differ at the end of the window, the edge has that instant.
  *
- * Divider, filter, reference and timer are those at init. Cost of three legs: about 50 ns a step, and 0.2 us an
- * edge behind a filter. Tests: probe_test.cpp, capture_test.cpp. */
+ * Divider, filter, reference and timer are those at init. Cost of three legs: about 50 ns a step, and 0.2 us
+ * an edge behind a filter. Tests: probe_test.cpp, capture_test.cpp. */
 #ifndef PLANT_PROBE_H
 #define PLANT_PROBE_H
 

@@ -18,8 +18,8 @@
  *
  *   share of full scale = ((1 + v_zero_gain_error) v / (1 + network/(3 load)) + v_zero_offset) / full scale
  *
- * with converter steps and noise of its own, drawn after those before. It reads mid-scale where there is none.
- * So does the sensor of the link current, which has the noise of the legs' and is drawn last.
+ * with converter steps and noise of its own, drawn after those before. It reads mid-scale where there is
+ * none. So does the sensor of the link current, which has the noise of the legs' and is drawn last.
  *
  * The noise is Gaussian from a generator of its own: equal seeds give equal runs. Drawn in the order i_leg,
  * v_dc, v_leg, v_neutral; the last two only with v_leg_full_scale_V > 0, else they have no noise.

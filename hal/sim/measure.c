@@ -50,8 +50,8 @@ static void fill_samples(const hal_t *hal, pm_measure_t *more)
     }
 }
 
-/* Star point against the mean of the terminals. The plant's differential channel sees the opposite; without it
- * the difference of the channels takes its place, half of the code's range on either side. */
+/* Star point against the mean of the terminals. The plant's differential channel sees the opposite; without
+ * it the difference of the channels takes its place, half of the code's range on either side. */
 static uint16_t neutral_code(const plant_adc_t *adc, const plant_sensor_t *sensor)
 {
     if (sensor->v_zero_full_scale_V > 0.0) {

@@ -209,7 +209,7 @@ class PlantRun
         }
         append(text_, t_s_[row], ',');
         for (size_t leg = 0; leg < legs_; ++leg) {
-            append(text_, truth.i_A[leg], ',');
+            append(text_, truth.i_A[leg] + 0.0, ','); // not -0
         }
         append(text_, truth.theta_e_rad, ',');
         append(text_, speed_rad_s_ != nullptr ? (*speed_rad_s_)[row] : truth.omega_mech_rad_s, ',');

@@ -1,8 +1,8 @@
 // The plant alone, driven by given phase voltages: `pmsim plant`.
 //
 // Input and output columns: docs/pmsim.md. A row's voltages and load hold until the next row; an imposed
-// speed moves linearly between rows. Terminals that float are off the sources. Output: the state at each row's
-// time, as CSV text.
+// speed moves linearly between rows. Terminals that float are off the sources. Output: the state at each
+// row's time, as CSV text.
 // Tests: tests/unit/pmsim/plant_run_test.cpp, plant_command_test.py.
 #ifndef PMSIM_PLANT_RUN_H
 #define PMSIM_PLANT_RUN_H
@@ -16,7 +16,8 @@
 namespace pmsim
 {
 
-// Terminals by their names a b c x y z, bit k for leg k; throws InputError for one that the machine does not have.
+// Terminals by their names a b c x y z, bit k for leg k; throws InputError for one that the machine does not
+// have.
 unsigned floating_legs(const std::vector<std::string> &names, const Setup &setup);
 
 // Terminals that float need no voltage.

@@ -201,7 +201,8 @@ TEST(SimChannels, NeutralOfTheDifferentialAmplifier)
     EXPECT_TRUE(low && high);
 }
 
-// What a held pair takes comes from the link; with all legs low, as in the middle of a zero vector, nothing does.
+// What a held pair takes comes from the link; with all legs low, as in the middle of a zero vector, nothing
+// does.
 TEST(SimChannels, LinkCurrentOfAHeldPair)
 {
     plant_config_t config = machine();
@@ -226,7 +227,8 @@ TEST(SimChannels, LinkCurrentOfAHeldPair)
 }
 
 // Leg a chopped against b, c off, rotor locked, at a duty d: from the upper rail d v_dc/(2 R) flows, to it
-// (1 - d) v_dc/(2 R); a leg whose switch leads to the rail of b's carries nothing, which both switches would change.
+// (1 - d) v_dc/(2 R); a leg whose switch leads to the rail of b's carries nothing, which both switches would
+// change.
 TEST(SimChannels, OneSwitchOfALeg)
 {
     plant_config_t config = plants::spm_400();
@@ -252,7 +254,8 @@ TEST(SimChannels, OneSwitchOfALeg)
         for (int k = 0; k < 300; ++k) { // twenty time constants
             port.step();
         }
-        // at the middle of a half of the pulse pattern the current is the mean, but for a hundredth of the ripple
+        // at the middle of a half of the pulse pattern the current is the mean, but for a hundredth of the
+        // ripple
         EXPECT_NEAR(port.in.i_leg[0], current_code(c.i_A), 0.002 * 32768) << c.a << c.b;
     }
 }

@@ -143,8 +143,8 @@ Csv run_floating(const PlantFile &file, const std::string &input, const std::vec
     return Csv::from_text(out, "out.csv", {split(out.substr(0, out.find('\n')), ','), {}});
 }
 
-// a and b in series, c off, rotor at 0: psi_a = L_d i, psi_b = -(L_d + L_q) i/2, psi_c = (L_q - L_d) i/2, so that
-// v = 2 R i + (3 L_d + L_q)/2 di/dt; the star point is at v - R i - L_d di/dt, c above it by dpsi_c/dt.
+// a and b in series, c off, rotor at 0: psi_a = L_d i, psi_b = -(L_d + L_q) i/2, psi_c = (L_q - L_d) i/2, so
+// that v = 2 R i + (3 L_d + L_q)/2 di/dt; the star point is at v - R i - L_d di/dt, c above it by dpsi_c/dt.
 TEST(PlantRun, FloatingTerminalShowsTheSaliency)
 {
     const PlantFile file = plant(linear, {{"mechanics.locked", "true"}});

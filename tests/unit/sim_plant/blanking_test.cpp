@@ -58,8 +58,8 @@ struct Edge {
     bool rising;
 };
 
-// A comparator of terminal 0 against the mean along straight lines between the points {t, v}, with a commanded edge
-// at 10 us; the window ends at 12 us.
+// A comparator of terminal 0 against the mean along straight lines between the points {t, v}, with a
+// commanded edge at 10 us; the window ends at 12 us.
 std::vector<Edge> seen(const std::vector<std::pair<double, double>> &points)
 {
     plant_sensor_t sensor{};
@@ -166,7 +166,7 @@ TEST_F(BlankedBridge, AShortPulseIsHidden)
     EXPECT_TRUE(run(0.02, 3e-6).empty());
 }
 
-// A window that goes on in the next period: the falling edge at 97.5 us is seen at 2.5 us, before the rising one.
+// A window that goes on in the next period: the falling edge at 96 us is seen at 1 us of that.
 TEST_F(BlankedBridge, WindowsCrossTheEndOfThePeriod)
 {
     const std::vector<Edge> edges = run(0.95, 5e-6);

@@ -1,5 +1,5 @@
-// Edges of the terminal comparators of an undriven machine against the instants that follow from its EMF, for each
-// reference, with an offset.
+// Edges of the terminal comparators of an undriven machine against the instants that follow from its EMF, for
+// each reference, with an offset.
 #include "rig.h"
 
 #include <gtest/gtest.h>
@@ -101,8 +101,8 @@ double emf_V(const plant_config_t &c, int k, double theta_e)
     return -omega_e * (c.machine.psi_m_Wb * std::sin(own) + h.order * h.amplitude * std::sin(h.order * own));
 }
 
-// The potential of terminals that are tied to nothing is centred between the rails: terminal k lies at v_dc/2 +
-// e_k - (e_max + e_min)/2, which is v_dc/2 + 1.5 e_k while it is the middle one.
+// The potential of terminals that are tied to nothing is centred between the rails: terminal k lies at v_dc/2
+// + e_k - (e_max + e_min)/2, which is v_dc/2 + 1.5 e_k while it is the middle one.
 TEST(Capture, HalfLinkWithOffset)
 {
     for (double offset_V : {0.0, 6.0, -9.0}) {
@@ -146,8 +146,8 @@ TEST(Capture, DividersOfTerminalAndNeutral)
     expect_same(edges_of_leg(0, config), crossings(seen_V), 4);
 }
 
-// A terminal at 100 V while the link rises from 180 V by 8 V/us, both behind the RC: the reference is 90 V + 4 V/us
-// (t - tau (1 - e^(-t/tau))).
+// A terminal at 100 V while the link rises from 180 V by 8 V/us, both behind the RC: the reference is 90 V +
+// 4 V/us (t - tau (1 - e^(-t/tau))).
 TEST(Capture, HalfLinkMovesWithTheLink)
 {
     constexpr double slope_V_s = 4e6, duration_s = 10e-6;

@@ -215,9 +215,9 @@ TEST(InLineAmplifier, IsNoneForOtherShunts)
     EXPECT_THROW(rig::Plant plant(config), std::invalid_argument);
 }
 
-// In the steady state at a duty the link's current, i for the share d of the period about its middle, is behind the RC
-// what a periodic pulse makes of it: y = i (e^{x (1+d)/2} - e^{x (1-d)/2})/(e^x - 1) at the period's end, x = T/tau.
-// The ripple of the current, of L/R = 8.7 ms, is odd about that middle.
+// In the steady state at a duty the link's current, i for the share d of the period about its middle, is
+// behind the RC what a periodic pulse makes of it: y = i (e^{x (1+d)/2} - e^{x (1-d)/2})/(e^x - 1) at the
+// period's end, x = T/tau. The ripple of the current, of L/R = 8.7 ms, is odd about that middle.
 TEST(LinkSensor, ShowsPulsesBehindItsFilter)
 {
     constexpr double duty = 0.3, T = 100e-6;
