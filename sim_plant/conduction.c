@@ -142,7 +142,9 @@ bool circuit_switch_early(circuit_t *c, const gates_t *gates, unsigned legs, dou
 void circuit_sources(circuit_t *c, const double v_leg_V[])
 {
     for (int k = 0; k < c->bridge.legs; k++) {
-        bridge_put(&c->bridge, k, LEG_SOURCE);
+        if (!c->bridge.off_wire[k]) {
+            bridge_put(&c->bridge, k, LEG_SOURCE);
+        }
         c->bridge.v_source_V[k] = v_leg_V[k];
     }
     circuit_summarise(c);

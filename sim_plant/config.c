@@ -191,6 +191,14 @@ const char *config_sensor_fault(const plant_sensor_t *s, double period_s)
             "sensor: full scales must be finite and not negative")
     REQUIRE(not_negative(s->filter_s) && not_negative(s->hysteresis_V) && not_negative(s->capture_s),
             "sensor.filter_s, hysteresis_V and capture_s must be finite and not negative")
+    REQUIRE(s->comparator_reference >= PLANT_REFERENCE_MEAN &&
+                s->comparator_reference <= PLANT_REFERENCE_NEUTRAL,
+            "sensor.comparator_reference must be mean, half_link or neutral")
+    REQUIRE(not_negative(s->comparator_blanking_s) && s->comparator_blanking_s < period_s,
+            "sensor.comparator_blanking_s must be less than a PWM period and not negative")
+    REQUIRE(not_negative(s->i_dc_full_scale_A) && not_negative(s->i_dc_filter_s) &&
+                isfinite(s->i_dc_gain_error) && isfinite(s->i_dc_offset_A),
+            "sensor.i_dc_*: range and filter must be finite and not negative, gain error and offset finite")
     REQUIRE(isfinite(s->v_dc_offset_V) && isfinite(s->v_zero_offset_V) && isfinite(s->v_zero_gain_error),
             "sensor: offsets and gain errors must be finite")
     REQUIRE(not_negative(s->i_filter_s) && not_negative(s->v_zero_filter_s),
@@ -206,6 +214,7 @@ const char *config_sensor_fault(const plant_sensor_t *s, double period_s)
                 "sensor.v_zero_network_error must be finite and above -1")
         REQUIRE(isfinite(s->gain_error[k]), "sensor.gain_error must be finite")
         REQUIRE(isfinite(s->offset_A[k]), "sensor.offset_A must be finite")
+        REQUIRE(isfinite(s->comparator_offset_V[k]), "sensor.comparator_offset_V must be finite")
     }
     for (int n = 0; n < PLANT_LEGS + PLANT_SETS; n++) {
         REQUIRE(s->divider_error[n] > -1.0 && isfinite(s->divider_error[n]),
@@ -224,6 +233,10 @@ const char *config_fault(const plant_config_t *config)
     fault = fault ? fault : config_sensor_fault(&config->sensor, 1.0 / config->inverter.f_pwm_Hz);
     if (!fault && config->winding.r_winding_ohm > 0.0 && config->inverter.c_leg_F == 0.0) {
         fault = "winding.r_winding_ohm needs inverter.c_leg_F: without it nothing rings";
+    }
+    if (!fault && config->sensor.comparator_reference == PLANT_REFERENCE_NEUTRAL &&
+        config->winding.connection == PLANT_OPEN) {
+        fault = "sensor.comparator_reference: an open winding has no neutral";
     }
     double tolerance = config->tolerance;
     if (!fault && tolerance != 0.0 && !(tolerance >= 1e-12 && tolerance <= 1e-2)) {

@@ -89,7 +89,7 @@ double steps_locate(const circuit_t *c, double h_late, steps_retake_t *retake, c
 
 static void lag_inputs(const circuit_t *c, const point_t *p, const circuit_nodes_t *nodes, lagged_t *inputs)
 {
-    *inputs = (lagged_t){{0.0}, {0.0}};
+    *inputs = (lagged_t){.i_dc_A = nodes->i_dc_A};
     for (int set = 0; set < c->machine.winding.sets; set++) {
         inputs->v_zero_V[set] = lags_zero_V(&c->lags, set, nodes->v_zero_V[set], nodes->v_leg_V);
     }
@@ -101,7 +101,7 @@ static void lag_inputs(const circuit_t *c, const point_t *p, const circuit_nodes
 void steps_probe(circuit_t *c, const point_t *to, double h)
 {
     circuit_nodes_t before, after;
-    double v_before_V[PLANT_LEGS + PLANT_SETS], v_after_V[PLANT_LEGS + PLANT_SETS];
+    double v_before_V[PROBE_CHANNELS], v_after_V[PROBE_CHANNELS];
     circuit_nodes(c, &c->now, &before);
     circuit_nodes(c, to, &after);
     if (lags_active(&c->lags)) {
@@ -117,5 +117,7 @@ void steps_probe(circuit_t *c, const point_t *to, double h)
     memcpy(v_after_V, after.v_leg_V, sizeof after.v_leg_V);
     memcpy(&v_before_V[PLANT_LEGS], before.v_neutral_V, sizeof before.v_neutral_V);
     memcpy(&v_after_V[PLANT_LEGS], after.v_neutral_V, sizeof after.v_neutral_V);
+    v_before_V[PROBE_LINK] = c->now.x[V_DC];
+    v_after_V[PROBE_LINK] = to->x[V_DC];
     probe_advance(&c->probe, c->t_s - c->period_start_s, h, v_before_V, v_after_V);
 }

@@ -48,7 +48,9 @@ void gates_drive(gates_t *gates, const bool driven[], const plant_leg_state_t st
 void gates_off(gates_t *gates)
 {
     gates->next_s = -1.0;
+    gates->commanded = false;
     for (int k = 0; k < gates->legs; k++) {
+        gates->commanded = gates->commanded || gates->leg[k].command != GATE_OFF;
         gates->leg[k].driven = false;
         gates->leg[k].to_drive = false;
         gates->leg[k].command = GATE_OFF;
@@ -133,6 +135,7 @@ static bool update_leg(gates_t *gates, int k, double t_s)
     }
     gate_t command = command_at(gates, k, late_s);
     if (command != gates->leg[k].command) {
+        gates->commanded = true;
         gates->leg[k].command = command;
         gates->leg[k].on_s = closing_at_s(gates, k, command, t_s);
         if (before != GATE_OFF && !gates->leg[k].opening) {
@@ -156,6 +159,7 @@ unsigned gates_update(gates_t *gates, double t_s)
     unsigned changed = 0u;
     double late_s = t_s + gates->coincident_s;
     double next_s = gates->period_s;
+    gates->commanded = false;
     for (int k = 0; k < gates->legs; k++) {
         if (gates->leg[k].next_s <= late_s) {
             changed |= update_leg(gates, k, t_s) ? 1u << k : 0u;

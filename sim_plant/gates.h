@@ -32,6 +32,7 @@ typedef struct {
     uint32_t timer_counts;
     int legs;
     double edge_s;  /* the last change of any gate */
+    bool commanded; /* the last update, or gates_off(), had a command edge, those to and from off included */
     double drive_s; /* when `driven` becomes `to_drive`, `state` `to_state` */
     double next_s;  /* nothing happens to any leg between the last update and this */
     struct {

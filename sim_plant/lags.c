@@ -6,7 +6,8 @@ void lags_init(lags_t *lags, const plant_sensor_t *sensor, int legs)
 {
     bool in_line = sensor->shunt == PLANT_IN_LINE;
     *lags = (lags_t){.zero_s = sensor->v_zero_full_scale_V > 0.0 ? sensor->v_zero_filter_s : 0.0,
-                     .current_s = in_line ? sensor->i_filter_s : 0.0};
+                     .current_s = in_line ? sensor->i_filter_s : 0.0,
+                     .dc_s = sensor->i_dc_full_scale_A > 0.0 ? sensor->i_dc_filter_s : 0.0};
     for (int first = 0; first < legs; first += 3) {
         double sum = 0.0;
         for (int k = first; k < first + 3; k++) {
@@ -50,5 +51,10 @@ void lags_advance(lags_t *lags, double duration_s, const lagged_t *before, const
         for (int k = 0; k < PLANT_LEGS; k++) {
             advance(&lags->y.i_A[k], gap, 1.0 - gap / constants, before->i_A[k], after->i_A[k]);
         }
+    }
+    if (lags->dc_s > 0.0) {
+        double constants = duration_s / lags->dc_s;
+        double gap = -expm1(-constants);
+        advance(&lags->y.i_dc_A, gap, 1.0 - gap / constants, before->i_dc_A, after->i_dc_A);
     }
 }

@@ -1,5 +1,5 @@
-/* Amplifiers with a bandwidth of their own: the differential channel of each neutral, and shunts in line
- * (METHODS.md 0.2 E8, E12; 11.2).
+/* Amplifiers with a bandwidth of their own: the differential channel of each neutral, shunts in line, and the
+ * sensor of the link current (METHODS.md 0.2 E8, E12; 11.2).
  *
  * Each is time constant * dy/dt = u - y, solved exactly for an input that moves linearly within the step; a
  * time constant of zero is the input itself. The differential channel of a set looks at
@@ -16,11 +16,12 @@
 typedef struct {
     double v_zero_V[PLANT_SETS];
     double i_A[PLANT_LEGS];
+    double i_dc_A;
 } lagged_t;
 
 typedef struct {
-    double zero_s, current_s;   /* 0: none */
-    double unequal[PLANT_LEGS]; /* w_k - 1/3 */
+    double zero_s, current_s, dc_s; /* 0: none */
+    double unequal[PLANT_LEGS];     /* w_k - 1/3 */
     lagged_t y;
 } lags_t;
 
@@ -28,7 +29,7 @@ void lags_init(lags_t *lags, const plant_sensor_t *sensor, int legs);
 
 static inline bool lags_active(const lags_t *lags)
 {
-    return lags->zero_s > 0.0 || lags->current_s > 0.0;
+    return lags->zero_s > 0.0 || lags->current_s > 0.0 || lags->dc_s > 0.0;
 }
 
 /* Input of the differential channel of a set, from its zero sequence and its three terminals. */

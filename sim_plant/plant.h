@@ -51,6 +51,7 @@ typedef struct {
     uint16_t v_leg[PLANT_LEGS];
     uint16_t v_neutral[PLANT_SETS];
     uint16_t v_zero[PLANT_SETS]; /* mid-scale is none */
+    uint16_t i_dc;               /* of a sensor beside those of the legs; mid-scale is none */
     uint16_t temperature;
     uint8_t settled; /* bit k: i_leg[k] was sampled in its valid window */
 } plant_adc_t;
@@ -149,8 +150,8 @@ bool plant_break_held(const plant_t *plant);       /* a comparator sees too much
 /* Comparator edges of the last period, oldest first; returns their number, at most `most` are written. */
 int plant_captured(const plant_t *plant, plant_capture_t captured[], int most);
 
-/* Without inverter: ideal sources hold the legs at the given voltages for that long. `pmsim plant`. With
- * rate_rad_s2 the imposed speed moves linearly. */
+/* Without inverter: ideal sources hold the legs at the given voltages for that long, but terminals that are
+ * off (PLANT_WIRE_OPEN), which float. `pmsim plant`. With rate_rad_s2 the imposed speed moves linearly. */
 void plant_run_voltages(plant_t *plant, const double v_leg_V[], double rate_rad_s2, double duration_s);
 void plant_truth(const plant_t *plant, plant_truth_t *truth);
 

@@ -96,6 +96,10 @@ typedef struct {
 
 typedef enum { PLANT_IN_LINE, PLANT_LOW_SIDE, PLANT_SINGLE_SHUNT } plant_shunt_t;
 
+/* What the comparator of a terminal compares with: mean of the terminals of its set, half the DC-link
+ * voltage, or the star point of its set, which an open winding does not have. */
+typedef enum { PLANT_REFERENCE_MEAN, PLANT_REFERENCE_HALF_LINK, PLANT_REFERENCE_NEUTRAL } plant_reference_t;
+
 typedef struct {
     int bits;              /* 0: ideal converter (no rounding, full-scale still clips) */
     double i_full_scale_A; /* codes span -fs ... +fs */
@@ -110,8 +114,13 @@ typedef struct {
     double v_leg_full_scale_V; /* terminal and neutral channels; 0: the board has none */
     double divider_error[PLANT_LEGS + PLANT_SETS]; /* E12, relative: terminals, then neutrals */
     double filter_s;                               /* RC of those channels; 0: none */
-    double hysteresis_V; /* E18: comparators of terminal k against the mean of the terminals of its set */
-    double capture_s;    /* resolution of the timer that captures their edges */
+    double hysteresis_V;                           /* E18: comparators of the terminals */
+    double capture_s;                              /* resolution of the timer that captures their edges */
+    plant_reference_t comparator_reference;
+    double comparator_offset_V[PLANT_LEGS]; /* added to the difference, ahead of the divider */
+    /* After each commanded edge of any leg nothing is captured for so long, less than a period; a comparator
+     * that differs at the end has its edge there. 0: none */
+    double comparator_blanking_s;
     double t_full_scale_degC;                   /* temperature channel spans -fs ... +fs; 0: 200 */
     double v_dc_offset_V;                       /* added to what the DC link's channel sees, */
     double v_offset_V[PLANT_LEGS + PLANT_SETS]; /* and behind the dividers of terminals and neutrals */
@@ -127,6 +136,10 @@ typedef struct {
     double v_zero_filter_s;                  /* RC; 0: none */
     double v_zero_noise_lsb;                 /* rms, of its own converter; */
     int v_zero_bits;                         /* 0: bits */
+    /* Sensor of the DC-link current beside those of the legs (i_dc_A of plant_truth_t). */
+    double i_dc_full_scale_A;              /* codes span -fs ... +fs; 0: the board has none */
+    double i_dc_gain_error, i_dc_offset_A; /* relative; behind the gain */
+    double i_dc_filter_s;                  /* RC; 0: none */
 } plant_sensor_t;
 
 typedef struct map_table map_table_t; /* map_table.h */

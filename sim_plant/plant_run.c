@@ -5,10 +5,25 @@
 #include <math.h>
 #include <string.h>
 
+static void announce_edges(plant_t *plant, double at_s)
+{
+    if (plant->gates.commanded) {
+        probe_command_edge(&plant->circuit.probe, at_s);
+    }
+}
+
+static unsigned update_gates(plant_t *plant, double at_s)
+{
+    unsigned changed = gates_update(&plant->gates, at_s);
+    announce_edges(plant, at_s);
+    return changed;
+}
+
 void plant_open_bridge(plant_t *plant)
 {
     memset(&plant->queued, 0, sizeof plant->queued);
     gates_off(&plant->gates);
+    announce_edges(plant, plant->t_s);
     circuit_switch(&plant->circuit, &plant->gates, ~0u);
 }
 
@@ -60,11 +75,11 @@ static void run_closed(plant_t *plant, double t_s)
     gates_t *gates = &plant->gates;
     circuit_settle(&plant->circuit);
     double next_s = plant->t_s; /* when the gates change next: they are those of then */
-    unsigned changed = gates_update(gates, next_s);
+    unsigned changed = update_gates(plant, next_s);
     while (plant->t_s < t_s) {
         while (next_s < t_s && commutate(plant, changed, next_s)) {
             next_s = gates_next_s(gates, next_s);
-            changed = next_s < t_s ? gates_update(gates, next_s) : 0u;
+            changed = next_s < t_s ? update_gates(plant, next_s) : 0u;
         }
         advance_until(plant, next_s < t_s ? next_s : t_s);
         t_s = plant->break_s < t_s ? plant->break_s : t_s;
@@ -96,7 +111,7 @@ static void start_period(plant_t *plant)
     plant->circuit.period_start_s = plant->circuit.t_s;
     if (probe_active(&plant->circuit.probe)) {
         plant->complete = plant->circuit.probe;
-        probe_start_period(&plant->circuit.probe);
+        probe_start_period(&plant->circuit.probe, plant->gates.period_s);
     }
     circuit_align(&plant->circuit);
     if (!same_machine(&plant->config.machine, &plant->known)) {

@@ -6,12 +6,14 @@
 #include <math.h>
 #include <string.h>
 
-static bool has_voltage_channels(const plant_t *plant)
+static bool has_node_channels(const plant_t *plant)
 {
-    return plant->config.sensor.v_leg_full_scale_V > 0.0 || plant->config.sensor.v_zero_full_scale_V > 0.0;
+    const plant_sensor_t *sensor = &plant->config.sensor;
+    return sensor->v_leg_full_scale_V > 0.0 || sensor->v_zero_full_scale_V > 0.0 ||
+           sensor->i_dc_full_scale_A > 0.0;
 }
 
-static void see_voltages(const plant_t *plant, sensor_input_t *seen)
+static void see_nodes(const plant_t *plant, sensor_input_t *seen)
 {
     const circuit_t *circuit = &plant->circuit;
     const lags_t *lags = &circuit->lags;
@@ -22,6 +24,7 @@ static void see_voltages(const plant_t *plant, sensor_input_t *seen)
         double seen_V = probe_active(&circuit->probe) ? probe_voltage(&circuit->probe, n) : raw_V;
         *(n < PLANT_LEGS ? &seen->v_leg_V[n] : &seen->v_neutral_V[n - PLANT_LEGS]) = seen_V;
     }
+    seen->i_link_A = lags->dc_s > 0.0 ? lags->y.i_dc_A : nodes.i_dc_A;
     for (int set = 0; set < circuit->machine.winding.sets; set++) {
         seen->v_zero_V[set] = lags->zero_s > 0.0 ? lags->y.v_zero_V[set]
                                                  : lags_zero_V(lags, set, nodes.v_zero_V[set], nodes.v_leg_V);
@@ -47,8 +50,8 @@ void plant_look(const plant_t *plant, sensor_input_t *seen)
         seen->low_for_s[k] = low ? circuit->t_s - circuit->low_since_s[k] : -1.0;
         seen->i_dc_A += circuit->bridge.upper[k] * i_A;
     }
-    if (has_voltage_channels(plant)) {
-        see_voltages(plant, seen);
+    if (has_node_channels(plant)) {
+        see_nodes(plant, seen);
     }
 }
 

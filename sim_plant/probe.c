@@ -31,19 +31,23 @@ void probe_init(probe_t *probe, const plant_sensor_t *sensor, int legs, int sets
     *probe = (probe_t){
         .filter_s = sensor->filter_s,
         .capture_s = sensor->capture_s,
+        .reference = sensor->comparator_reference,
+        .blanking.length_s = sensor->capture_s > 0.0 ? sensor->comparator_blanking_s : 0.0,
         .threshold_V = fmax(0.5 * sensor->hysteresis_V, ROUNDING_V),
         .legs = legs,
         .sets = sets,
     };
-    for (int k = 0; k < legs; k++) {
-        probe->gain[k] = 1.0 + sensor->divider_error[k];
+    for (int n = 0; n < PLANT_LEGS + PLANT_SETS; n++) {
+        probe->gain[n] = 1.0 + sensor->divider_error[n];
     }
+    memcpy(probe->offset_V, sensor->comparator_offset_V, sizeof probe->offset_V);
 }
 
-void probe_start_period(probe_t *probe)
+void probe_start_period(probe_t *probe, double period_s)
 {
     probe->edges = 0;
     probe->lost = 0;
+    blanking_start_period(&probe->blanking, period_s);
 }
 
 double probe_voltage(const probe_t *probe, int channel)
@@ -72,11 +76,23 @@ static void filter(probe_t *probe, const step_t *step, int channel, double befor
     }
 }
 
-/* At comparator k, its set's mean being the reference. */
+static double reference_V(const probe_t *probe, int set, const double v_V[])
+{
+    const double *set_V = &v_V[3 * set];
+    switch (probe->reference) {
+    case PLANT_REFERENCE_HALF_LINK:
+        return 0.5 * v_V[PROBE_LINK];
+    case PLANT_REFERENCE_NEUTRAL:
+        return probe->gain[PLANT_LEGS + set] * v_V[PLANT_LEGS + set];
+    default:
+        return (set_V[0] + set_V[1] + set_V[2]) / 3.0;
+    }
+}
+
+/* At comparator k */
 static double difference_V(const probe_t *probe, int k, const double v_V[])
 {
-    const double *set_V = &v_V[k / 3 * 3];
-    return probe->gain[k] * v_V[k] - (set_V[0] + set_V[1] + set_V[2]) / 3.0;
+    return probe->gain[k] * v_V[k] - reference_V(probe, k / 3, v_V) + probe->offset_V[k];
 }
 
 /* share: of the step, 0 to 1; the slope is that per step */
@@ -148,9 +164,31 @@ static void record(probe_t *probe, plant_capture_t edge)
     probe->edge[n] = edge;
 }
 
-/* Over a stretch of the step in which the response moves one way only. */
+/* Comparator k goes high or low, at that instant to the timer. */
+static void capture(probe_t *probe, int k, double at_s)
+{
+    double counts = at_s / probe->capture_s;
+    record(probe, (plant_capture_t){.count = (uint32_t)fmin(counts + ROUNDING_COUNT, UINT32_MAX),
+                                    .leg = (uint8_t)k,
+                                    .rising = probe->high[k]});
+    probe->shown[k] = probe->high[k];
+}
+
+/* The comparator has stayed as it is between two instants: where a window ends there the timer sees it. */
+static void unblank(probe_t *probe, int k, double from_s, double to_s)
+{
+    if (probe->shown[k] != probe->high[k]) {
+        double end_s = blanking_end_s(&probe->blanking, from_s, to_s);
+        if (end_s <= to_s) {
+            capture(probe, k, end_s);
+        }
+    }
+}
+
+/* Over a stretch of the step in which the response moves one way only. *seen_s: the comparator's last change,
+ * or the start of the step. */
 static void compare(probe_t *probe, int k, const step_t *step, const response_t *response, double from,
-                    double from_V, double to, double to_V)
+                    double from_V, double to, double to_V, double *seen_s)
 {
     double sign = probe->high[k] ? -1.0 : 1.0;
     double threshold_V = probe->threshold_V;
@@ -161,27 +199,31 @@ static void compare(probe_t *probe, int k, const step_t *step, const response_t 
     if (sign * from_V < threshold_V) {
         share = crossing_share(response, sign * threshold_V, !probe->high[k], from, to);
     }
+    double at_s = step->start_s + share * step->duration_s;
+    unblank(probe, k, *seen_s, at_s);
+    *seen_s = at_s;
     probe->high[k] = !probe->high[k];
-    double counts = (step->start_s + share * step->duration_s) / probe->capture_s;
-    record(probe, (plant_capture_t){.count = (uint32_t)fmin(counts + ROUNDING_COUNT, UINT32_MAX),
-                                    .leg = (uint8_t)k,
-                                    .rising = probe->high[k]});
+    if (probe->high[k] != probe->shown[k] && !blanking_holds(&probe->blanking, at_s)) {
+        capture(probe, k, at_s);
+    }
 }
 
 static void watch(probe_t *probe, int k, const step_t *step, const response_t *response)
 {
     double end_V = difference_V(probe, k, probe->v_V);
     double start_V = response->start_V;
-    compare(probe, k, step, response, 0.0, start_V, 0.0, start_V); /* a jump ahead of the step */
+    double seen_s = step->start_s;
+    compare(probe, k, step, response, 0.0, start_V, 0.0, start_V, &seen_s); /* a jump ahead of the step */
     double turn = turning_share(response, step->gap);
     if (turn < 1.0) {
         double slope_V;
         double turn_V = response_V(response, turn, &slope_V);
-        compare(probe, k, step, response, 0.0, start_V, turn, turn_V);
-        compare(probe, k, step, response, turn, turn_V, 1.0, end_V);
+        compare(probe, k, step, response, 0.0, start_V, turn, turn_V, &seen_s);
+        compare(probe, k, step, response, turn, turn_V, 1.0, end_V, &seen_s);
     } else {
-        compare(probe, k, step, response, 0.0, start_V, 1.0, end_V);
+        compare(probe, k, step, response, 0.0, start_V, 1.0, end_V, &seen_s);
     }
+    unblank(probe, k, seen_s, step->start_s + step->duration_s);
 }
 
 void probe_advance(probe_t *probe, double start_s, double duration_s, const double before_V[],
@@ -201,6 +243,7 @@ void probe_advance(probe_t *probe, double start_s, double duration_s, const doub
         int channel = PLANT_LEGS + set;
         filter(probe, &step, channel, before_V[channel], after_V[channel]);
     }
+    filter(probe, &step, PROBE_LINK, before_V[PROBE_LINK], after_V[PROBE_LINK]);
     for (int k = 0; probe->capture_s > 0.0 && k < probe->legs; k++) {
         double input_V = difference_V(probe, k, before_V);
         response_t response = {.constants = step.constants,
@@ -209,4 +252,5 @@ void probe_advance(probe_t *probe, double start_s, double duration_s, const doub
                                .change_V = difference_V(probe, k, after_V) - input_V};
         watch(probe, k, &step, &response);
     }
+    blanking_pass(&probe->blanking, start_s + duration_s);
 }

@@ -124,6 +124,15 @@ static uint16_t differential(const plant_sensor_t *s, noise_t *noise, double v_V
     return bipolar(bits, seen_V / s->v_zero_full_scale_V, noise_lsb);
 }
 
+static uint16_t link_current(const plant_sensor_t *s, noise_t *noise, double i_A)
+{
+    if (s->i_dc_full_scale_A == 0.0) {
+        return MID_SCALE;
+    }
+    double seen_A = (1.0 + s->i_dc_gain_error) * i_A + s->i_dc_offset_A;
+    return bipolar(resolution(s), seen_A / s->i_dc_full_scale_A, draw_lsb(s, noise));
+}
+
 void sensor_convert(const plant_sensor_t *sensor, noise_t *noise, const sensor_input_t *input,
                     plant_adc_t *adc)
 {
@@ -142,6 +151,7 @@ void sensor_convert(const plant_sensor_t *sensor, noise_t *noise, const sensor_i
     for (int set = 0; set < PLANT_SETS; set++) {
         adc->v_zero[set] = set < input->sets ? differential(sensor, noise, input->v_zero_V[set]) : MID_SCALE;
     }
+    adc->i_dc = link_current(sensor, noise, input->i_link_A);
     double t_full_scale_degC =
         sensor->t_full_scale_degC > 0.0 ? sensor->t_full_scale_degC : T_FULL_SCALE_DEGC;
     adc->temperature = bipolar(bits, input->temperature_degC / t_full_scale_degC, 0.0);

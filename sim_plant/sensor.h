@@ -18,7 +18,8 @@
  *
  *   share of full scale = ((1 + v_zero_gain_error) v / (1 + network/(3 load)) + v_zero_offset) / full scale
  *
- * with converter steps and noise of its own, drawn after all others. It reads mid-scale where there is none.
+ * with converter steps and noise of its own, drawn after those before. It reads mid-scale where there is
+ * none. So does the sensor of the link current, which has the noise of the legs' and is drawn last.
  *
  * The noise is Gaussian from a generator of its own: equal seeds give equal runs. Drawn in the order i_leg,
  * v_dc, v_leg, v_neutral; the last two only with v_leg_full_scale_V > 0, else they have no noise.
@@ -40,7 +41,8 @@ typedef struct {
     double v_neutral_V[PLANT_SETS];
     double v_zero_V[PLANT_SETS]; /* behind its own */
     double v_dc_V;
-    double i_dc_A;
+    double i_dc_A;   /* of the single shunt, */
+    double i_link_A; /* and of the link's own sensor, behind its filter */
     double temperature_degC;
     double
         low_for_s[PLANT_LEGS]; /* how long the lower switch or diode has conducted; negative: it does not */

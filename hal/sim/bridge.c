@@ -2,15 +2,28 @@
 
 #include <assert.h>
 
-/* A leg that is held is one with the duty 0 or 1. */
+static plant_leg_state_t switches_of(pm_leg_t state)
+{
+    switch (state) {
+    case PM_LEG_UPPER:
+        return PLANT_LEG_UPPER;
+    case PM_LEG_LOWER:
+        return PLANT_LEG_LOWER;
+    default:
+        return PLANT_LEG_PWM;
+    }
+}
+
+/* A leg that is held is one with the duty 0 or 1, as on a board. */
 static void set_leg(const hal_t *hal, int leg, const drive_out_t *out, plant_pwm_t *pwm)
 {
     const pm_leg_t state = pm_leg(out->legs, (uint32_t)leg);
-    assert(state != PM_LEG_UPPER && state != PM_LEG_LOWER && state <= PM_LEG_LOW); /* not declared */
+    assert(state <= PM_LEG_LOW);
     const bool held = state == PM_LEG_HIGH || state == PM_LEG_LOW;
     const uint32_t all = state == PM_LEG_HIGH ? hal->timer_counts : 0U;
     pwm->compare[leg][0] = held ? all : out->compare[leg][0];
     pwm->compare[leg][1] = held ? all : out->compare[leg][1];
+    pwm->state[leg] = switches_of(state);
     pwm->driven[leg] = state != PM_LEG_OFF && hal->armed;
 }
 

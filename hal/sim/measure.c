@@ -5,14 +5,16 @@
 
 #define MID_SCALE 0x8000
 
-/* Of the sensors that the plant has. Not yet: the link current beside the leg currents, PWM on one switch,
- * commutation within the period. */
+/* Of the sensors that the plant has. Not yet: commutation within the period. */
 uint32_t hal_channels(const hal_t *hal)
 {
     const plant_sensor_t *sensor = plant_sensor(hal->plant);
-    const bool voltages = sensor->v_leg_full_scale_V > 0.0;
+    const bool terminals = sensor->v_leg_full_scale_V > 0.0;
+    const bool neutral = terminals || sensor->v_zero_full_scale_V > 0.0;
     const uint32_t all = NEEDS_SECOND_SAMPLE | NEEDS_CURRENT_MASK | NEEDS_HALVES | NEEDS_HELD |
-                         (voltages ? NEEDS_TERMINALS | NEEDS_NEUTRAL : 0U) |
+                         NEEDS_ONE_SWITCH | (terminals ? NEEDS_TERMINALS : 0U) |
+                         (neutral ? NEEDS_NEUTRAL : 0U) |
+                         (sensor->i_dc_full_scale_A > 0.0 ? NEEDS_DC_CURRENT : 0U) |
                          (sensor->capture_s > 0.0 ? NEEDS_CAPTURES : 0U);
     return all & ~hal->without;
 }
@@ -48,10 +50,14 @@ static void fill_samples(const hal_t *hal, pm_measure_t *more)
     }
 }
 
-/* The differential amplifier between star point and the network of resistors at the terminals: half of the
- * code's range on either side. */
-static uint16_t neutral_code(const plant_adc_t *adc)
+/* Star point against the mean of the terminals. The plant's differential channel sees the opposite; without
+ * it the difference of the channels takes its place, half of the code's range on either side. */
+static uint16_t neutral_code(const plant_adc_t *adc, const plant_sensor_t *sensor)
 {
+    if (sensor->v_zero_full_scale_V > 0.0) {
+        const int32_t mirrored = 2 * MID_SCALE - adc->v_zero[0];
+        return (uint16_t)(mirrored < UINT16_MAX ? mirrored : UINT16_MAX);
+    }
     const int32_t sum = adc->v_leg[0] + adc->v_leg[1] + adc->v_leg[2];
     return (uint16_t)(MID_SCALE + (3 * adc->v_neutral[0] - sum) / (2 * PM_LEGS));
 }
@@ -76,11 +82,14 @@ static void fill_more(const hal_t *hal, pm_measure_t *more)
     if ((channels & NEEDS_CURRENT_MASK) != 0U) {
         more->missing = (uint16_t)(~hal->adc.settled & 7U);
     }
+    if ((channels & NEEDS_DC_CURRENT) != 0U) {
+        more->i_dc = hal->adc.i_dc;
+    }
     if ((channels & NEEDS_TERMINALS) != 0U) {
         memcpy(more->v_terminal, hal->adc.v_leg, sizeof more->v_terminal);
     }
     if ((channels & NEEDS_NEUTRAL) != 0U) {
-        more->v_neutral = neutral_code(&hal->adc);
+        more->v_neutral = neutral_code(&hal->adc, plant_sensor(hal->plant));
     }
     if ((channels & NEEDS_SECOND_SAMPLE) != 0U) {
         fill_samples(hal, more);

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 struct Options {
     std::string machine, input, out;
-    std::vector<std::string> settings;
+    std::vector<std::string> floating, settings;
 };
 
 // A line on a terminal, ten times a second, once the run has taken two seconds.
@@ -84,14 +84,16 @@ void write_all(const std::string &path, const std::string &text)
 void run(const Options &options)
 {
     const PlantFile file = load_plant_file(options.machine, parse_settings(options.settings));
-    const Csv input = load_plant_input(options.input, file.setup);
+    const unsigned floating = floating_legs(options.floating, file.setup);
+    const Csv input = load_plant_input(options.input, file.setup, floating);
     check_out(options);
     PlantOutput output;
     if (isatty(STDERR_FILENO) != 0) {
         ProgressLine line;
-        output = run_plant(file, input, [&line](double fraction) { line.show(fraction); });
+        output = run_plant(
+            file, input, [&line](double fraction) { line.show(fraction); }, floating);
     } else {
-        output = run_plant(file, input);
+        output = run_plant(file, input, nullptr, floating);
     }
     write_all(options.out, output.csv);
     print_notes(file.setup);
@@ -111,6 +113,10 @@ void add_plant_command(Command &app)
         ->required();
     command->add_option("--input", options->input, "CSV file: what is applied")->required();
     command->add_option("--out", options->out, "CSV file to write: what the machine does")->required();
+    command
+        ->add_option("--float", options->floating,
+                     "a terminal that is off while the others are fed: a, b, c, x, y or z; once for each")
+        ->one_each();
     command->add_option("--set", options->settings, settings_help())->one_each();
     command->footer(
         "Input columns, in any order: t_s, va_V, vb_V, vc_V, held from each row to the next (two sets and\n"
@@ -119,7 +125,11 @@ void add_plant_command(Command &app)
         "is imposed and moves linearly from row to row.\n"
         "Output, one row for each input row, the state at its time: t_s, ia_A, ib_A, ic_A (ix_A, iy_A, "
         "iz_A),\n"
-        "theta_e_rad, omega_mech_rad_s, torque_Nm, psi_d_Vs, psi_q_Vs.\n"
+        "theta_e_rad, omega_mech_rad_s, torque_Nm, psi_d_Vs, psi_q_Vs, v_neutral_V (of two sets "
+        "v_neutral_abc_V,\n"
+        "v_neutral_xyz_V): star point against the mean of its terminals; then the voltages of terminals "
+        "that\n"
+        "float, which need none in the input.\n"
         "Starts without current, at rest or at the imposed speed, with theta_e = 0 unless `start` says\n"
         "otherwise; the last row's voltages have no effect. 1 s in 100 us rows takes about 0.1 s; progress "
         "is\n"

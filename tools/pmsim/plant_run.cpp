@@ -32,13 +32,29 @@ std::vector<std::string> leg_columns(const Setup &setup, const char *quantity, c
     return columns;
 }
 
-CsvColumns input_columns(const Setup &setup)
+bool floats(unsigned floating, size_t leg)
+{
+    return (floating >> leg & 1U) != 0U;
+}
+
+CsvColumns input_columns(const Setup &setup, unsigned floating)
 {
     CsvColumns columns{{"t_s"}, {load_column, speed_column}};
-    for (const std::string &leg : leg_columns(setup, "v", "_V")) {
-        columns.required.push_back(leg);
+    const std::vector<std::string> legs = leg_columns(setup, "v", "_V");
+    for (size_t leg = 0; leg < legs.size(); ++leg) {
+        (floats(floating, leg) ? columns.optional : columns.required).push_back(legs[leg]);
     }
     return columns;
+}
+
+// Star points.
+std::vector<std::string> neutral_columns(const Setup &setup)
+{
+    if (setup.plant.winding.connection == PLANT_OPEN) {
+        return {};
+    }
+    return leg_count(setup.plant) == 6 ? std::vector<std::string>{"v_neutral_abc_V", "v_neutral_xyz_V"}
+                                       : std::vector<std::string>{"v_neutral_V"};
 }
 
 void check_limit(const Csv &input, const std::string &column, double max_abs)
@@ -60,7 +76,9 @@ Csv checked(Csv input, const Setup &setup)
         }
     }
     for (const std::string &leg : leg_columns(setup, "v", "_V")) {
-        check_limit(input, leg, max_voltage_V);
+        if (input.has(leg)) {
+            check_limit(input, leg, max_voltage_V);
+        }
     }
     const std::vector<double> &t_s = input.column("t_s");
     for (size_t row = 1; row < t_s.size(); ++row) {
@@ -86,12 +104,13 @@ constexpr double fine_tolerance = 1e-9;
 class PlantRun
 {
   public:
-    PlantRun(const PlantFile &file, const Csv &input)
-        : input_(input), map_(file.setup.flux_map.get()),
-          legs_(static_cast<size_t>(leg_count(file.setup.plant))), t_s_(input.column("t_s"))
+    PlantRun(const PlantFile &file, const Csv &input, unsigned floating)
+        : input_(input), map_(file.setup.flux_map.get()), floating_(floating),
+          legs_(static_cast<size_t>(leg_count(file.setup.plant))),
+          neutrals_(neutral_columns(file.setup).size()), t_s_(input.column("t_s"))
     {
         for (const std::string &leg : leg_columns(file.setup, "v", "_V")) {
-            v_V_.push_back(&input.column(leg));
+            v_V_.push_back(floats(floating, v_V_.size()) ? nullptr : &input.column(leg));
         }
         load_Nm_ = input.has(load_column) ? &input.column(load_column) : nullptr;
         speed_rad_s_ = input.has(speed_column) ? &input.column(speed_column) : nullptr;
@@ -109,11 +128,12 @@ class PlantRun
         if (!plant_) {
             refuse_plant(file.setup, reason);
         }
-        text_ = "t_s";
-        for (const std::string &leg : leg_columns(file.setup, "i", "_A")) {
-            text_ += "," + leg;
+        for (size_t leg = 0; leg < legs_; ++leg) {
+            if (floats(floating_, leg)) {
+                plant_set_leg_fault(plant_.get(), int(leg), PLANT_WIRE_OPEN);
+            }
         }
-        text_ += ",theta_e_rad,omega_mech_rad_s,torque_Nm,psi_d_Vs,psi_q_Vs\n";
+        write_header(file.setup);
     }
 
     // State at the row's time, then on to the next row.
@@ -122,15 +142,18 @@ class PlantRun
         if (speed_rad_s_ != nullptr) {
             plant_set_speed(plant_.get(), (*speed_rad_s_)[row]);
         }
+        double v_V[PLANT_LEGS] = {};
+        for (size_t leg = 0; leg < legs_; ++leg) {
+            v_V[leg] = v_V_[leg] != nullptr ? (*v_V_[leg])[row] : 0.0;
+        }
+        if (row == 0) {
+            plant_run_voltages(plant_.get(), v_V, 0.0, 0.0); // nothing was applied before
+        }
         write(row);
         if (row + 1 == t_s_.size()) {
             return;
         }
         const double duration_s = t_s_[row + 1] - t_s_[row];
-        double v_V[PLANT_LEGS] = {};
-        for (size_t leg = 0; leg < legs_; ++leg) {
-            v_V[leg] = (*v_V_[leg])[row];
-        }
         if (load_Nm_ != nullptr) {
             plant_set_load(plant_.get(), (*load_Nm_)[row]);
         }
@@ -157,6 +180,23 @@ class PlantRun
         }
     };
 
+    void write_header(const Setup &setup)
+    {
+        text_ = "t_s";
+        for (const std::string &leg : leg_columns(setup, "i", "_A")) {
+            text_ += "," + leg;
+        }
+        text_ += ",theta_e_rad,omega_mech_rad_s,torque_Nm,psi_d_Vs,psi_q_Vs";
+        for (const std::string &neutral : neutral_columns(setup)) {
+            text_ += "," + neutral;
+        }
+        const std::vector<std::string> terminals = leg_columns(setup, "v", "_V");
+        for (size_t leg = 0; leg < legs_; ++leg) {
+            text_ += floats(floating_, leg) ? "," + terminals[leg] : "";
+        }
+        text_ += "\n";
+    }
+
     void write(size_t row)
     {
         plant_truth_t truth;
@@ -169,13 +209,22 @@ class PlantRun
         }
         append(text_, t_s_[row], ',');
         for (size_t leg = 0; leg < legs_; ++leg) {
-            append(text_, truth.i_A[leg], ',');
+            append(text_, truth.i_A[leg] + 0.0, ','); // not -0
         }
         append(text_, truth.theta_e_rad, ',');
         append(text_, speed_rad_s_ != nullptr ? (*speed_rad_s_)[row] : truth.omega_mech_rad_s, ',');
         append(text_, truth.torque_Nm, ',');
         append(text_, truth.psi_d_Wb, ',');
-        append(text_, truth.psi_q_Wb, '\n');
+        append(text_, truth.psi_q_Wb, ',');
+        for (size_t set = 0; set < neutrals_; ++set) {
+            append(text_, 0.0 - truth.v_zero_V[set], ',');
+        }
+        for (size_t leg = 0; leg < legs_; ++leg) {
+            if (floats(floating_, leg)) {
+                append(text_, truth.v_leg_V[leg], ',');
+            }
+        }
+        text_.back() = '\n';
     }
 
     bool within_map(const plant_truth_t &truth) const
@@ -192,9 +241,10 @@ class PlantRun
     const Csv &input_;
     const FluxMap *map_; // null: energy form
     std::optional<size_t> outside_row_;
-    size_t legs_;
+    unsigned floating_; // terminals, bit k for leg k
+    size_t legs_, neutrals_;
     const std::vector<double> &t_s_;
-    std::vector<const std::vector<double> *> v_V_;
+    std::vector<const std::vector<double> *> v_V_; // null: floats
     const std::vector<double> *load_Nm_, *speed_rad_s_;
     std::unique_ptr<plant_t, Deleter> plant_;
     std::string text_;
@@ -202,19 +252,38 @@ class PlantRun
 
 } // namespace
 
-Csv load_plant_input(const std::string &path, const Setup &setup)
+unsigned floating_legs(const std::vector<std::string> &names, const Setup &setup)
 {
-    return checked(Csv::from_file(path, input_columns(setup)), setup);
+    const size_t legs = static_cast<size_t>(leg_count(setup.plant));
+    unsigned floating = 0;
+    for (const std::string &name : names) {
+        size_t leg = 0;
+        while (leg < legs && leg_names()[leg] != name) {
+            ++leg;
+        }
+        if (leg == legs) {
+            throw InputError("--float " + name + ": no terminal of this machine; one of: a, b, c" +
+                             (legs == 6 ? ", x, y, z" : ""));
+        }
+        floating |= 1U << leg;
+    }
+    return floating;
 }
 
-Csv read_plant_input(const std::string &text, const std::string &name, const Setup &setup)
+Csv load_plant_input(const std::string &path, const Setup &setup, unsigned floating)
 {
-    return checked(Csv::from_text(text, name, input_columns(setup)), setup);
+    return checked(Csv::from_file(path, input_columns(setup, floating)), setup);
 }
 
-PlantOutput run_plant(const PlantFile &file, const Csv &input, const std::function<void(double)> &progress)
+Csv read_plant_input(const std::string &text, const std::string &name, const Setup &setup, unsigned floating)
 {
-    PlantRun run(file, input);
+    return checked(Csv::from_text(text, name, input_columns(setup, floating)), setup);
+}
+
+PlantOutput run_plant(const PlantFile &file, const Csv &input, const std::function<void(double)> &progress,
+                      unsigned floating)
+{
+    PlantRun run(file, input, floating);
     for (size_t row = 0; row < input.rows(); ++row) {
         run.play(row);
         if (progress) {

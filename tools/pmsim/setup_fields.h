@@ -32,8 +32,8 @@ struct Harmonics {
     const char *amplitude_key;
 };
 
-using Target =
-    std::variant<double *, int *, uint32_t *, bool *, plant_connection_t *, plant_shunt_t *, List, Harmonics>;
+using Target = std::variant<double *, int *, uint32_t *, bool *, plant_connection_t *, plant_shunt_t *,
+                            plant_reference_t *, List, Harmonics>;
 
 struct Field {
     const char *section, *key;

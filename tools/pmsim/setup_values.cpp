@@ -14,6 +14,7 @@ const int trapezoid_max_order = 31; // the 31st of a 120 degree trapezoid is 0.1
 
 const std::vector<std::string> connections = {"star", "open"}; // in the order of plant_connection_t
 const std::vector<std::string> shunts = {"in_line", "low_side", "single_shunt"};
+const std::vector<std::string> references = {"mean", "half_link", "neutral"};
 
 template <class Enum> Enum read_choice(const Value &value, const std::vector<std::string> &names)
 {
@@ -134,6 +135,10 @@ struct Reader { // what to do with each kind of member
     void operator()(plant_shunt_t *shunt) const
     {
         *shunt = read_choice<plant_shunt_t>(value, shunts);
+    }
+    void operator()(plant_reference_t *reference) const
+    {
+        *reference = read_choice<plant_reference_t>(value, references);
     }
     void operator()(const List &list) const
     {

@@ -269,6 +269,28 @@ static void check_held(run_t *run)
 }
 #endif
 
+#if PM_CARRIES(NEEDS_ONE_SWITCH)
+/* The lower switches alone for the whole period: all terminals low. */
+static void check_one_switch(run_t *run)
+{
+    struct app *app = &the_app;
+    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        app->out.compare[leg][0] = 0;
+        app->out.compare[leg][1] = 0;
+    }
+    app->out.legs = PM_LEGS_ALL(PM_LEG_LOWER);
+    wait_us(run, 1000);
+    check(run, "stays armed with one switch of each leg", hal_bridge_armed(run->hal), 0);
+    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        const int32_t off = (int32_t)app->in.i_leg[leg] - MID_SCALE;
+        check(run, "no current with the lower switches alone", off > -2000 && off < 2000, off);
+#if PM_CARRIES(NEEDS_TERMINALS)
+        check_code(run, "a terminal on its lower switch", app->in.more.v_terminal[leg], 0, 2000);
+#endif
+    }
+}
+#endif
+
 static void check_legs(run_t *run)
 {
     const uint32_t channels = hal_channels(run->hal);
@@ -281,6 +303,11 @@ static void check_legs(run_t *run)
 #if PM_CARRIES(NEEDS_HELD)
     if ((channels & NEEDS_HELD) != 0U) {
         check_held(run);
+    }
+#endif
+#if PM_CARRIES(NEEDS_ONE_SWITCH)
+    if ((channels & NEEDS_ONE_SWITCH) != 0U) {
+        check_one_switch(run);
     }
 #endif
     (void)channels;

@@ -1,4 +1,5 @@
 // What the port `sim` delivers beside the common measurements, against the plant's truth and closed formulas.
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -172,6 +173,91 @@ TEST(SimChannels, ACurrentThatCannotBeMeasuredIsMarked)
         port.step();
     }
     EXPECT_EQ(port.in.more.missing, 2);
+}
+
+// The differential amplifier alone: its own range, and no terminals.
+TEST(SimChannels, NeutralOfTheDifferentialAmplifier)
+{
+    plant_config_t config = machine();
+    const double psi_3_Wb = 0.02, omega_e = 300.0, full_scale_V = 12.0; // the peak is 18 V
+    config.winding.emf[0] = {3, psi_3_Wb, 0.0};
+    config.sensor.v_leg_full_scale_V = 0.0;
+    config.sensor.v_zero_full_scale_V = full_scale_V;
+    Port port(config);
+    EXPECT_EQ(hal_channels(&port.hal) & (NEEDS_NEUTRAL | NEEDS_TERMINALS), NEEDS_NEUTRAL);
+    plant_set_speed(port.plant.get(), omega_e / config.machine.pole_pairs);
+    port.step(); // from standstill
+    bool low = false, high = false;
+    for (int k = 0; k < 100; ++k) {
+        plant_truth_t truth;
+        plant_truth(port.plant.get(), &truth);
+        port.step();
+        const double v_V = 3 * omega_e * psi_3_Wb * std::sin(3 * truth.theta_e_rad);
+        const double code = 32768 + v_V / full_scale_V * 32768;
+        EXPECT_NEAR(port.in.more.v_neutral, std::min(std::max(code, 0.0), 65535.0), 3.0) << k;
+        low = low || code < 0;
+        high = high || code > 65536;
+    }
+    EXPECT_TRUE(low && high);
+}
+
+// What a held pair takes comes from the link; with all legs low, as in the middle of a zero vector, nothing
+// does.
+TEST(SimChannels, LinkCurrentOfAHeldPair)
+{
+    plant_config_t config = machine();
+    config.mech.locked = true;
+    config.sensor.i_dc_full_scale_A = 20.0; // twice the legs'
+    Port port(config);
+    EXPECT_NE(hal_channels(&port.hal) & NEEDS_DC_CURRENT, 0U);
+    ASSERT_TRUE(hal_bridge_arm(&port.hal));
+    port.out.legs = pm_legs_of(PM_LEG_HIGH, PM_LEG_LOW, PM_LEG_OFF);
+    for (int k = 0; k < 12; ++k) {
+        port.step();
+    }
+    const int i_a = port.in.i_leg[0] - 32768;
+    EXPECT_GT(i_a, 3000);
+    EXPECT_NEAR(port.in.more.i_dc - 32768, i_a / 2, 2);
+    port.out.legs = pm_legs_of(PM_LEG_LOW, PM_LEG_LOW, PM_LEG_OFF);
+    for (int k = 0; k < 3; ++k) {
+        port.step();
+    }
+    EXPECT_GT(port.in.i_leg[0] - 32768, 3000);
+    EXPECT_EQ(port.in.more.i_dc, 32768);
+}
+
+// Leg a chopped against b, c off, rotor locked, at a duty d: from the upper rail d v_dc/(2 R) flows, to it
+// (1 - d) v_dc/(2 R); a leg whose switch leads to the rail of b's carries nothing, which both switches would
+// change.
+TEST(SimChannels, OneSwitchOfALeg)
+{
+    plant_config_t config = plants::spm_400();
+    config.mech.locked = true;
+    config.inverter.dead_time_s = config.inverter.r_on_ohm = 0.0;
+    config.dclink.r_source_ohm = config.dclink.c_F = 0.0;
+    config.sensor.bits = 0;
+    config.winding.dR_ohm[0] = config.winding.dR_ohm[1] = 2.0;
+    const double R_ohm = config.machine.R_s_ohm + 2.0, d = 0.4;
+    const double to_a_A = d * 36.0 / (2 * R_ohm), from_a_A = (1 - d) * 36.0 / (2 * R_ohm);
+    const struct {
+        pm_leg_t a, b;
+        double i_A;
+    } cases[] = {{PM_LEG_UPPER, PM_LEG_LOW, to_a_A},   {PM_LEG_LOWER, PM_LEG_HIGH, -from_a_A},
+                 {PM_LEG_UPPER, PM_LEG_HIGH, 0.0},     {PM_LEG_LOWER, PM_LEG_LOW, 0.0},
+                 {PM_LEG_PWM, PM_LEG_HIGH, -from_a_A}, {PM_LEG_PWM, PM_LEG_LOW, to_a_A}};
+    for (const auto &c : cases) {
+        Port port(config);
+        ASSERT_TRUE(hal_bridge_arm(&port.hal));
+        EXPECT_NE(hal_channels(&port.hal) & NEEDS_ONE_SWITCH, 0U);
+        port.out.legs = pm_legs_of(c.a, c.b, PM_LEG_OFF);
+        port.out.compare[0][0] = port.out.compare[0][1] = static_cast<uint16_t>(d * kCounts);
+        for (int k = 0; k < 300; ++k) { // twenty time constants
+            port.step();
+        }
+        // at the middle of a half of the pulse pattern the current is the mean, but for a hundredth of the
+        // ripple
+        EXPECT_NEAR(port.in.i_leg[0], current_code(c.i_A), 0.002 * 32768) << c.a << c.b;
+    }
 }
 
 } // namespace

@@ -46,7 +46,8 @@ void keeps_contract(const plant_config_t &config, uint32_t without, uint32_t cha
     EXPECT_NE(std::string(hal.console).find("DONE 0 of"), std::string::npos) << hal.console;
 }
 
-constexpr uint32_t kAlways = NEEDS_SECOND_SAMPLE | NEEDS_CURRENT_MASK | NEEDS_HALVES | NEEDS_HELD;
+constexpr uint32_t kAlways =
+    NEEDS_SECOND_SAMPLE | NEEDS_CURRENT_MASK | NEEDS_HALVES | NEEDS_HELD | NEEDS_ONE_SWITCH;
 
 TEST(HalContract, Sim)
 {
@@ -64,6 +65,14 @@ plant_config_t with_voltages()
 TEST(HalContract, SimWithTerminalsAndComparators)
 {
     keeps_contract(with_voltages(), 0, kAlways | NEEDS_TERMINALS | NEEDS_NEUTRAL | NEEDS_CAPTURES);
+}
+
+TEST(HalContract, SimWithNeutralAndLinkCurrent)
+{
+    plant_config_t config = plants::ipm_1000();
+    config.sensor.v_zero_full_scale_V = 200;
+    config.sensor.i_dc_full_scale_A = 20;
+    keeps_contract(config, 0, kAlways | NEEDS_NEUTRAL | NEEDS_DC_CURRENT);
 }
 
 TEST(HalContract, SimWithoutWhatIsTaken)

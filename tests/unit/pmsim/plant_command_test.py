@@ -45,13 +45,22 @@ def check_runs(folder):
     rows = folder.run(ROWS)
     assert [float(row["t_s"]) for row in rows] == [0, 1e-4, 2e-4], rows
     assert list(rows[0]) == ["t_s", "ia_A", "ib_A", "ic_A", "theta_e_rad", "omega_mech_rad_s", "torque_Nm",
-                             "psi_d_Vs", "psi_q_Vs"], list(rows[0])
+                             "psi_d_Vs", "psi_q_Vs", "v_neutral_V"], list(rows[0])
     assert float(rows[1]["ia_A"]) > 0 and float(rows[0]["ia_A"]) == 0
     turned = folder.run(ROWS, MACHINE, "--set", "start.theta_e_deg=90")
     assert abs(float(turned[0]["theta_e_rad"]) - 1.5707963267948966) < 1e-15
     again = folder.out.read_bytes()
     folder.run(ROWS, MACHINE, "--set", "start.theta_e_deg=90")
     assert folder.out.read_bytes() == again, "two runs differ"
+
+
+def check_floats(folder):
+    rows = folder.run("t_s,va_V,vb_V\n0,1,0\n1e-4,1,0\n2e-4,0,0\n", MACHINE, "--float", "c")
+    assert list(rows[0])[-2:] == ["v_neutral_V", "vc_V"], list(rows[0])
+    assert all(abs(float(row["ic_A"])) < 1e-9 for row in rows), rows
+    assert float(rows[1]["ia_A"]) > 0 and 0 < float(rows[1]["vc_V"]) < 1, rows
+    folder.refused(ROWS, "--float d: no terminal of this machine; one of: a, b, c", MACHINE, "--float", "d")
+    folder.refused(ROWS, "--float x: no terminal of this machine; one of: a, b, c", MACHINE, "--float", "x")
 
 
 def check_table_errors(folder):
@@ -128,6 +137,7 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = Folder(pathlib.Path(name))
         check_runs(folder)
+        check_floats(folder)
         check_table_errors(folder)
         check_other_errors(folder)
         check_inputs_are_safe(folder)

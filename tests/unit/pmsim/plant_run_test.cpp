@@ -135,6 +135,62 @@ TEST(PlantRun, TakesMachineFilesAndWhatIsLaidOverThem)
     EXPECT_EQ(scenario.setup.name, "IPM-1000");
 }
 
+Csv run_floating(const PlantFile &file, const std::string &input, const std::vector<std::string> &names)
+{
+    const unsigned floating = floating_legs(names, file.setup);
+    const Csv in = read_plant_input(input, "in.csv", file.setup, floating);
+    const std::string out = run_plant(file, in, nullptr, floating).csv;
+    return Csv::from_text(out, "out.csv", {split(out.substr(0, out.find('\n')), ','), {}});
+}
+
+// a and b in series, c off, rotor at 0: psi_a = L_d i, psi_b = -(L_d + L_q) i/2, psi_c = (L_q - L_d) i/2, so
+// that v = 2 R i + (3 L_d + L_q)/2 di/dt; the star point is at v - R i - L_d di/dt, c above it by dpsi_c/dt.
+TEST(PlantRun, FloatingTerminalShowsTheSaliency)
+{
+    const PlantFile file = plant(linear, {{"mechanics.locked", "true"}});
+    const Csv out = run_floating(file, "t_s,va_V,vb_V\n0,6,0\n0.0005,6,0\n0.004,6,0\n0.005,6,0\n", {"c"});
+    const double v_V = 6.0, R = 2.0, L_d = 4e-3, L_q = 6e-3, L = 1.5 * L_d + 0.5 * L_q;
+    for (size_t row = 0; row < out.rows(); ++row) {
+        const double i_A = v_V / (2.0 * R) * -std::expm1(-out.column("t_s")[row] * 2.0 * R / L);
+        const double di_A_s = (v_V - 2.0 * R * i_A) / L;
+        EXPECT_NEAR(out.column("ia_A")[row], i_A, tolerance) << row;
+        EXPECT_NEAR(out.column("ib_A")[row], -i_A, tolerance) << row;
+        EXPECT_NEAR(out.column("ic_A")[row], 0.0, 1e-10) << row;
+        const double neutral_V = v_V - R * i_A - L_d * di_A_s;
+        EXPECT_NEAR(out.column("vc_V")[row], neutral_V + 0.5 * (L_q - L_d) * di_A_s, 10.0 * tolerance) << row;
+        EXPECT_NEAR(out.column("v_neutral_V")[row], 0.0, 1e-12) << row; // no zero sequence
+    }
+}
+
+// With and without a terminal off: 3 omega psi_3 sin(3 theta) against the mean of the terminals.
+TEST(PlantRun, NeutralShowsTheThirdHarmonic)
+{
+    const PlantFile file = plant(std::string(linear) + "winding: {emf: [{order: 3, psi_Wb: 0.004}]}\n");
+    const std::string rows = "0,1,0,0,100\n0.001,1,0,0,100\n0.002,1,0,0,100\n0.0035,1,0,0,100\n";
+    for (const std::vector<std::string> &names : {std::vector<std::string>{}, {"c"}, {"a", "b", "c"}}) {
+        const Csv out = run_floating(file, "t_s,va_V,vb_V,vc_V,omega_mech_rad_s\n" + rows, names);
+        for (size_t row = 0; row < out.rows(); ++row) {
+            const double theta = 300.0 * out.column("t_s")[row];
+            EXPECT_NEAR(out.column("v_neutral_V")[row], 3.0 * 300.0 * 0.004 * std::sin(3.0 * theta), 1e-6)
+                << names.size() << row;
+        }
+    }
+}
+
+TEST(PlantRun, NeutralsOfTwoSetsAndNoneOfAnOpenWinding)
+{
+    const auto header = [](const std::string &extra) {
+        const PlantFile file = plant(std::string(linear) + extra);
+        const Csv in =
+            read_plant_input("t_s,va_V,vb_V,vc_V,vx_V,vy_V,vz_V\n0,0,0,0,0,0,0\n", "in.csv", file.setup);
+        const std::string out = run_plant(file, in).csv;
+        return out.substr(0, out.find('\n'));
+    };
+    EXPECT_THAT(header("winding: {sets: 2}\n"),
+                testing::EndsWith(",psi_q_Vs,v_neutral_abc_V,v_neutral_xyz_V"));
+    EXPECT_THAT(header("winding: {connection: open, L_0_H: 1.0e-3}\n"), testing::EndsWith(",psi_q_Vs"));
+}
+
 TEST(PlantRun, ErrorsOfTheFile)
 {
     const auto error = [](const std::string &text, const Settings &settings = {}) {

@@ -61,7 +61,10 @@ TEST(WindingSection, ValuesReachThePlant)
                 "  dM_H: [0, 1.0e-6, 0]\n"
                 "  emf_shift_deg: [0, 0, 90]\n"
                 "inverter: {turn_off_s: 1.0e-7, c_leg_F: 2.0e-9}\n"
-                "sensor: {shunt: low_side, neutral_divider_error: [0.02], divider_error: [0.01, 0, 0]}\n"
+                "sensor: {shunt: low_side, neutral_divider_error: [0.02], divider_error: [0.01, 0, 0],\n"
+                "  comparator_reference: half_link, comparator_offset_V: [0, 0, -0.1], "
+                "comparator_blanking_s: 2.0e-6,\n"
+                "  i_dc_full_scale_A: 20, i_dc_filter_s: 1.0e-4}\n"
                 "dclink: {ripple_V: 3, ripple_Hz: 300}\n")
             .plant;
     EXPECT_EQ(plant.winding.emf[0].order, 5);
@@ -79,6 +82,11 @@ TEST(WindingSection, ValuesReachThePlant)
     EXPECT_NEAR(plant.winding.emf_shift_rad[2], pi / 2, 1e-15);
     EXPECT_EQ(plant.inverter.turn_off_s, 1.0e-7);
     EXPECT_EQ(plant.sensor.shunt, PLANT_LOW_SIDE);
+    EXPECT_EQ(plant.sensor.comparator_reference, PLANT_REFERENCE_HALF_LINK);
+    EXPECT_EQ(plant.sensor.comparator_offset_V[2], -0.1);
+    EXPECT_EQ(plant.sensor.comparator_blanking_s, 2.0e-6);
+    EXPECT_EQ(plant.sensor.i_dc_full_scale_A, 20.0);
+    EXPECT_EQ(plant.sensor.i_dc_filter_s, 1.0e-4);
     EXPECT_EQ(plant.sensor.divider_error[0], 0.01);
     EXPECT_EQ(plant.sensor.divider_error[PLANT_LEGS], 0.02);
     EXPECT_EQ(plant.dclink.ripple_Hz, 300.0);
@@ -190,6 +198,8 @@ TEST(WindingSection, ErrorsNameThePlace)
     EXPECT_EQ(error_with("winding: {R_eddy_mohm: 2}\n"),
               "m.yaml:4:11: unknown key \"R_eddy_mohm\": wrong unit; did you mean \"R_eddy_ohm\"?");
     EXPECT_THAT(error_with("sensor: {shunt: inline}\n"), StartsWith("m.yaml:4:17: \"inline\" is not known"));
+    EXPECT_EQ(error_with("sensor: {comparator_reference: link}\n"),
+              "m.yaml:4:32: \"link\" is not known here; one of: mean, half_link, neutral");
     std::string many = "winding: {cogging: [{order: 1, T_Nm: 0}";
     for (int n = 2; n <= 17; ++n) {
         many += ", {order: " + std::to_string(n) + ", T_Nm: 0}";

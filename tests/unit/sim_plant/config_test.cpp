@@ -179,6 +179,19 @@ const Garbage garbage[] = {
     {"filter_s", [](plant_config_t &c) { c.sensor.filter_s = -1e-6; }},
     {"hysteresis_V", [](plant_config_t &c) { c.sensor.hysteresis_V = nan; }},
     {"capture_s", [](plant_config_t &c) { c.sensor.capture_s = inf; }},
+    {"comparator_reference",
+     [](plant_config_t &c) { c.sensor.comparator_reference = static_cast<plant_reference_t>(3); }},
+    {"no neutral",
+     [](plant_config_t &c) {
+         c.sensor.comparator_reference = PLANT_REFERENCE_NEUTRAL;
+         c.winding.connection = PLANT_OPEN;
+         c.winding.L_0_H = 5e-3;
+     }},
+    {"i_dc_", [](plant_config_t &c) { c.sensor.i_dc_filter_s = -1e-6; }},
+    {"i_dc_", [](plant_config_t &c) { c.sensor.i_dc_offset_A = nan; }},
+    {"comparator_offset_V", [](plant_config_t &c) { c.sensor.comparator_offset_V[1] = inf; }},
+    {"comparator_blanking_s", [](plant_config_t &c) { c.sensor.comparator_blanking_s = 100e-6; }},
+    {"comparator_blanking_s", [](plant_config_t &c) { c.sensor.comparator_blanking_s = -1e-6; }},
     {"divider_error", [](plant_config_t &c) { c.sensor.divider_error[PLANT_LEGS] = -1.0; }},
     {"tolerance", [](plant_config_t &c) { c.tolerance = 0.02; }},
     {"tolerance", [](plant_config_t &c) { c.tolerance = -1e-6; }},

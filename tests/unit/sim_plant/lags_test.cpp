@@ -215,4 +215,51 @@ TEST(InLineAmplifier, IsNoneForOtherShunts)
     EXPECT_THROW(rig::Plant plant(config), std::invalid_argument);
 }
 
+// In the steady state at a duty the link's current, i for the share d of the period about its middle, is
+// behind the RC what a periodic pulse makes of it: y = i (e^{x (1+d)/2} - e^{x (1-d)/2})/(e^x - 1) at the
+// period's end, x = T/tau. The ripple of the current, of L/R = 8.7 ms, is odd about that middle.
+TEST(LinkSensor, ShowsPulsesBehindItsFilter)
+{
+    constexpr double duty = 0.3, T = 100e-6;
+    for (double tau_s : {30e-6, 200e-6}) {
+        plant_config_t config = rig::spm_400_linear();
+        config.mech.locked = true;
+        config.sensor.i_dc_full_scale_A = 100.0;
+        config.sensor.i_dc_filter_s = tau_s;
+        config.sensor.i_dc_gain_error = 0.02;
+        config.sensor.i_dc_offset_A = -0.5;
+        rig::Plant plant(config);
+        plant.run(rig::pwm(duty, 0.0, 0.0), 2000);
+        plant_adc_t adc;
+        plant_sample(plant, &adc);
+        const double i_A = duty * V / (1.5 * 0.373), x = T / tau_s; // mean: R with R/2 behind it
+        const double y_A =
+            i_A * (std::exp(0.5 * x * (1.0 + duty)) - std::exp(0.5 * x * (1.0 - duty))) / std::expm1(x);
+        // of the ripple, d (1 - d) T R/L of the current at most, the filter leaves no more than that
+        const double ripple = duty * (1.0 - duty) * T * 0.373 / 3.24e-3;
+        EXPECT_NEAR(of_code(adc.i_dc, 100.0), 1.02 * y_A - 0.5, ripple * y_A + 100.0 / 32768) << tau_s;
+    }
+}
+
+// Without filter it is the current of the moment: a held pair carries it, the zero vector does not.
+TEST(LinkSensor, IsTheCurrentOfTheMoment)
+{
+    plant_config_t config = rig::spm_400_linear();
+    config.mech.locked = true;
+    config.sensor.i_dc_full_scale_A = 100.0;
+    rig::Plant plant(config);
+    plant_adc_t adc;
+    plant.run(rig::pwm(1.0, 0.0, 0.0), 4);
+    plant_sample(plant, &adc);
+    EXPECT_NEAR(of_code(adc.i_dc, 100.0), plant.truth().i_A[0], 100.0 / 32768);
+    EXPECT_GT(plant.truth().i_A[0], 2.0);
+    plant.run(rig::pwm(0.5, 0.0, 0.0), 2);
+    plant_sample(plant, &adc);
+    EXPECT_EQ(adc.i_dc, 0x8000);
+    plant_sensor(plant)->i_dc_full_scale_A = 0.0;
+    plant.run(rig::pwm(1.0, 0.0, 0.0), 2);
+    plant_sample(plant, &adc);
+    EXPECT_EQ(adc.i_dc, 0x8000) << "no such sensor";
+}
+
 } // namespace

@@ -55,7 +55,7 @@ class Probe : public testing::Test
         std::vector<Edge> edges;
         for (int p = 0; p < periods; p++) {
             double period_s = p * steps * step_s;
-            probe_start_period(&probe);
+            probe_start_period(&probe, 0.0);
             for (int n = 0; n < steps; n++) {
                 advance(n * step_s, step_s, voltages(period_s + n * step_s),
                         voltages(period_s + (n + 1) * step_s));
@@ -343,7 +343,7 @@ TEST_F(Probe, DipWithinOneStepGivesBothEdges)
     init();
     advance(0.0, 1.0, 90.0, 90.0);
     ASSERT_EQ(probe.edges, 1);
-    probe_start_period(&probe);
+    probe_start_period(&probe, 0.0);
     advance(0.0, 3.0 * tau_s, -120.0, 60.0);
     auto response_V = [](double x) {
         return 90.0 + (-210.0) * -std::expm1(-x) + 60.0 * (x + std::expm1(-x));
@@ -381,7 +381,7 @@ TEST_F(Probe, JumpIsAnEdgeAtTheStartOfItsStep)
     sensor.capture_s = 1e-7;
     init();
     advance(0.0, 1e-5, -10.0, -10.0);
-    probe_start_period(&probe);
+    probe_start_period(&probe, 0.0);
     advance(2e-5, 1e-5, 5.0, -15.0);
     std::vector<plant_capture_t> of_leg_0;
     for (int e = 0; e < probe.edges; e++) {
@@ -475,7 +475,7 @@ TEST_F(Probe, OverflowKeepsTheEarliestAndCountsTheRest)
     for (int e = 0; e < PROBE_EDGES; e++) {
         EXPECT_EQ(probe.edge[e].count, 10u * static_cast<uint32_t>((e + 1) / 3)) << e;
     }
-    probe_start_period(&probe);
+    probe_start_period(&probe, 0.0);
     EXPECT_EQ(probe.edges, 0);
     EXPECT_EQ(probe.lost, 0u);
 }
