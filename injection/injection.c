@@ -2,6 +2,11 @@
 
 #include "firmware/math/compiler.h"
 #include "firmware/math/image.h"
+#include "firmware/math/measure.h"
+
+#define PM_METHOD(name, help, traits, needs) PM_CHECK_NEEDS(name, needs)
+#include "injection/injections.def"
+#undef PM_METHOD
 
 /* One case for each of the list that the image has. */
 

@@ -4,7 +4,7 @@
  * window.h), with the saliency of the machine under load (saliency.h). It owes the contract of every position
  * source (firmware/math/estimate.h), and as it disturbs the current that it measures, it says what the
  * fundamental current is and what voltage it adds:
- *   x_reset(self, config, in)             seeds every member with the current of `in`; warm-up begins
+ *   x_reset(self, config, in)             seeds every member with the current of `in`
  *   x_step(self, config, in, out)         one period, before the observer, which takes the fundamental current
  *                                         out->i. No division, no root
  *   x_last(self)                          eps, misfit and vector of the last step again
@@ -17,7 +17,7 @@
  * In period k the step takes the current sampled at k and gives the voltage for [k+1, k+2).
  *
  * Cost of the dispatch: three instructions for the default, which is compiled into the caller; a call for
- * the others. Tests: tests/contract/injection_contract_test.cpp runs all of the list. */
+ * the others. Tests: tests/contract/observer_contract_test.cpp runs all of the list. */
 #ifndef INJECTION_INJECTION_H
 #define INJECTION_INJECTION_H
 

@@ -13,9 +13,11 @@
  * Without it the position lags by L_q / (L_q - L_d) times as much.
  *
  * eps is exact for small e and 1/2 sin 2e beyond: stable at 0 and 180 degrees, so the polarity must be known.
- * Commanded at k, a voltage is seen at k+2: of the first three steps eps is noise, in the fourth half of the error.
+ * Commanded at k, a voltage is seen at k+2. So the first three steps after a reset show only noise in eps, and
+ * the fourth shows half of the error.
  * misfit: distance of h_d from its value without load, relative. The fundamental current is the mean of two
- * samples. Each period 57 instructions, without the Park transform that it replaces. Functions as injection.h says.
+ * samples. With it a control period takes 48 instructions more (docs/performance.md). Functions as injection.h
+ * says.
  * Tests: tests/unit/injection/pulsating_square_test.cpp, tests/scenario. */
 #ifndef INJECTION_PULSATING_SQUARE_H
 #define INJECTION_PULSATING_SQUARE_H

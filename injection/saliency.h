@@ -12,8 +12,7 @@
  *   I_p                    = i_p_0 + i_p_2 i_q^2
  * All pass through the values at i_q = 0 and i_rated, lambda and theta_m also through those at half of it. The
  * gain rises to 2.5 times that without load at most: beyond, it would only amplify noise. Range: |i_q| < 8,
- * |lambda| <= 1. Tests: tests/unit/injection,
- * tests/unit/drive/config_test.cpp. */
+ * |lambda| <= 1. Tests: tests/unit/injection, tests/unit/drive/config_test.cpp. */
 #ifndef INJECTION_SALIENCY_H
 #define INJECTION_SALIENCY_H
 

@@ -2,7 +2,7 @@
  *   R    = 10 kohm exp(3380 K (1/T - 1/298.15 K))
  *   code = 4096 * 4.7 kohm / (4.7 kohm + R)
  * Straight lines between points at every 10 degC, -40 to 150 degC; 0.6 degC from the curve at most. Called at
- * 1 kHz. Tests: tests/unit/stm32g431/ntc_test.cpp */
+ * 1 kHz. Tests: tests/unit/stm32g431/port_test.cpp */
 #ifndef STM32G431_NTC_H
 #define STM32G431_NTC_H
 

@@ -4,6 +4,11 @@
 
 #include "firmware/drive/drive_parts.h"
 #include "firmware/math/image.h"
+#include "firmware/math/measure.h"
+
+#define PM_METHOD(name, help, traits, needs) PM_CHECK_NEEDS(name, needs)
+#include "firmware/drive/procedures/procedures.def"
+#undef PM_METHOD
 
 _Static_assert(offsetof(position_t, pll) == 0 && offsetof(procedure_t, pll) == 0,
                "drive->pll is that of whichever has the place");
