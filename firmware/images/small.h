@@ -8,6 +8,8 @@
 #define PM_IMAGE_TRACE_NUMBERS 3740U
 
 #define PM_WITHOUT_mismatch 1
+#define PM_WITHOUT_extended_emf_ab 1
+#define PM_WITHOUT_sliding_mode 1
 #define PM_WITHOUT_ekf_full 1
 #define PM_WITHOUT_ekf_reduced 1
 #define PM_WITHOUT_mras_current 1
