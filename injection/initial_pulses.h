@@ -20,6 +20,7 @@
 
 #include "firmware/math/frames.h"
 #include "firmware/math/procedure.h"
+#include "firmware/params/types.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -56,6 +57,8 @@ pm_procedure_t initial_pulses_step(initial_pulses_t *self, const initial_pulses_
 
 /* Of a result, the smaller of the two; at most 2560. */
 pm_sigma_t initial_pulses_margin(const initial_pulses_t *self, const initial_pulses_config_t *config);
+
+void make_initial_pulses(maker_t *m, initial_pulses_config_t *c);
 
 #ifdef __cplusplus
 }

@@ -10,8 +10,8 @@
  *   x_last(self)                          eps, misfit and vector of the last step again
  *   x_slow(self, config, in)              at 1 kHz, also after a reset: what depends on load and speed, for
  *                                         i_dq and omega of the last step
- *   make_x(maker, config, limits)         configuration from SI parameters, and what the source asks of the
- *                                         loops while it leads (x_config.c)
+ *   make_x(maker, config)                 configuration from SI parameters (x_config.c)
+ *   x_limits(maker)                       what the source asks of the loops while it leads
  *   x_answer(maker)                       amplitude of the answer at 45 degrees of error without load, in A
  *                                         of one sample with the noise of one sample
  * In period k the step takes the current sampled at k and gives the voltage for [k+1, k+2).
@@ -59,7 +59,8 @@ obs_out_t injection_last(const injection_t *self, const injection_config_t *conf
 
 /* Of the source that the parameter `injection` names. injection_sees_saliency(): the answer at 45 degrees of
  * error without load is four times the noise, and some saliency is left at rated current. */
-void make_injection(maker_t *m, injection_config_t *c, injection_limits_t *limits);
+void make_injection(maker_t *m, injection_config_t *c);
+injection_limits_t injection_limits(const maker_t *m);
 bool injection_sees_saliency(const maker_t *m);
 
 /* injection_step() of all but INJECTION_INLINE. */

@@ -11,7 +11,7 @@ static void check_carrier(maker_t *m)
     }
 }
 
-void make_injection(maker_t *m, injection_config_t *c, injection_limits_t *limits)
+void make_injection(maker_t *m, injection_config_t *c)
 {
     check_carrier(m);
     c->id = (injection_id_t)m->params->injection;
@@ -20,13 +20,26 @@ void make_injection(maker_t *m, injection_config_t *c, injection_limits_t *limit
 #define PM_METHOD(name, help, traits, needs)                                                                 \
     PM_IN_IMAGE(name, case INJECTION_##name                                                                  \
                 : require(m, needs, DRIVE_PARAM_injection);                                                  \
-                make_##name(m, &c->name, limits); break;)
+                make_##name(m, &c->name); break;)
 #include "injection/injections.def"
 #undef PM_METHOD
     case INJECTION_COUNT:
     default: /* excluded by the range of the parameter */
         refuse(m, DRIVE_PARAM_injection, "is not in this image");
         break;
+    }
+}
+
+injection_limits_t injection_limits(const maker_t *m)
+{
+    switch ((injection_id_t)m->params->injection) {
+#define PM_METHOD(name, help, traits, needs)                                                                 \
+    PM_IN_IMAGE(name, case INJECTION_##name : return name##_limits(m);)
+#include "injection/injections.def"
+#undef PM_METHOD
+    case INJECTION_COUNT:
+    default:
+        return (injection_limits_t){{0, 0}, {0, 0}};
     }
 }
 

@@ -55,7 +55,8 @@ void pulsating_square_slow(pulsating_square_t *self, const pulsating_square_conf
                            const obs_in_t *in);
 obs_out_t pulsating_square_last(const pulsating_square_t *self, const pulsating_square_config_t *config);
 
-void make_pulsating_square(maker_t *m, pulsating_square_config_t *c, injection_limits_t *limits);
+void make_pulsating_square(maker_t *m, pulsating_square_config_t *c);
+injection_limits_t pulsating_square_limits(const maker_t *m);
 pm_num_t pulsating_square_answer(const maker_t *m);
 
 #ifdef __cplusplus

@@ -65,7 +65,8 @@ void rotating_sine_step(rotating_sine_t *self, const rotating_sine_config_t *con
 void rotating_sine_slow(rotating_sine_t *self, const rotating_sine_config_t *config, const obs_in_t *in);
 obs_out_t rotating_sine_last(const rotating_sine_t *self, const rotating_sine_config_t *config);
 
-void make_rotating_sine(maker_t *m, rotating_sine_config_t *c, injection_limits_t *limits);
+void make_rotating_sine(maker_t *m, rotating_sine_config_t *c);
+injection_limits_t rotating_sine_limits(const maker_t *m);
 pm_num_t rotating_sine_answer(const maker_t *m);
 
 #ifdef __cplusplus

@@ -56,10 +56,10 @@ static pm_num_t seen_share(const maker_t *m)
     return pm_num_add(pm_num(1), square(kappa));
 }
 
-static void make_limits(const maker_t *m, injection_limits_t *limits)
+injection_limits_t rotating_sine_limits(const maker_t *m)
 {
-    limits->pll_max = bandwidth(m, pm_num_ratio(3, 10));
-    limits->current_max = bandwidth(m, pm_num_ratio(4, 10));
+    return (injection_limits_t){.pll_max = bandwidth(m, pm_num_ratio(3, 10)),
+                                .current_max = bandwidth(m, pm_num_ratio(4, 10))};
 }
 
 static void make_carrier(maker_t *m, rotating_sine_config_t *c, int32_t n)
@@ -81,14 +81,13 @@ static bool load_counts(const maker_t *m)
     return pm_num_cmp(pm_num_sub(L.L_q, L.L_d), least_difference) >= 0;
 }
 
-void make_rotating_sine(maker_t *m, rotating_sine_config_t *c, injection_limits_t *limits)
+void make_rotating_sine(maker_t *m, rotating_sine_config_t *c)
 {
     const int32_t n = periods(m);
     if (n < WINDOW_LEAST || n > WINDOW_MOST) {
         refuse(m, DRIVE_PARAM_f_injection, "must lie between a fortieth and an eighth of f_pwm");
         return;
     }
-    make_limits(m, limits);
     make_saliency_sequence(m, &c->saliency, flux(m));
     make_carrier(m, c, n);
     c->with_load = load_counts(m);

@@ -1,6 +1,7 @@
 #include "firmware/drive/config.h"
 
-#include "firmware/drive/config_maker.h"
+#include "firmware/drive/procedures/procedure.h"
+#include "firmware/params/maker.h"
 
 static void make_base(maker_t *m)
 {
@@ -120,8 +121,10 @@ static void make_limits(maker_t *m, drive_config_t *config)
     config->omega_max = speed(m, DRIVE_PARAM_speed_max);
     config->v_linear = fixed(m, pm_num_mul(pm_num_ratio(98, 100), pm_num_sqrt(pm_num_ratio(1, 3))), UNIT_BITS,
                              DRIVE_PARAM_v_full_scale);
-    config->psi_m = config->current.psi_m;
-    config->dL = config->current.L_d - config->current.L_q;
+    config->R_s = per_unit(m, DRIVE_PARAM_R_s, m->impedance);
+    config->L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
+    config->L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);
+    config->psi_m = per_unit(m, DRIVE_PARAM_psi_m, m->base.psi);
 }
 
 static sequence_id_t start_of(const drive_params_t *params, bool injection)
@@ -157,15 +160,16 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     config->injection =
         params->start_method % 2 == 1 || (params->start_method == 0 && injection_sees_saliency(&m));
     config->start = (uint8_t)start_of(params, config->injection);
+    require(&m, sequence_needs((sequence_id_t)config->start), DRIVE_PARAM_start_method);
     make_modulator(&m, &config->modulator);
-    make_current_control(&m, &config->current);
+    make_regulator(&m, &config->regulator);
     make_speed_control(&m, &config->speed);
     make_mtpa(&m, &config->mtpa);
     m.i_d_rated = i_d_rated(&m, &config->mtpa);
     make_field_weakening(&m, &config->field_weakening);
     make_position(&m, &config->position, config->injection);
     if (config->start != (uint8_t)SEQUENCE_align) {
-        make_pulses(&m, &config->pulses);
+        make_initial_pulses(&m, &config->pulses);
     }
     make_open_loop(&m, &config->open_loop);
     make_protection(&m, &config->protection);

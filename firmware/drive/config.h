@@ -5,10 +5,10 @@
 #ifndef DRIVE_CONFIG_H
 #define DRIVE_CONFIG_H
 
-#include "firmware/control/current_control.h"
 #include "firmware/control/field_weakening.h"
 #include "firmware/control/modulator.h"
 #include "firmware/control/mtpa.h"
+#include "firmware/control/regulator.h"
 #include "firmware/control/speed_control.h"
 #include "firmware/drive/position.h"
 #include "firmware/drive/procedures/sequence.h"
@@ -48,7 +48,7 @@ typedef struct {
 typedef struct {
     drive_base_t base;
     modulator_config_t modulator;
-    current_control_config_t current;
+    regulator_config_t regulator;
     speed_control_config_t speed;
     mtpa_config_t mtpa;
     field_weakening_config_t field_weakening;
@@ -64,9 +64,8 @@ typedef struct {
     pm_q_t i_max;
     pm_q_t i_d_light;
     pm_q_t omega_max;
-    pm_unit_t v_linear; /* share of v_dc that the voltage vector may reach */
-    pm_q_t psi_m;
-    pm_q_t dL; /* L_d - L_q */
+    pm_unit_t v_linear;          /* share of v_dc that the voltage vector may reach */
+    pm_q_t R_s, psi_m, L_d, L_q; /* of the machine */
 } drive_config_t;
 
 /* channels: what the board has, hal_channels(). */

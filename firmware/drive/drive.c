@@ -35,8 +35,8 @@ bool drive_same_frame(const drive_config_t *a, const drive_config_t *b)
     const drive_base_t *y = &b->base;
     return same(x->v, y->v) && same(x->i, y->i) && same(x->omega, y->omega) && same(x->t_s, y->t_s) &&
            same(a->pole_pairs, b->pole_pairs) && a->modulator.counts == b->modulator.counts &&
-           a->injection == b->injection && a->position.injection.id == b->position.injection.id &&
-           a->start == b->start;
+           a->injection == b->injection && a->regulator.id == b->regulator.id &&
+           a->position.injection.id == b->position.injection.id && a->start == b->start;
 }
 
 PM_RARE void drive_reconfigure(drive_t *drive, const drive_config_t *config)
@@ -213,17 +213,19 @@ static inline void write_out(const modulator_out_t *m, drive_out_t *out)
 }
 
 /* The voltage acts one and a half periods later, when the frame has turned to drive->ahead. */
-static inline void control(drive_t *drive, const position_out_t *frame, drive_out_t *out)
+static inline void control(drive_t *drive, const position_out_t *frame, bool usual, drive_out_t *out)
 {
     const drive_config_t *c = &drive->config;
     const pm_q_t v_dc = drive->status.v_dc;
-    current_control_out_t u;
-    current_control_step(&drive->current, &drive->current_config, frame->i, pm_pair_dq(&drive->i_ref),
-                         frame->omega, pm_unit(v_dc, drive->v_share), &u);
-    drive->u = u.wide;
+    const regulator_in_t in = {.i = frame->i,
+                               .i_ref = pm_pair_dq(&drive->i_ref),
+                               .omega = frame->omega,
+                               .v_max = pm_unit(v_dc, drive->v_share)};
+    regulator_out_t *u = &drive->voltage;
+    regulator_step_usual(&drive->regulator, &drive->regulator_config, usual, &in, u);
     drive->status.i = frame->i;
 
-    const pm_dq_t v = {.d = pm_shl(u.wide.d, 30 - PM_WIDE_BITS), .q = pm_shl(u.wide.q, 30 - PM_WIDE_BITS)};
+    const pm_dq_t v = {.d = pm_shl(u->v.d, 30 - PM_WIDE_BITS), .q = pm_shl(u->v.q, 30 - PM_WIDE_BITS)};
     pm_ab_t v_ab = pm_park_inverse_quarter(v, frame->ahead);
     if (drive->carrier) {
         v_ab.alpha += frame->carrier.alpha;
@@ -250,31 +252,27 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
         drive->v_acting.alpha = next.alpha;
         drive->v_acting.beta = next.beta;
         drive->status.theta = drive->position.pll.theta;
-        if (drive->stage != STAGE_VECTOR) {
-            drive->theta_open += (pm_angle_t)drive->turn_open;
-            if (!drive->forced) {
-                frame = imposed_frame(drive);
+        bool usual = drive->usual;
+        if (!usual) {
+            usual = drive->regulator_config.id == REGULATOR_INLINE;
+            if (drive->stage != STAGE_VECTOR) {
+                drive->theta_open += (pm_angle_t)drive->turn_open;
+                if (!drive->forced) {
+                    frame = imposed_frame(drive);
+                }
             }
         }
-        control(drive, &frame, out);
+        control(drive, &frame, usual, out);
     }
 }
 
-static void slow_down(pm_pi_config_t *pi, pm_unit_t share)
-{
-    pi->kp = pm_unit(pi->kp, share);
-    pi->ki = pm_unit(pi->ki, share);
-}
-
-/* kp and ki are proportional to the bandwidth; the integrals are voltages and stay. */
 static void prepare_current_control(drive_t *drive)
 {
-    drive->current_config = drive->config.current;
+    drive->regulator_config = drive->config.regulator;
     if (drive->carrier) {
         const pm_unit_t share = position_current_share(&drive->position, &drive->config.position);
         if (share < PM_UNIT_MAX) {
-            slow_down(&drive->current_config.d, share);
-            slow_down(&drive->current_config.q, share);
+            regulator_slow_down(&drive->regulator_config, share);
         }
     }
 }
@@ -295,6 +293,7 @@ PM_RARE void drive_prepare(drive_t *drive)
         position_force(&drive->position, &c->position, &along);
     }
     drive->turn_open = turn;
+    drive->usual = drive->stage == STAGE_VECTOR && drive->config.regulator.id == REGULATOR_INLINE;
     drive->ahead = pm_dir((pm_angle_t)turn + (pm_angle_t)pm_half(turn));
     drive->carrier = drive->stage == STAGE_VECTOR && drive->position.inject;
     drive->v_share = c->v_linear;

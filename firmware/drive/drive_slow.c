@@ -52,7 +52,7 @@ static void begin_sequence(drive_t *drive)
 static void begin_injection(drive_t *drive, pm_angle_t theta)
 {
     position_reset(&drive->position, &drive->config.position, theta, drive->i_ab, true);
-    current_control_reset(&drive->current, (pm_dq_t){0, 0});
+    regulator_reset(&drive->regulator, &drive->config.regulator, (pm_dq_t){0, 0}, (pm_dq_t){0, 0}, 0);
     reference_reset(drive, 0);
     drive->stage = STAGE_VECTOR;
     drive->state_ms = 0;
@@ -232,8 +232,8 @@ static void report(drive_t *drive)
 void drive_slow(drive_t *drive, const drive_slow_in_t *in)
 {
     drive->temperature_dC = in->temperature_dC;
-    drive->status.limits = drive->current.limited || drive->modulator.limited ? DRIVE_LIMIT_VOLTAGE : 0U;
-    drive->current.limited = false;
+    drive->status.limits = drive->voltage.limited || drive->modulator.limited ? DRIVE_LIMIT_VOLTAGE : 0U;
+    drive->voltage.limited = false;
     drive->modulator.limited = false;
     if (drive->fault == DRIVE_FAULT_NONE) {
         if (!drive->references_ready && !is_alone(drive)) {

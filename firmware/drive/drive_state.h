@@ -27,18 +27,19 @@ struct drive {
     pm_abc_t i_abc;
     pm_ab_t i_ab;
     bool hw_fault;
-    bool carrier;          /* injection is on */
-    bool forced;           /* open loop: the observer is forced to the ramp angle */
+    bool carrier; /* injection is on */
+    bool forced;  /* open loop: the observer is forced to the ramp angle */
+    bool usual;   /* estimated angle and REGULATOR_INLINE: one branch per period for all that is not */
     bool references_ready; /* the command's references are in per-unit */
     pm_dir_t ahead;        /* one and a half periods of rotation: from the sample to where the voltage acts */
     pm_unit_t v_share;     /* share of v_dc for current control */
-    pm_dq_t u;             /* voltage of the current control, without carrier; Q22 */
     pm_ab_t v_acting;      /* commanded at k-1: acts over [k, k+1) */
     pm_ab_t v_next;        /* commanded at k: acts over [k+1, k+2) */
     modulator_t modulator;
 
-    current_control_t current;
-    current_control_config_t current_config; /* the configured one, slowed while injection asks for it */
+    regulator_out_t voltage; /* of the current control, without carrier */
+    regulator_t regulator;
+    regulator_config_t regulator_config; /* the configured one, slowed while injection asks for it */
     pm_dq_t i_ref;
     pm_angle_t theta_open; /* open loop: angle of the current vector, */
     pm_q_t omega_open;     /* its speed, which yields to a swinging rotor, */

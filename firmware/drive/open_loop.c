@@ -20,7 +20,7 @@ void open_loop_start(drive_t *drive)
     drive->emf_open = 0;
     drive->i_open = 0;
     position_reset(&drive->position, &drive->config.position, 0, drive->i_ab, false);
-    current_control_reset(&drive->current, (pm_dq_t){0, 0});
+    regulator_reset(&drive->regulator, &drive->config.regulator, (pm_dq_t){0, 0}, (pm_dq_t){0, 0}, 0);
 }
 
 /* The vector keeps its place: the imposed angle starts at the angle of the present current. */
@@ -28,14 +28,15 @@ void open_loop_resume(drive_t *drive)
 {
     const pm_dq_t i = drive->status.i;
     const pm_angle_t turn = pm_atan2(i.q, i.d);
-    const pm_ab_t v = {.alpha = pm_narrow(drive->u.d), .beta = pm_narrow(drive->u.q)};
+    const pm_ab_t v = {.alpha = pm_narrow(drive->voltage.v.d), .beta = pm_narrow(drive->voltage.v.q)};
     const pm_dq_t u = pm_park(v, pm_dir(turn));
     drive->theta_open = drive->position.pll.theta + turn;
     drive->omega_ramp = drive->position.pll.omega;
     drive->omega_open = drive->omega_ramp;
     drive->emf_open = 0;
     drive->i_open = pm_hypot(i.d, i.q);
-    current_control_reset(&drive->current, u);
+    regulator_reset(&drive->regulator, &drive->config.regulator, u, (pm_dq_t){.d = drive->i_open, .q = 0},
+                    drive->omega_ramp);
     drive->agree_ms = 0;
     drive->stage = STAGE_OPEN_LOOP;
 }
@@ -45,9 +46,10 @@ static void hand_over(drive_t *drive)
     const pm_angle_t turn = drive->theta_open - drive->position.pll.theta;
     const pm_dir_t dir = pm_dir(turn);
     const pm_ab_t i = pm_park_inverse((pm_dq_t){.d = drive->i_open, .q = 0}, dir);
-    const pm_dq_t v = {.d = pm_narrow(drive->u.d), .q = pm_narrow(drive->u.q)};
+    const pm_dq_t v = {.d = pm_narrow(drive->voltage.v.d), .q = pm_narrow(drive->voltage.v.q)};
     const pm_ab_t u = pm_park_inverse(v, dir);
-    current_control_reset(&drive->current, (pm_dq_t){.d = u.alpha, .q = u.beta});
+    regulator_reset(&drive->regulator, &drive->config.regulator, (pm_dq_t){.d = u.alpha, .q = u.beta},
+                    (pm_dq_t){.d = i.alpha, .q = i.beta}, drive->position.pll.omega);
     reference_reset(drive, i.beta);
     drive->i_ref.d = i.alpha;
     drive->i_open = i.alpha;
@@ -84,7 +86,7 @@ static void damp(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
     const pm_q_t across =
-        pm_narrow_sat(drive->u.q) - pm_mul(drive->omega_open, pm_mul(c->current.L_d, drive->status.i.d));
+        pm_narrow_sat(drive->voltage.v.q) - pm_mul(drive->omega_open, pm_mul(c->L_d, drive->status.i.d));
     const pm_q_t emf =
         pm_clamp(across - pm_mul(drive->omega_ramp, c->psi_m), -c->open_loop.v_swing, c->open_loop.v_swing);
     const pm_q_t swing = emf - pm_lp1(&drive->emf_open, emf, c->open_loop.k_swing);

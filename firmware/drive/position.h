@@ -105,6 +105,9 @@ static inline pm_q_t position_injected(const position_t *self)
  * weight of the observer. */
 pm_unit_t position_current_share(const position_t *self, const position_config_t *config);
 
+/* config_position.c; injection: a low-speed source leads at low speed. */
+void make_position(maker_t *m, position_config_t *c, bool injection);
+
 /* At 1 kHz, with the current of the last step and the same in its frame: weight, carrier, loop gains,
  * quality. */
 void position_slow(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq);

@@ -33,8 +33,8 @@ void reference_reset(drive_t *drive, pm_q_t i_q)
 /* T = psi_a i_q in per-unit, psi_a = psi_m + (L_d - L_q) i_d with the present reference. */
 static pm_q_t current_for(const drive_t *drive, pm_q_t torque)
 {
-    const pm_q_t psi =
-        pm_max(drive->config.psi_m + pm_mul(drive->config.dL, drive->i_ref.d), drive->config.psi_m / 4);
+    const drive_config_t *c = &drive->config;
+    const pm_q_t psi = pm_max(c->psi_m + pm_mul(c->L_d - c->L_q, drive->i_ref.d), c->psi_m / 4);
     const pm_q_t i = pm_div(pm_abs(torque), psi);
     return torque < 0 ? -i : i;
 }
@@ -43,9 +43,9 @@ static pm_q_t flux_current(drive_t *drive, pm_q_t i_q)
 {
     const drive_config_t *c = &drive->config;
     const pm_q_t v_top = pm_unit(drive->status.v_dc, c->v_linear);
-    const pm_q_t weak =
-        field_weakening_step(&drive->field_weakening, &c->field_weakening,
-                             pm_hypot(pm_narrow(drive->u.d), pm_narrow(drive->u.q)), v_top - v_top / 20);
+    const pm_q_t weak = field_weakening_step(
+        &drive->field_weakening, &c->field_weakening,
+        pm_hypot(pm_narrow(drive->voltage.v.d), pm_narrow(drive->voltage.v.q)), v_top - v_top / 20);
     const pm_q_t light = pm_mul(c->i_d_light, drive->position.weight);
     const pm_q_t i_d = light < 0 ? -light : pm_min(mtpa_i_d(&c->mtpa, i_q), -light);
     return pm_max(i_d + weak, -c->i_max);

@@ -7,6 +7,7 @@
 #define PM_IMAGE_NAME "small"
 #define PM_IMAGE_TRACE_NUMBERS 3740U
 
+#define PM_WITHOUT_deadbeat 1
 #define PM_WITHOUT_mismatch 1
 #define PM_WITHOUT_extended_emf_ab 1
 #define PM_WITHOUT_sliding_mode 1

@@ -1,10 +1,10 @@
 // The firmware's headers that the contract suites use.
 #pragma once
 
-#include "firmware/control/current_control.h"
 #include "firmware/control/field_weakening.h"
 #include "firmware/control/modulator.h"
 #include "firmware/control/mtpa.h"
+#include "firmware/control/regulator.h"
 #include "firmware/control/speed_control.h"
 #include "firmware/drive/drive_parts.h"
 #include "firmware/math/estimate.h"

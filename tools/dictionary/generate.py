@@ -13,7 +13,7 @@ PACKAGE = "tools/pmdrive/pmdrive"
 BYTES = "firmware/can/dictionary_bytes.c"
 LEDGER = "firmware/params/allocations.txt"
 # Lists whose methods are all beside them: METHODS_H of the folder has their headers.
-LISTS = "observers/observers.def", "injection/injections.def"
+LISTS = "observers/observers.def", "injection/injections.def", "firmware/control/regulators.def"
 METHODS_H = "methods.h"
 # Beside a method x.h stands x.yaml with its parameters.
 METHODS = "observers/*.yaml", "injection/**/*.yaml", "bldc/**/*.yaml", "firmware/control/*.yaml", "firmware/drive/**/*.yaml"
@@ -52,7 +52,7 @@ def _c_files(render, dictionary, sheet):
 def _headers(render, known):
     for path in LISTS:
         folder = path.rpartition("/")[0]
-        render(f"{folder}/{METHODS_H}", "methods.h.j2", list=path, folder=folder, guard=f"{folder.upper()}_METHODS_H",
+        render(f"{folder}/{METHODS_H}", "methods.h.j2", list=path, folder=folder, guard="_".join(folder.removeprefix("firmware/").upper().split("/")) + "_METHODS_H",
                methods=sorted(name for name, found in known.items() if found == path))
 
 

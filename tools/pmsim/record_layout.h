@@ -33,7 +33,7 @@ static inline void record_layout(uint32_t layout[RECORD_LAYOUT])
         offsetof(drive_t, procedure.identify.of),
         offsetof(drive_t, sequence.margin),
         offsetof(drive_t, beside),
-        offsetof(drive_t, current),
+        offsetof(drive_t, regulator),
         offsetof(drive_t, i_ref),
         offsetof(drive_t, config.injection),
         offsetof(drive_t, config.protection.lost_ms),

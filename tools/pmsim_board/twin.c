@@ -110,15 +110,15 @@ static size_t control(void *before, const void *memory, bool event[FIGURE_EVENTS
     drive_t *drive = before;
     const memory_t *image = memory;
     drive_out_t out = image->out;
-    const bool current = drive->current.limited;
+    const bool current = drive->voltage.limited;
     const bool modulator = drive->modulator.limited;
     const bool fault = drive->fault != DRIVE_FAULT_NONE;
-    drive->current.limited = false;
+    drive->voltage.limited = false;
     drive->modulator.limited = false;
     drive_step(drive, &image->in, &out);
-    event[FIGURE_LIMITED] = drive->current.limited || drive->modulator.limited;
+    event[FIGURE_LIMITED] = drive->voltage.limited || drive->modulator.limited;
     event[FIGURE_FAULT] = !fault && drive->fault != DRIVE_FAULT_NONE;
-    drive->current.limited = drive->current.limited || current;
+    drive->voltage.limited = drive->voltage.limited || current;
     drive->modulator.limited = drive->modulator.limited || modulator;
     return difference(drive, &out, image);
 }

@@ -24,11 +24,12 @@ pm_q_t commissioning_mean(const identify_t *self, uint32_t n)
 
 void commissioning_start_current(drive_t *drive)
 {
-    const pm_dq_t v = {.d = drive->procedure.identify.v.alpha, .q = drive->procedure.identify.v.beta};
-    current_control_reset(&drive->current, v);
+    identify_t *self = &drive->procedure.identify;
+    self->axis_d.integral = pm_widen(self->v.alpha);
+    self->axis_q.integral = pm_widen(self->v.beta);
     drive->i_ref = (pm_dq_t){0, 0};
     drive->omega_open = 0;
-    drive->procedure.identify.kind = KIND_CURRENT;
+    self->kind = KIND_CURRENT;
 }
 
 /* A bandwidth of f_pwm / 21: kp = 0.3 L / T_s, ki = 0.3 R. */
@@ -94,14 +95,14 @@ static inline pm_abc_t turn(drive_t *drive)
     drive->theta_open += (pm_angle_t)step;
     const pm_dir_t dir = pm_dir(drive->theta_open);
     const pm_dq_t i = pm_park(drive->i_ab, dir);
-    pm_dq_t u = {.d = pm_narrow(axis_voltage(drive, &drive->current.d, drive->i_ref.d - i.d)), .q = 0};
+    pm_dq_t u = {.d = pm_narrow(axis_voltage(drive, &self->axis_d, drive->i_ref.d - i.d)), .q = 0};
     if (step != 0) {
-        u.q = pm_narrow(axis_voltage(drive, &drive->current.q, -i.q));
+        u.q = pm_narrow(axis_voltage(drive, &self->axis_q, -i.q));
     } else {
-        drive->current.q.integral = 0;
+        self->axis_q.integral = 0;
     }
     drive->status.i = i;
-    drive->u = u;
+    drive->voltage.v = u;
     self->sum[0] += u.d;
     self->sum[1] += u.q;
     self->sum[2] += i.d;
@@ -130,7 +131,7 @@ static void wave(drive_t *drive, pm_ab_t v_past)
     square_step(drive, v_past);
     const pm_q_t bias = self->of.square.bias;
     if (bias != 0) {
-        self->v.alpha = pm_narrow(axis_voltage(drive, &drive->current.d, bias - drive->i_ab.alpha));
+        self->v.alpha = pm_narrow(axis_voltage(drive, &self->axis_d, bias - drive->i_ab.alpha));
     }
 }
 

@@ -45,12 +45,11 @@ static void know(drive_t *drive)
 {
     identify_t *self = &drive->procedure.identify;
     const commissioning_result_t *r = &drive->commissioning_report.result;
-    const current_control_config_t *c = &drive->config.current;
+    const drive_config_t *c = &drive->config;
     self->L_d = r->L_d != 0 ? r->L_d : c->L_d;
     self->L_q = r->L_q != 0 ? r->L_q : c->L_q;
     self->lost = r->R != 0 ? r->lost : assumed_loss(drive);
-    /* of the current control: kb = R T_s / L */
-    self->R = r->R != 0 ? r->R : pm_div(pm_unit(c->L_d, c->d.kb), commissioning_period(drive));
+    self->R = r->R != 0 ? r->R : c->R_s;
     commissioning_set_gains(drive);
 }
 

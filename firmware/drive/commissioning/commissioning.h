@@ -97,6 +97,7 @@ typedef struct {
     pm_ab_t v_past;  /* what acted over the last period */
     int32_t rest[3]; /* of the timer's counts, 128ths */
     pm_pi_config_t pi;
+    pm_pi_t axis_d, axis_q;   /* current control along the vector and across it */
     pm_q_t R, lost, L_d, L_q; /* per-unit, as far as they are known */
     uint16_t ms;              /* in this phase */
     uint8_t phase, part, kind;

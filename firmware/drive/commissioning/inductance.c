@@ -74,7 +74,7 @@ void inductance_enter(drive_t *drive, bool on_q, bool rated)
     self->of.square.count = (uint16_t)((uint32_t)self->of.square.half * 646U / 1000U);
     self->v = (pm_ab_t){0, 0};
     self->kind = KIND_SQUARE;
-    current_control_reset(&drive->current, (pm_dq_t){0, 0});
+    self->axis_d.integral = 0;
 }
 
 /* Products of two signals have twice their fractional bits. */

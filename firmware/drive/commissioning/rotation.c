@@ -31,7 +31,7 @@ void rotation_enter(drive_t *drive)
         pm_clamp(drive->omega_target, -drive->config.omega_max, drive->config.omega_max);
     self->of.rotation.count = 0;
     self->of.rotation.omega_ref = 0;
-    self->of.rotation.u_d = drive->u.d;
+    self->of.rotation.u_d = drive->voltage.v.d;
 }
 
 static pm_q_t ramp_step(const identify_t *self)
@@ -73,12 +73,12 @@ static void turn_on(drive_t *drive, pm_q_t target)
 {
     identify_t *self = &drive->procedure.identify;
     const pm_q_t ref = commissioning_approach(self->of.rotation.omega_ref, target, ramp_step(self));
-    const pm_q_t off = drive->u.d - self->of.rotation.u_d;
+    const pm_q_t off = drive->voltage.v.d - self->of.rotation.u_d;
     self->of.rotation.u_d += off / 256;
     self->of.rotation.omega_ref = ref;
     drive->omega_open = ref;
     if (pm_abs(ref) > pm_abs(self->of.rotation.omega) / 4) {
-        const pm_q_t behind = pm_clamp(pm_div(off, pm_abs(drive->u.q)), -PM_Q(0.3), PM_Q(0.3));
+        const pm_q_t behind = pm_clamp(pm_div(off, pm_abs(drive->voltage.v.q)), -PM_Q(0.3), PM_Q(0.3));
         /* per-unit: 0.03 over the radians of a millisecond at base speed */
         const pm_q_t per_ms = commissioning_period(drive) * (int32_t)drive->config.slow_divider;
         const pm_q_t back = pm_mul(behind, pm_div(PM_Q(0.03), per_ms));

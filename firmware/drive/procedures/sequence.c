@@ -1,6 +1,7 @@
 #include "firmware/drive/procedures/sequence.h"
 
 #include "firmware/drive/procedures/procedure.h"
+#include "firmware/math/measure.h"
 
 #define FAULT_ALWAYS SEQUENCE_FAULT, PM_RUNNING
 #define CALIBRATE                                                                                            \
@@ -20,6 +21,26 @@ static const sequence_step_t steps[SEQUENCE_COUNT][SEQUENCE_STEPS] = {
 const sequence_step_t *sequence_step(sequence_id_t id, uint32_t step)
 {
     return &steps[id][step];
+}
+
+static uint32_t procedure_needs(uint8_t procedure)
+{
+    static const uint16_t needed[PROCEDURE_COUNT] = {
+        0,
+#define PM_METHOD(name, help, traits, needs) needs,
+#include "firmware/drive/procedures/procedures.def"
+#undef PM_METHOD
+    };
+    return needed[procedure];
+}
+
+uint32_t sequence_needs(sequence_id_t id)
+{
+    uint32_t needs = 0;
+    for (uint32_t step = 0; step < SEQUENCE_STEPS; step++) {
+        needs |= procedure_needs(steps[id][step].procedure);
+    }
+    return needs;
 }
 
 uint32_t sequence_next(const sequence_step_t *step, pm_procedure_t result)

@@ -47,6 +47,7 @@ typedef struct {
 
 const sequence_step_t *sequence_step(sequence_id_t id, uint32_t step);
 uint32_t sequence_next(const sequence_step_t *step, pm_procedure_t result);
+uint32_t sequence_needs(sequence_id_t id); /* NEEDS_...: of all its procedures */
 
 /* The drive's place in it. */
 typedef struct {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "firmware/params/parameters.h"
-#include "observer_gains.h" // made by CMake: all of tests/unit/observers/*_gains.h
+#include "method_gains.h" // made by CMake: tests/unit/*/*_gains.h of all methods
 #include "tests/contract/bench.h"
 #include "tests/unit/math/samples.h"
 
@@ -170,15 +170,15 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
         {"drop", c.modulator.drop, 28, 1 / V},
         {"zone_alpha", c.modulator.zone_alpha, 20, I / 0.03},
         {"zone_beta", c.modulator.zone_beta, 20, std::sqrt(0.75) * I / 0.03},
-        {"d.kp", c.current.d.kp, 26, w_c * L_d / Z},
-        {"d.ki", c.current.d.ki, 26, w_c * R * T / Z},
-        {"d.kb", c.current.d.kb, 31, R * T / L_d},
-        {"q.kp", c.current.q.kp, 26, w_c * L_q / Z},
-        {"q.ki", c.current.q.ki, 26, w_c * R * T / Z},
-        {"q.kb", c.current.q.kb, 31, R * T / L_q},
-        {"L_d", c.current.L_d, 28, L_d / Lb},
-        {"L_q", c.current.L_q, 28, L_q / Lb},
-        {"psi_m", c.current.psi_m, 28, psi / Pb},
+        {"d.kp", c.regulator.synchronous_pi.d.kp, 26, w_c * L_d / Z},
+        {"d.ki", c.regulator.synchronous_pi.d.ki, 26, w_c * R * T / Z},
+        {"d.kb", c.regulator.synchronous_pi.d.kb, 31, R * T / L_d},
+        {"q.kp", c.regulator.synchronous_pi.q.kp, 26, w_c * L_q / Z},
+        {"q.ki", c.regulator.synchronous_pi.q.ki, 26, w_c * R * T / Z},
+        {"q.kb", c.regulator.synchronous_pi.q.kb, 31, R * T / L_q},
+        {"L_d", c.L_d, 28, L_d / Lb},
+        {"L_q", c.L_q, 28, L_q / Lb},
+        {"psi_m", c.psi_m, 28, psi / Pb},
         {"speed kp", c.speed.pi.kp, 26, kp_s},
         {"speed ki", c.speed.pi.ki, 26, kp_s * w_s * slow / 4},
         {"speed kb", c.speed.pi.kb, 31, w_s * slow / 4},
@@ -403,6 +403,32 @@ Names observer_must_be_positive(const observer_config_t &o)
     }
 }
 
+Names injection_must_be_positive(const injection_config_t &i)
+{
+    switch (i.id) {
+#define PM_METHOD(x, help, traits, needs)                                                                    \
+    case INJECTION_##x:                                                                                      \
+        return gains::must_be_positive(i.x);
+#include "injection/injections.def"
+#undef PM_METHOD
+    default:
+        return {};
+    }
+}
+
+Names regulator_must_be_positive(const regulator_config_t &r)
+{
+    switch (r.id) {
+#define PM_METHOD(x, help, traits, needs)                                                                    \
+    case REGULATOR_##x:                                                                                      \
+        return gains::must_be_positive(r.x);
+#include "firmware/control/regulators.def"
+#undef PM_METHOD
+    default:
+        return {};
+    }
+}
+
 // What must be above zero in any configuration that is accepted.
 Names must_be_positive(const drive_config_t &c)
 {
@@ -410,15 +436,9 @@ Names must_be_positive(const drive_config_t &c)
         {"counts", c.modulator.counts},
         {"zone_alpha", c.modulator.zone_alpha},
         {"zone_beta", c.modulator.zone_beta},
-        {"d.kp", c.current.d.kp},
-        {"d.ki", c.current.d.ki},
-        {"d.kb", c.current.d.kb},
-        {"q.kp", c.current.q.kp},
-        {"q.ki", c.current.q.ki},
-        {"q.kb", c.current.q.kb},
-        {"L_d", c.current.L_d},
-        {"L_q", c.current.L_q},
-        {"psi_m", c.current.psi_m},
+        {"L_d", c.L_d},
+        {"L_q", c.L_q},
+        {"psi_m", c.psi_m},
         {"speed kb", c.speed.pi.kb},
         {"speed slope", c.speed.slope},
         {"fw k", c.field_weakening.k},
@@ -436,8 +456,9 @@ Names must_be_positive(const drive_config_t &c)
         {"omega_stall", c.protection.omega_stall},
         {"i_trip", c.protection.i_trip},
     };
-    for (const auto &item : observer_must_be_positive(c.position.observer)) {
-        x.push_back(item);
+    for (const Names &names :
+         {observer_must_be_positive(c.position.observer), regulator_must_be_positive(c.regulator)}) {
+        x.insert(x.end(), names.begin(), names.end());
     }
     if (c.position.loop.id == LOOP_SIMPLIFIED_EKF) {
         x.push_back({"K_1", c.position.loop.k_acceleration});
@@ -451,11 +472,8 @@ Names must_be_positive(const drive_config_t &c)
         x.push_back({"mismatch current", c.position.mismatch.i});
     }
     if (c.injection) {
-        const pulsating_square_config_t &s = c.position.injection.pulsating_square;
-        x.push_back({"v_h", s.v_h});
-        x.push_back({"gain_0", s.saliency.gain_0});
-        x.push_back({"h_d", s.h_d});
-        x.push_back({"h_d_inverse", s.h_d_inverse});
+        const Names names = injection_must_be_positive(c.position.injection);
+        x.insert(x.end(), names.begin(), names.end());
     }
     if (c.start != SEQUENCE_align) {
         x.push_back({"pulse periods", c.pulses.periods});
@@ -467,10 +485,20 @@ Names must_be_positive(const drive_config_t &c)
 }
 
 // Gain of the injection loop at a current: it must not turn round below the current limit.
-double square_gain(const drive_config_t &c, double i_q)
+double injection_gain(const drive_config_t &c, double i_q)
 {
-    return real(c.position.injection.pulsating_square.saliency.gain_0, 20) +
-           real(c.position.injection.pulsating_square.saliency.gain_2, 16) * i_q * i_q;
+    const auto at = [i_q](const saliency_config_t &s) {
+        return real(s.gain_0, 20) + real(s.gain_2, 16) * i_q * i_q;
+    };
+    switch (c.position.injection.id) {
+#define PM_METHOD(x, help, traits, needs)                                                                    \
+    case INJECTION_##x:                                                                                      \
+        return at(c.position.injection.x.saliency);
+#include "injection/injections.def"
+#undef PM_METHOD
+    default:
+        return 0;
+    }
 }
 
 struct Survey {
@@ -497,7 +525,7 @@ Survey survey(int draws)
         if (c.injection) {
             ++s.injecting;
             const double i_rated = p.i_rated / static_cast<double>(p.i_full_scale);
-            s.known["injection gain at i_rated"] += square_gain(c, i_rated) <= 0 ? 1 : 0;
+            s.known["injection gain at i_rated"] += injection_gain(c, i_rated) <= 0 ? 1 : 0;
         }
     }
     return s;
@@ -593,7 +621,7 @@ TEST(Config, RefusesInjectionWhoseSaliencyTurnsRound)
         drive_config_t c = {};
         const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
         if (r.ok && c.injection) {
-            EXPECT_GT(square_gain(c, 0.4), 0) << L_qh;
+            EXPECT_GT(injection_gain(c, 0.4), 0) << L_qh;
         }
     }
 }

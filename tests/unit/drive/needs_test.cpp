@@ -1,7 +1,8 @@
 // What a method needs and the board has not; currents that a period could not measure.
 //
-// The list of observers is that of the firmware, but for its last word: here each observer needs the neutral
-// voltage (CMakeLists.txt), so that the way from a row to the refusal is the firmware's own.
+// The lists are those of the firmware, but for their last word: here each observer needs the neutral voltage, each
+// low-speed source a second sample, each regulator legs that are held and each procedure the terminal voltages
+// (CMakeLists.txt), so that the way from a row to the refusal is the firmware's own.
 #include <gtest/gtest.h>
 
 #include "tests/unit/drive/direct.h"
@@ -20,7 +21,7 @@ drive_result_t configured(int32_t observer, uint32_t channels)
 TEST(Needs, AnObserverIsRefusedByTheChannelThatIsMissing)
 {
     for (int32_t id = 0; id < OBSERVER_COUNT; ++id) {
-        const drive_result_t with = configured(id, NEEDS_NEUTRAL);
+        const drive_result_t with = configured(id, PM_ALL);
         if (with.param != DRIVE_PARAM_COUNT) {
             continue; // not for this machine
         }
@@ -31,6 +32,27 @@ TEST(Needs, AnObserverIsRefusedByTheChannelThatIsMissing)
         EXPECT_STREQ(without.reason, "needs the neutral voltage, which this board does not measure") << id;
     }
     EXPECT_TRUE(configured(OBSERVER_active_flux, PM_ALL).ok);
+}
+
+TEST(Needs, EveryListRefusesByItsOwnParameter)
+{
+    struct {
+        uint32_t missing;
+        drive_param_id_t blamed;
+        const char *reason;
+    } const rows[] = {
+        {NEEDS_SECOND_SAMPLE, DRIVE_PARAM_injection,
+         "needs a second sample in the period, which this board does not take"},
+        {NEEDS_HELD, DRIVE_PARAM_regulator, "needs legs held high or low, which this board does not make"},
+        {NEEDS_TERMINALS, DRIVE_PARAM_start_method,
+         "needs the terminal voltages, which this board does not measure"},
+    };
+    for (const auto &row : rows) {
+        const drive_result_t result = configured(OBSERVER_active_flux, PM_ALL & ~row.missing);
+        EXPECT_FALSE(result.ok);
+        EXPECT_EQ(result.param, row.blamed);
+        EXPECT_STREQ(result.reason, row.reason);
+    }
 }
 
 TEST(Needs, ARefusedDriveStaysOff)

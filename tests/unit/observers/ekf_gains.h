@@ -1,7 +1,7 @@
 // Variances of the Kalman filters.
 #pragma once
 
-#include "tests/unit/observers/gains.h"
+#include "tests/contract/gains.h"
 
 namespace gains
 {

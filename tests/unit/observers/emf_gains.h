@@ -1,7 +1,7 @@
 // Gains of the three EMF observers, which have one configuration.
 #pragma once
 
-#include "tests/unit/observers/gains.h"
+#include "tests/contract/gains.h"
 
 namespace gains
 {

@@ -1,7 +1,7 @@
 // Gains of the flux observers.
 #pragma once
 
-#include "tests/unit/observers/gains.h"
+#include "tests/contract/gains.h"
 
 namespace gains
 {

@@ -1,7 +1,7 @@
 // Gains of the three model-reference observers, which have one configuration.
 #pragma once
 
-#include "tests/unit/observers/gains.h"
+#include "tests/contract/gains.h"
 
 namespace gains
 {

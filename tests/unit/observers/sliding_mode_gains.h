@@ -1,7 +1,7 @@
 // Gains of the sliding-mode observer.
 #pragma once
 
-#include "tests/unit/observers/gains.h"
+#include "tests/contract/gains.h"
 
 namespace gains
 {

@@ -1,4 +1,4 @@
-#include "firmware/control/current_control.h"
+#include "firmware/control/synchronous_pi.h"
 
 #include "firmware/params/maker.h"
 
@@ -14,11 +14,16 @@ static pm_pi_config_t make_current_pi(maker_t *m, drive_param_id_t L)
     };
 }
 
-void make_current_control(maker_t *m, current_control_config_t *c)
+void make_synchronous_pi(maker_t *m, synchronous_pi_config_t *c)
 {
     c->d = make_current_pi(m, DRIVE_PARAM_L_d);
     c->q = make_current_pi(m, DRIVE_PARAM_L_q);
     c->L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
     c->L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);
     c->psi_m = per_unit(m, DRIVE_PARAM_psi_m, m->base.psi);
+}
+
+pm_num_t synchronous_pi_bandwidth(const maker_t *m)
+{
+    return si(m, DRIVE_PARAM_current_bandwidth);
 }

@@ -1,0 +1,27 @@
+#include "firmware/control/deadbeat.h"
+
+#include "firmware/params/maker.h"
+
+static void make_axis(maker_t *m, drive_param_id_t L, pm_gain_t *k, pm_q_t *per_L)
+{
+    const pm_num_t per_period = pm_num_div(pm_num_div(si(m, L), m->base.t_s), m->impedance);
+    *k = gain(m, per_period, GAIN_BITS, L);
+    *per_L = fixed(m, pm_num_div(pm_num(1), per_period), Q_BITS, L);
+}
+
+void make_deadbeat(maker_t *m, deadbeat_config_t *c)
+{
+    make_axis(m, DRIVE_PARAM_L_d, &c->k_d, &c->per_L_d);
+    make_axis(m, DRIVE_PARAM_L_q, &c->k_q, &c->per_L_q);
+    c->R = per_unit(m, DRIVE_PARAM_R_s, m->impedance);
+    c->L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
+    c->L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);
+    c->psi_m = per_unit(m, DRIVE_PARAM_psi_m, m->base.psi);
+}
+
+/* That of a first-order response with a time constant of one period. */
+pm_num_t deadbeat_bandwidth(const maker_t *m)
+{
+    const pm_num_t two_pi = {PM_NUM_TWO_PI_M, PM_NUM_TWO_PI_E};
+    return pm_num_div(si(m, DRIVE_PARAM_f_pwm), two_pi);
+}

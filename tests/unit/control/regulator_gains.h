@@ -1,0 +1,23 @@
+// Gains of the regulators of the current.
+#pragma once
+
+#include "tests/contract/gains.h"
+
+namespace gains
+{
+
+inline Names must_be_positive(const synchronous_pi_config_t &c)
+{
+    return {{"d.kp", c.d.kp}, {"d.ki", c.d.ki}, {"d.kb", c.d.kb},
+            {"q.kp", c.q.kp}, {"q.ki", c.q.ki}, {"q.kb", c.q.kb}};
+}
+
+inline Names must_be_positive(const deadbeat_config_t &c)
+{
+    return {{"deadbeat k_d", c.k_d},
+            {"deadbeat k_q", c.k_q},
+            {"deadbeat per_L_d", c.per_L_d},
+            {"deadbeat per_L_q", c.per_L_q}};
+}
+
+} // namespace gains
