@@ -53,6 +53,7 @@ typedef union {
 #undef PM_METHOD
 } injection_t;
 
+uint32_t injection_traits(injection_id_t id); /* SOURCE_... */
 void injection_reset(injection_t *self, const injection_config_t *config, const obs_in_t *in);
 void injection_slow(injection_t *self, const injection_config_t *config, const obs_in_t *in);
 obs_out_t injection_last(const injection_t *self, const injection_config_t *config);

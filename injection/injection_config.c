@@ -11,6 +11,16 @@ static void check_carrier(maker_t *m)
     }
 }
 
+uint32_t injection_traits(injection_id_t id)
+{
+    static const uint8_t traits_of[INJECTION_COUNT] = {
+#define PM_METHOD(name, help, traits, needs) (uint8_t)(traits),
+#include "injection/injections.def"
+#undef PM_METHOD
+    };
+    return traits_of[id];
+}
+
 void make_injection(maker_t *m, injection_config_t *c)
 {
     check_carrier(m);

@@ -103,6 +103,7 @@ enum {
     DRIVE_LIMIT_TEMPERATURE = 1 << 2, /* current derated by temperature */
     DRIVE_LIMIT_DC_VOLTAGE = 1 << 3,  /* regeneration derated by the DC-link voltage */
     DRIVE_LIMIT_SPEED = 1 << 4,       /* reference clamped to speed_max */
+    DRIVE_LIMIT_SLIP = 1 << 5, /* the position had slipped since the start, and was put right (slip.h) */
 };
 
 /* A snapshot for traces, CAN and tests; per-unit values as in config.h. While there is no current control,
@@ -119,6 +120,7 @@ typedef struct {
     pm_q_t v_dc;
     pm_q_t weight;           /* 0: injection, 1: flux observer */
     pm_q_t quality;          /* 1: good, 0: lost */
+    uint8_t slips;           /* of the position that were put right in this run */
     drive_refusal_t refusal; /* of the present start or the last */
 } drive_status_t;
 

@@ -1,6 +1,7 @@
 #include "firmware/drive/drive_parts.h"
 
 #include "firmware/math/compiler.h"
+#include "firmware/math/trig.h"
 
 /* Injection settles on the position of the pulses, without torque. */
 #define SETTLE_MS 30
@@ -125,6 +126,25 @@ static void start(drive_t *drive)
     }
 }
 
+/* Current and voltage stay as they are; both have other coordinates in the frame that was put right. */
+static void resolve_slip(drive_t *drive)
+{
+    const position_config_t *c = &drive->config.position;
+    const pm_dq_t i = drive->status.i;
+    const pm_dq_t v = {.d = pm_narrow(drive->voltage.v.d), .q = pm_narrow(drive->voltage.v.q)};
+    const pm_angle_t turn = position_resolve_slip(&drive->position, c, v, drive->i_ab);
+    if (turn != 0U) {
+        const pm_dir_t dir = pm_dir(turn);
+        const pm_dq_t i_now = pm_park((pm_ab_t){.alpha = i.d, .beta = i.q}, dir);
+        const pm_dq_t v_now = pm_park((pm_ab_t){.alpha = v.d, .beta = v.q}, dir);
+        regulator_reset(&drive->regulator, &drive->config.regulator, v_now, i_now, drive->position.pll.omega);
+        reference_reset(drive, i_now.q);
+    }
+    if (drive->position.slip.count > SLIP_MOST) {
+        drive_trip(drive, DRIVE_FAULT_POSITION_LOST);
+    }
+}
+
 static void run(drive_t *drive)
 {
     const position_config_t *c = &drive->config.position;
@@ -133,6 +153,7 @@ static void run(drive_t *drive)
         open_loop_slow(drive);
         return;
     }
+    resolve_slip(drive);
     reference_vector(drive);
     /* without injection nothing shows the position at low speed */
     if (!c->injects && pm_abs(drive->speed.reference) < c->omega_low &&
@@ -210,6 +231,7 @@ static void report_nothing(drive_t *drive)
     s->omega_ref = 0;
     s->weight = 0;
     s->quality = 0;
+    s->slips = 0;
 }
 
 static void report(drive_t *drive)
@@ -224,6 +246,8 @@ static void report(drive_t *drive)
         s->omega_ref = drive->stage == STAGE_OPEN_LOOP ? drive->omega_ramp : drive->speed.reference;
         s->weight = drive->position.weight;
         s->quality = drive->position.quality;
+        s->slips = drive->position.slip.count;
+        s->limits |= s->slips != 0U ? (uint32_t)DRIVE_LIMIT_SLIP : 0U;
     }
     s->i_ref = drive->i_ref;
     s->v = drive->v_next;

@@ -77,6 +77,25 @@ pm_unit_t position_current_share(const position_t *self, const position_config_t
     return blend(config->current_low, PM_UNIT_MAX, self->weight);
 }
 
+pm_angle_t position_resolve_slip(position_t *self, const position_config_t *config, pm_dq_t v, pm_ab_t i)
+{
+    if (!self->inject) {
+        return 0;
+    }
+    const pm_dq_t seen = pm_park(i, pm_dir(self->pll.theta));
+    const pm_angle_t turn = slip_slow(&self->slip, &config->slip, v, seen, self->pll.omega);
+    if (turn != 0U) {
+        self->pll.theta += turn;
+        const pm_dir_t dir = pm_dir(self->pll.theta);
+        const obs_in_t in = {.dir = dir, .omega = self->pll.omega, .i = i, .i_dq = pm_park(i, dir)};
+        observer_reset(&self->observer, &config->observer, &in);
+        injection_reset(&self->injection, &config->injection, &in);
+        self->eps_mean = 0;
+        self->misfit_mean = 0;
+    }
+    return turn;
+}
+
 static pm_q_t magnitude_after(pm_q_t *filter, pm_q_t x)
 {
     return pm_abs(pm_lp1(filter, x, K_NOISE));

@@ -50,8 +50,8 @@ inline const std::vector<std::string> &identify_reason_names()
 // By bit of DRIVE_LIMIT_...
 inline const std::vector<std::string> &limit_names()
 {
-    static const std::vector<std::string> names = {"current", "voltage", "temperature", "dc_voltage",
-                                                   "speed"};
+    static const std::vector<std::string> names = {"current",    "voltage", "temperature",
+                                                   "dc_voltage", "speed",   "slip"};
     return names;
 }
 

@@ -290,7 +290,7 @@ ENTRIES = (
     Entry(0x2900, 15, "drive_state", "measured", "u8", "read", "", 0, 0, None, None, None, False, False, "none", "tx", {0: 'off', 1: 'calibrating', 2: 'finding the position', 3: 'running', 4: 'stopping', 5: 'fault'}, 'state of the drive', ""),
     Entry(0x2900, 16, "drive_fault", "measured", "u8", "read", "", 0, 0, None, None, None, False, False, "none", "tx", {}, 'code of the latched fault, 0: none', ""),
     Entry(0x2900, 17, "drive_limits", "measured", "u16", "read", "", 0, 0, None, None, None, False, False, "none", "tx", {}, ('limits at work: bit 0 current, 1 voltage, 2 temperature, 3 DC-link voltage, '
- '4 speed'), ""),
+ '4 speed, 5 a slip of the position was put right since the start'), ""),
     Entry(0x2A00, 0, "fault_record.count", "fault_record", "u8", "const", "", 0, 0, None, None, 9, False, False, "none", "none", {}, 'highest sub-index', ""),
     Entry(0x2A00, 1, "fault_record.code", "fault_record", "u8", "read", "", 0, 0, None, None, None, False, False, "none", "none", {}, 'fault, 0: none', ""),
     Entry(0x2A00, 2, "fault_record.i_a", "fault_record", "i32", "read", "A", -3, 0, None, None, None, False, False, "none", "none", {}, 'current of phase A', ""),
