@@ -162,7 +162,7 @@ static int32_t torque_permille(const app_t *app)
 {
     const drive_config_t *c = &app->drive.config;
     const pm_dq_t i = app->drive.status.i;
-    const pm_q_t psi = c->psi_m + pm_mul(c->L_d - c->L_q, i.d);
+    const pm_q_t psi = c->machine.psi_m + pm_mul(c->machine.L_d - c->machine.L_q, i.d);
     const pm_num_t torque = pm_num_mul(pm_num_from_fixed(pm_mul(psi, i.q), PM_Q_BITS), c->base.torque);
     return pm_clamp(rounded(pm_num_mul(pm_num_div(torque, rated_torque(app)), pm_num(THOUSAND))), INT16_MIN,
                     INT16_MAX);

@@ -121,10 +121,10 @@ static void make_limits(maker_t *m, drive_config_t *config)
     config->omega_max = speed(m, DRIVE_PARAM_speed_max);
     config->v_linear = fixed(m, pm_num_mul(pm_num_ratio(98, 100), pm_num_sqrt(pm_num_ratio(1, 3))), UNIT_BITS,
                              DRIVE_PARAM_v_full_scale);
-    config->R_s = per_unit(m, DRIVE_PARAM_R_s, m->impedance);
-    config->L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
-    config->L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);
-    config->psi_m = per_unit(m, DRIVE_PARAM_psi_m, m->base.psi);
+    config->machine.R_s = per_unit(m, DRIVE_PARAM_R_s, m->impedance);
+    config->machine.L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
+    config->machine.L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);
+    config->machine.psi_m = per_unit(m, DRIVE_PARAM_psi_m, m->base.psi);
 }
 
 static sequence_id_t start_of(const drive_params_t *params, bool injection)

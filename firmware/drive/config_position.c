@@ -27,20 +27,6 @@ static int32_t per_span(maker_t *m)
                  DRIVE_PARAM_speed_high);
 }
 
-/* omega psi_m > 0.4 R i_max, and an observer could lead. */
-static void make_slip(maker_t *m, slip_config_t *c)
-{
-    const pm_num_t drop = mul3(si(m, DRIVE_PARAM_R_s), si(m, DRIVE_PARAM_i_max), pm_num_ratio(4, 10));
-    const pm_num_t omega = pm_num_div(pm_num_div(drop, si(m, DRIVE_PARAM_psi_m)), m->base.omega);
-    c->R = per_unit(m, DRIVE_PARAM_R_s, m->impedance);
-    c->L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
-    c->L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);
-    c->psi_m = per_unit(m, DRIVE_PARAM_psi_m, m->base.psi);
-    c->omega_least =
-        pm_max(speed(m, DRIVE_PARAM_speed_low), fixed(m, least(omega, pm_num(2)), Q_BITS, DRIVE_PARAM_psi_m));
-    c->traits = injection_traits((injection_id_t)m->params->injection);
-}
-
 void make_position(maker_t *m, position_config_t *c, bool injection)
 {
     make_observer(m, &c->observer);
@@ -63,6 +49,6 @@ void make_position(maker_t *m, position_config_t *c, bool injection)
     if (injection) {
         make_injection(m, &c->injection);
         limit_bandwidths(m, c);
-        make_slip(m, &c->slip);
+        c->traits = (uint8_t)injection_traits(c->injection.id);
     }
 }

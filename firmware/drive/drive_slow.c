@@ -127,21 +127,26 @@ static void start(drive_t *drive)
 }
 
 /* Current and voltage stay as they are; both have other coordinates in the frame that was put right. */
-static void resolve_slip(drive_t *drive)
+PM_RARE static void turn_frame(drive_t *drive, pm_angle_t turn, pm_dq_t v)
 {
-    const position_config_t *c = &drive->config.position;
-    const pm_dq_t i = drive->status.i;
-    const pm_dq_t v = {.d = pm_narrow(drive->voltage.v.d), .q = pm_narrow(drive->voltage.v.q)};
-    const pm_angle_t turn = position_resolve_slip(&drive->position, c, v, drive->i_ab);
-    if (turn != 0U) {
-        const pm_dir_t dir = pm_dir(turn);
-        const pm_dq_t i_now = pm_park((pm_ab_t){.alpha = i.d, .beta = i.q}, dir);
-        const pm_dq_t v_now = pm_park((pm_ab_t){.alpha = v.d, .beta = v.q}, dir);
-        regulator_reset(&drive->regulator, &drive->config.regulator, v_now, i_now, drive->position.pll.omega);
-        reference_reset(drive, i_now.q);
-    }
+    const pm_dir_t dir = pm_dir(turn);
+    const pm_dq_t i = pm_park((pm_ab_t){.alpha = drive->status.i.d, .beta = drive->status.i.q}, dir);
+    const pm_dq_t now = pm_park((pm_ab_t){.alpha = v.d, .beta = v.q}, dir);
+    regulator_reset(&drive->regulator, &drive->config.regulator, now, i, drive->position.pll.omega);
+    reference_reset(drive, i.q);
     if (drive->position.slip.count > SLIP_MOST) {
         drive_trip(drive, DRIVE_FAULT_POSITION_LOST);
+    }
+}
+
+PM_APART static void resolve_slip(drive_t *drive) /* its stack is not that of the others */
+{
+    const drive_config_t *c = &drive->config;
+    const pm_dq_t v = {.d = pm_narrow(drive->voltage.v.d), .q = pm_narrow(drive->voltage.v.q)};
+    const pm_angle_t turn =
+        position_resolve_slip(&drive->position, &c->position, &c->machine, v, drive->i_ab);
+    if (turn != 0U) {
+        turn_frame(drive, turn, v);
     }
 }
 
@@ -153,7 +158,6 @@ static void run(drive_t *drive)
         open_loop_slow(drive);
         return;
     }
-    resolve_slip(drive);
     reference_vector(drive);
     /* without injection nothing shows the position at low speed */
     if (!c->injects && pm_abs(drive->speed.reference) < c->omega_low &&
@@ -266,6 +270,9 @@ void drive_slow(drive_t *drive, const drive_slow_in_t *in)
         }
         drive->state_ms = (uint16_t)(drive->state_ms + (drive->state_ms < UINT16_MAX ? 1U : 0U));
         move(drive);
+        if (drive->stage == STAGE_VECTOR) {
+            resolve_slip(drive);
+        }
         if (drive->sequence.begins) {
             begin_step(drive);
         }

@@ -85,10 +85,10 @@ bool open_loop_ramps(const drive_t *drive)
 static void damp(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
-    const pm_q_t across =
-        pm_narrow_sat(drive->voltage.v.q) - pm_mul(drive->omega_open, pm_mul(c->L_d, drive->status.i.d));
-    const pm_q_t emf =
-        pm_clamp(across - pm_mul(drive->omega_ramp, c->psi_m), -c->open_loop.v_swing, c->open_loop.v_swing);
+    const pm_q_t across = pm_narrow_sat(drive->voltage.v.q) -
+                          pm_mul(drive->omega_open, pm_mul(c->machine.L_d, drive->status.i.d));
+    const pm_q_t emf = pm_clamp(across - pm_mul(drive->omega_ramp, c->machine.psi_m), -c->open_loop.v_swing,
+                                c->open_loop.v_swing);
     const pm_q_t swing = emf - pm_lp1(&drive->emf_open, emf, c->open_loop.k_swing);
     drive->omega_open = drive->omega_ramp - pm_small_gain(pm_small(swing), c->open_loop.per_swing);
 }

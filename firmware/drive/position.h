@@ -34,7 +34,7 @@ typedef struct {
     second_harmonic_config_t second_harmonic;
     mismatch_config_t mismatch;
     speed_config_t speed;
-    slip_config_t slip;
+    uint8_t traits; /* of the low-speed source */
     pm_q_t omega_low, omega_high;
     int32_t per_span;      /* 1 / (omega_high - omega_low), Q20 */
     pm_unit_t current_low; /* share of the bandwidth of current control while injection leads */
@@ -111,7 +111,8 @@ pm_unit_t position_current_share(const position_t *self, const position_config_t
 /* Between two steps, while the low-speed source takes part: v is the voltage of the last step without carrier, Q28, i
  * its current. A slip is resolved: the position turns by what is returned, 0 if there was none, and both sources
  * start anew from there. */
-pm_angle_t position_resolve_slip(position_t *self, const position_config_t *config, pm_dq_t v, pm_ab_t i);
+pm_angle_t position_resolve_slip(position_t *self, const position_config_t *config,
+                                 const pm_machine_t *machine, pm_dq_t v, pm_ab_t i);
 
 /* config_position.c; injection: a low-speed source leads at low speed. */
 void make_position(maker_t *m, position_config_t *c, bool injection);

@@ -1,5 +1,6 @@
 /* The position at 1 kHz and at its beginning. */
 #include "firmware/drive/position.h"
+#include "firmware/math/compiler.h"
 #include "firmware/math/filter.h"
 #include "firmware/math/trig.h"
 
@@ -77,21 +78,31 @@ pm_unit_t position_current_share(const position_t *self, const position_config_t
     return blend(config->current_low, PM_UNIT_MAX, self->weight);
 }
 
-pm_angle_t position_resolve_slip(position_t *self, const position_config_t *config, pm_dq_t v, pm_ab_t i)
+PM_RARE static void turn_by(position_t *self, const position_config_t *config, pm_angle_t turn, pm_ab_t i)
+{
+    self->pll.theta += turn;
+    const pm_dir_t dir = pm_dir(self->pll.theta);
+    const obs_in_t in = {.dir = dir, .omega = self->pll.omega, .i = i, .i_dq = pm_park(i, dir)};
+    observer_reset(&self->observer, &config->observer, &in);
+    injection_reset(&self->injection, &config->injection, &in);
+    self->eps_mean = 0;
+    self->misfit_mean = 0;
+}
+
+pm_angle_t position_resolve_slip(position_t *self, const position_config_t *config,
+                                 const pm_machine_t *machine, pm_dq_t v, pm_ab_t i)
 {
     if (!self->inject) {
         return 0;
     }
-    const pm_dq_t seen = pm_park(i, pm_dir(self->pll.theta));
-    const pm_angle_t turn = slip_slow(&self->slip, &config->slip, v, seen, self->pll.omega);
+    const slip_in_t in = {.traits = config->traits,
+                          .omega_least = config->omega_low,
+                          .omega = self->pll.omega,
+                          .v = v,
+                          .i = pm_park(i, pm_dir(self->pll.theta))};
+    const pm_angle_t turn = slip_slow(&self->slip, machine, &in);
     if (turn != 0U) {
-        self->pll.theta += turn;
-        const pm_dir_t dir = pm_dir(self->pll.theta);
-        const obs_in_t in = {.dir = dir, .omega = self->pll.omega, .i = i, .i_dq = pm_park(i, dir)};
-        observer_reset(&self->observer, &config->observer, &in);
-        injection_reset(&self->injection, &config->injection, &in);
-        self->eps_mean = 0;
-        self->misfit_mean = 0;
+        turn_by(self, config, turn, i);
     }
     return turn;
 }

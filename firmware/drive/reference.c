@@ -34,7 +34,8 @@ void reference_reset(drive_t *drive, pm_q_t i_q)
 static pm_q_t current_for(const drive_t *drive, pm_q_t torque)
 {
     const drive_config_t *c = &drive->config;
-    const pm_q_t psi = pm_max(c->psi_m + pm_mul(c->L_d - c->L_q, drive->i_ref.d), c->psi_m / 4);
+    const pm_q_t psi = pm_max(c->machine.psi_m + pm_mul(c->machine.L_d - c->machine.L_q, drive->i_ref.d),
+                              c->machine.psi_m / 4);
     const pm_q_t i = pm_div(pm_abs(torque), psi);
     return torque < 0 ? -i : i;
 }

@@ -9,32 +9,31 @@ void slip_reset(slip_t *self)
     *self = (slip_t){.count = 0};
 }
 
-static pm_angle_t resolved(slip_t *self, const slip_config_t *config)
+static pm_angle_t resolved(slip_t *self, bool half)
 {
     self->ms = 0;
     self->count = (uint8_t)(self->count + 1U);
-    if ((config->traits & (uint32_t)SOURCE_HALF_TURN) != 0U) {
+    if (half) {
         return PM_TURN(0.5);
     }
     return self->across > 0 ? PM_TURN(1.0 / 3) : PM_TURN(2.0 / 3);
 }
 
-pm_angle_t slip_slow(slip_t *self, const slip_config_t *config, pm_dq_t v, pm_dq_t i, pm_q_t omega)
+pm_angle_t slip_slow(slip_t *self, const pm_machine_t *machine, const slip_in_t *in)
 {
-    const slip_config_t *c = config;
-    const pm_q_t speed = pm_abs(omega);
-    const bool half = (c->traits & (uint32_t)SOURCE_HALF_TURN) != 0U;
-    const bool third = (c->traits & (uint32_t)SOURCE_THIRD_TURN) != 0U;
-    if (speed < c->omega_least || !(half || third)) {
-        self->ms = 0;
-        return 0;
-    }
-    const pm_q_t e_d = v.d - pm_mul(c->R, i.d) + pm_mul(omega, pm_mul(c->L_q, i.q));
-    const pm_q_t e_q = v.q - pm_mul(c->R, i.q) - pm_mul(omega, pm_mul(c->L_d, i.d));
+    const pm_machine_t *m = machine;
+    const pm_dq_t i = in->i;
+    const pm_q_t omega = in->omega;
+    const bool half = (in->traits & (uint32_t)SOURCE_HALF_TURN) != 0U;
+    const bool third = (in->traits & (uint32_t)SOURCE_THIRD_TURN) != 0U;
+    const pm_q_t emf = pm_mul(pm_abs(omega), m->psi_m);
+    const pm_q_t least = pm_mul(pm_mul(m->R_s, pm_abs(i.d) + pm_abs(i.q)), PM_Q(0.4));
+    const pm_q_t e_d = in->v.d - pm_mul(m->R_s, i.d) + pm_mul(omega, pm_mul(m->L_q, i.q));
+    const pm_q_t e_q = in->v.q - pm_mul(m->R_s, i.q) - pm_mul(omega, pm_mul(m->L_d, i.d));
     const pm_q_t along = omega < 0 ? -e_q : e_q;
     (void)pm_lp1(&self->across, omega < 0 ? e_d : -e_d, K_ACROSS);
-    const pm_q_t emf = pm_mul(speed, c->psi_m);
-    const bool beyond = along < (half ? -emf / 2 : emf / 4);
+    const bool judged = (half || third) && pm_abs(omega) >= in->omega_least && emf >= least;
+    const bool beyond = judged && along < (half ? -emf / 2 : emf / 4);
     self->ms = beyond ? (uint16_t)(self->ms + 1U) : 0U;
-    return self->ms >= SLIP_MS ? resolved(self, c) : 0U;
+    return self->ms >= SLIP_MS ? resolved(self, half) : 0U;
 }

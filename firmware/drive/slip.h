@@ -9,8 +9,8 @@
  * A slip is what stays beyond the middle between two answers of the source, with a margin, for 20 ms:
  *   of half a turn    along < -1/2 |omega| psi_m
  *   of a third        along <  1/4 |omega| psi_m, and the sign of `across` says which way
- * L di/dt is left out: it passes within the 20 ms. R i_max 20 % off does not count as a slip where
- * |omega| psi_m > 0.4 R i_max.
+ * L di/dt is left out: it passes within the 20 ms. Where |omega| psi_m < 0.4 R i, R 20 % off could count as a slip:
+ * nothing is judged there.
  *
  * slip_slow() at 1 kHz while the source leads or shares the lead; no division. State 10 bytes.
  * Tests: tests/unit/drive/slip_test.cpp, tests/scenario/slip.yaml. */
@@ -26,11 +26,18 @@ extern "C" {
 #define SLIP_MS   20U
 #define SLIP_MOST 3U /* resolved in one run; with another the position is lost */
 
+/* Of the machine, per-unit. */
 typedef struct {
-    pm_q_t R, L_d, L_q, psi_m; /* per-unit, of the machine */
-    pm_q_t omega_least;        /* electrical speed from which the EMF is a witness */
-    uint32_t traits;           /* of the low-speed source */
-} slip_config_t;
+    pm_q_t R_s, psi_m, L_d, L_q;
+} pm_machine_t;
+
+typedef struct {
+    uint32_t traits;    /* of the low-speed source */
+    pm_q_t omega_least; /* from where the EMF is a witness */
+    pm_q_t omega;       /* electrical */
+    pm_dq_t v;          /* mean voltage of the period, Q28, and ... */
+    pm_dq_t i;          /* ... current, both in the estimated frame */
+} slip_in_t;
 
 typedef struct {
     pm_q_t across; /* filtered */
@@ -40,9 +47,8 @@ typedef struct {
 
 void slip_reset(slip_t *self);
 
-/* What is to be added to the estimated angle: 0, half a turn, or a third either way. v is the mean voltage of the
- * period (Q28), i the current, both in the estimated frame. */
-pm_angle_t slip_slow(slip_t *self, const slip_config_t *config, pm_dq_t v, pm_dq_t i, pm_q_t omega);
+/* What is to be added to the estimated angle: 0, half a turn, or a third either way. */
+pm_angle_t slip_slow(slip_t *self, const pm_machine_t *machine, const slip_in_t *in);
 
 #ifdef __cplusplus
 }

@@ -46,10 +46,10 @@ static void know(drive_t *drive)
     identify_t *self = &drive->procedure.identify;
     const commissioning_result_t *r = &drive->commissioning_report.result;
     const drive_config_t *c = &drive->config;
-    self->L_d = r->L_d != 0 ? r->L_d : c->L_d;
-    self->L_q = r->L_q != 0 ? r->L_q : c->L_q;
+    self->L_d = r->L_d != 0 ? r->L_d : c->machine.L_d;
+    self->L_q = r->L_q != 0 ? r->L_q : c->machine.L_q;
     self->lost = r->R != 0 ? r->lost : assumed_loss(drive);
-    self->R = r->R != 0 ? r->R : c->R_s;
+    self->R = r->R != 0 ? r->R : c->machine.R_s;
     commissioning_set_gains(drive);
 }
 

@@ -34,7 +34,7 @@ static pm_q_t best_i_d(const drive_t *drive, pm_q_t i_q)
     if (dL < r->L_q / 20) {
         return 0;
     }
-    const pm_q_t psi = r->psi_m != 0 ? r->psi_m : drive->config.psi_m;
+    const pm_q_t psi = r->psi_m != 0 ? r->psi_m : drive->config.machine.psi_m;
     const pm_q_t h = pm_div(psi / 2, dL);
     return pm_min(h > PM_Q(7.0) ? 0 : h - pm_hypot(h, i_q), -i_q / 8);
 }
