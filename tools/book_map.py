@@ -3,7 +3,8 @@
 
 usage: book_map.py [--check] [--root DIR]
 
-Rows, sections and proofs are those of tools/pmsim/methods.def; a source belongs to the rows that its comments name
+Rows and sections are those of tools/pmsim/methods.def, with the proofs of what belongs to no list; a method of a list says
+in `book` of its own x.yaml which rows it implements, and tools/pmsim/methods_of_lists.def is made from these. A source belongs to the rows that its comments name
 ("row 14", "rows 21 to 23"). Refused are orphans: a row that is there without a source or whose proof is missing, and
 a source that names a row which is not there. --check writes nothing and fails also when the page is not up to date.
 """
@@ -13,6 +14,9 @@ import sys
 from pathlib import Path
 
 METHOD = re.compile(r'^PM_METHOD\((\d+), "(.*?)", "(.*?)", (\w+), "(.*?)", "(.*?)"\)', re.MULTILINE)
+CLAIM = re.compile(r'- \{row: (\d+), parameter: (?:""|(\w+)), proof: ([\w/]+)\}')
+CLAIMS = "observers/*.yaml", "injection/**/*.yaml", "bldc/**/*.yaml", "firmware/control/*.yaml", "firmware/drive/**/*.yaml"
+CLAIMED = "tools/pmsim/methods_of_lists.def"
 NUMBERS = r"\d+(?:[\s*/]*(?:,|and|to)[\s*/]*\d+)*"  # also over the end of a comment's line
 ROWS = re.compile(rf"\brows?[\s*/]+({NUMBERS})", re.IGNORECASE)
 MANUALS = ".h", ".cpp"  # where a first comment is the manual: headers, and the programs of tools
@@ -56,8 +60,42 @@ def result_of(scenario):
     return "in the test" if "/" in scenario else "[results.md](results.md)"
 
 
+class Refused(Exception):
+    """A line that cannot be meant, with its file and number."""
+
+
+def claims(root):
+    """Row -> (parameter, proof) of what the methods of the lists say in `book`."""
+    found = {}
+    for path in sorted({path for pattern in CLAIMS for path in root.glob(pattern)}):
+        inside = False
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+            if not inside or not line.startswith("-"):
+                inside = line == "book:"
+                continue
+            where = f"{path.relative_to(root).as_posix()}:{number}"
+            claim = CLAIM.fullmatch(line)
+            if not claim:
+                raise Refused(f"{where}: not {{row: N, parameter: name or \"\", proof: scenario or folder/test}}")
+            row = int(claim[1])
+            if row in found:
+                raise Refused(f"{where}: row {row} is claimed already")
+            found[row] = claim[2] or "", claim[3]
+    return found
+
+
 def read(root):
-    return [(int(row), *rest) for row, *rest in METHOD.findall((root / "tools/pmsim/methods.def").read_text())]
+    methods = [(int(row), *rest) for row, *rest in METHOD.findall((root / "tools/pmsim/methods.def").read_text())]
+    claimed = claims(root)
+    for row in claimed.keys() - {row for row, _, _, state, _, _ in methods if state == "NOT_YET"}:
+        raise Refused(f"row {row} of a method's `book` is not one of the book, or has its proof in tools/pmsim/methods.def")
+    return [(row, section, name, "IMPLEMENTED", *claimed[row]) if row in claimed else (row, section, name, *rest)
+            for row, section, name, *rest in methods]
+
+
+def claimed_rows(root):
+    lines = "".join(f'PM_CLAIM({row}, "{parameter}", "{proof}")\n' for row, (parameter, proof) in sorted(claims(root).items()))
+    return "/* Made by tools/book_map.py from `book` of the methods of the lists: PM_CLAIM(row, parameter, scenario). */\n" + lines
 
 
 def orphans(root, methods, files):
@@ -96,13 +134,17 @@ def main():
     parser.add_argument("--check", action="store_true")
     parser.add_argument("--root", type=Path, default=Path(__file__).resolve().parent.parent)
     options = parser.parse_args()
-    methods, files = read(options.root), sources(options.root)
+    try:
+        methods, files = read(options.root), sources(options.root)
+    except Refused as refused:
+        sys.exit(str(refused))
     found = list(orphans(options.root, methods, files))
-    text, path = page(methods, files), options.root / "docs/book.md"
-    if not options.check:
-        path.write_text(text)
-    elif not path.exists() or path.read_text() != text:
-        found.append("docs/book.md is not up to date: run tools/book_map.py")
+    for name, text in ("docs/book.md", page(methods, files)), (CLAIMED, claimed_rows(options.root)):
+        path = options.root / name
+        if not options.check:
+            path.write_text(text)
+        elif not path.exists() or path.read_text() != text:
+            found.append(f"{name} is not up to date: run tools/book_map.py")
     for line in found:
         print(line, file=sys.stderr)
     sys.exit(1 if found else 0)

@@ -18,14 +18,25 @@ WHOLE = {
 }
 
 
+def plant(folder, changes):
+    for name, text in {**WHOLE, **changes}.items():
+        if text is not None:
+            path = Path(folder) / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+    (Path(folder) / "docs").mkdir()
+
+
+def run_only(changes):
+    """What is refused before a page is made."""
+    with tempfile.TemporaryDirectory() as folder:
+        plant(folder, changes)
+        return subprocess.run([sys.executable, TOOL, "--root", folder], capture_output=True, text=True, check=False)
+
+
 def run(changes, check_again=False):
     with tempfile.TemporaryDirectory() as folder:
-        for name, text in {**WHOLE, **changes}.items():
-            if text is not None:
-                path = Path(folder) / name
-                path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_text(text)
-        (Path(folder) / "docs").mkdir()
+        plant(folder, changes)
         command = [sys.executable, TOOL, "--root", folder]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if check_again:
@@ -44,6 +55,24 @@ class BookMap(unittest.TestCase):
                       "[active_test.cpp](../tests/unit/observers/active_test.cpp) | in the test |", page)
         self.assertIn("| 2.3.1 | 14 | Back-EMF | not yet |", page)
         self.assertIn("2 of 3 rows.", page)
+
+    def test_a_method_of_a_list_claims_its_rows(self):
+        claim = {"observers/x.yaml": "# X.\nbook:\n- {row: 14, parameter: \"\", proof: spm}\nknows: R\n",
+                 "observers/x.h": "/* row 14 */"}
+        code, message, page = run(claim)
+        self.assertEqual((code, message), (0, ""))
+        self.assertIn("| 2.3.1 | 14 | Back-EMF | [x.h](../observers/x.h) | always | [spm.yaml]", page)
+        self.assertIn("3 of 3 rows.", page)
+
+    def test_a_claim_that_cannot_be_meant_is_refused_with_its_line(self):
+        for text, reason in (("- {row: 14}", "observers/x.yaml:2: not {row: N"),
+                             ("- {row: 14, parameter: a, proof: spm}\n- {row: 14, parameter: a, proof: spm}",
+                              "observers/x.yaml:3: row 14 is claimed already"),
+                             ("- {row: 99, parameter: a, proof: spm}", "row 99 of a method's `book` is not one"),
+                             ("- {row: 12, parameter: a, proof: spm}", "row 12 of a method's `book` is not one")):
+            done = run_only({"observers/x.yaml": f"book:\n{text}\n"})
+            self.assertEqual(done.returncode, 1)
+            self.assertIn(reason, done.stderr)
 
     def test_a_range_names_its_rows(self):
         for text in "/* rows\n * 12 to\n * 13 */", "/* rows 12\n * to 13 */":

@@ -12,7 +12,7 @@ DEVICE_KEYS = ("vendor", "vendor_id", "product", "product_code", "revision", "de
 FAULT_LINE = re.compile(r'PM_FAULT\((\w+), "([^"]*)"\)')
 ROW = re.compile(r'^PM_METHOD\((\w+), "([^"]*)"', re.MULTILINE)
 FACTS = ("knows", "period_instructions", "step_instructions", "interrupt", "replay")  # read by tests and reports
-PART_KEYS = ("methods", "objects", "members") + FACTS
+PART_KEYS = ("methods", "objects", "members", "book") + FACTS  # book: read by tools/book_map.py
 
 
 @dataclass
