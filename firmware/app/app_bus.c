@@ -204,6 +204,7 @@ static void profile(app_t *app)
         drive_command(&app->drive, &command);
         if (out.clear_fault) {
             (void)drive_clear_fault(&app->drive);
+            app->armed = false; /* the fault has opened the bridge, perhaps unseen by the main loop */
         }
         hal_unlock(app->hal);
     }
