@@ -135,8 +135,8 @@ static void nmt_receive(node_t *node, const node_frame_t *frame)
         break;
     case NMT_RESET:
         leave(node, NODE_STOPPED);
+        node->nmt = NODE_INITIALISING; /* until node_init(), which boots up, if the host returns at all */
         node_host_reset(node->context);
-        node_boot_up(node);
         break;
     case NMT_RESET_COMMUNICATION:
         leave(node, NODE_STOPPED);

@@ -91,7 +91,7 @@ bool node_host_store(void *context, uint32_t group);   /* OD_GROUP_..., NODE_GRO
 bool node_host_restore(void *context, uint32_t group); /* forgets what is stored */
 void node_host_recall(void *context);                  /* give stored communication objects: node_recall() */
 void node_host_alarm(void *context, uint16_t code);    /* torque off; what EMCY says */
-void node_host_reset(void *context);                   /* restart of all; may return */
+void node_host_reset(void *context);                   /* restart of all; may return before it */
 
 typedef struct node node_t; /* caller-owned: node_state.h */
 
