@@ -66,7 +66,7 @@ void pdo_setup(node_t *node, bool receive, uint32_t number)
     const bool maps = count <= (uint32_t)NODE_MAPPED && pdo_length(node, map, count, &length) == SDO_OK;
     pdo->count = maps ? (uint8_t)count : 0U;
     pdo->length = maps ? (uint8_t)length : 0U;
-    pdo->id = (maps && (cob & COB_OFF) == 0U) ? (uint16_t)(cob & COB_ID) : 0U;
+    pdo->id = (pdo->count > 0U && (cob & COB_OFF) == 0U) ? (uint16_t)(cob & COB_ID) : 0U;
 }
 
 void pdo_start(node_t *node)
