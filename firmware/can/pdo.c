@@ -100,6 +100,7 @@ static void receive_one(node_t *node, node_pdo_t *pdo, uint32_t number, const no
     }
     node_error(node, NODE_ERROR_LENGTH, frame->length > pdo->length ? (uint16_t)CODE_LONG : 0U, number);
     node_error(node, NODE_ERROR_RPDO, 0, number);
+    node_hear(node);
     (void)memcpy(pdo->data, frame->data, sizeof pdo->data);
     pdo->last_us = node->now_us;
     pdo->timed = true;
