@@ -98,11 +98,16 @@ void hal_reset(hal_t *hal); /* thread: bridge off, then restart; does not return
  * compare[leg][0] serves both halves. */
 void hal_bridge_write(hal_t *hal, const drive_out_t *out);
 
-/* thread: lets the outputs follow hal_bridge_write(). False, and still off, while the break input is active
- * or the port has refused its configuration. */
+/* A break, by a comparator or the break input, opens all switches at once and without software. They stay open
+ * until armed again, also when the cause ends with that, and hal_measure() reports it once, however short it
+ * was. Nothing but this report forgets it. */
+
+/* thread, once for each time that outputs are wanted: lets them follow hal_bridge_write(). False, and still
+ * off, while the break input is active, a break has not been reported yet, or the port has refused its
+ * configuration. Outputs that are lost later are a fault: they must not simply be armed again. */
 bool hal_bridge_arm(hal_t *hal);
-void hal_bridge_off(hal_t *hal); /* any, 0.2 us: all switches open until armed again */
-bool hal_bridge_armed(const hal_t *hal);
+void hal_bridge_off(hal_t *hal);         /* any, 0.2 us: all switches open until armed again */
+bool hal_bridge_armed(const hal_t *hal); /* any: as the hardware has it, so false from the break on */
 
 /* --- measure.c ----------------------------------------------------------------------------------------- */
 
@@ -110,7 +115,8 @@ bool hal_bridge_armed(const hal_t *hal);
  * of drive_in_t.more that belongs to no declared channel is zero, one of drive_out_t.instants is ignored. */
 uint32_t hal_channels(const hal_t *hal);
 
-/* control, budget 40 instructions: the samples at the centre of this period's zero vector. */
+/* control, budget 40 instructions: the samples at the centre of this period's zero vector, and in hw_fault
+ * whether there was a break since the last call, or still is. */
 void hal_measure(hal_t *hal, drive_in_t *in);
 
 /* Slow measurements; the last conversion of each. */

@@ -93,17 +93,19 @@ void app_trip(app_t *app, drive_fault_t fault)
     hal_unlock(app->hal);
 }
 
-/* The bridge follows the state; a fault leaves it off. */
+/* The bridge follows the state and is armed once, on the way out of OFF. Outputs that are lost while they are
+ * wanted are a fault, which leaves them off. */
 static void follow_state(app_t *app)
 {
     const drive_state_t state = app->drive.state;
     const bool wanted = state != DRIVE_OFF && state != DRIVE_FAULT && app->drive.fault == DRIVE_FAULT_NONE;
     if (!wanted || app_ready(app) != APP_READY) {
         hal_bridge_off(app->hal);
-    } else if (!hal_bridge_armed(app->hal) && !hal_bridge_arm(app->hal)) {
-        app_trip(app, DRIVE_FAULT_HARDWARE);
+        app->armed = false;
+    } else if (app->armed ? !hal_bridge_armed(app->hal) : !hal_bridge_arm(app->hal)) {
+        app_trip(app, app->stalled ? DRIVE_FAULT_OVERRUN : DRIVE_FAULT_HARDWARE);
     } else {
-        /* on, as wanted */
+        app->armed = true;
     }
 }
 

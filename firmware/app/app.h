@@ -2,7 +2,8 @@
  * register access.
  *
  * The bridge is on only while the drive wants it, no fault is latched, the control interrupt runs, and the
- * parameters are the stored ones: an image without stored parameters reports it and stays off.
+ * machine's parameters are stored, each of them: otherwise the image reports it and stays off. It is armed
+ * once, when the drive leaves OFF; if the hardware opens it after that, the fault is HARDWARE.
  *
  *   app_boot(a, hal)   parameters from the store, hardware, drive; then interrupts run
  *   app_turn(a)        one round of the main loop, cheap when nothing has changed and no timer of the bus can
@@ -68,6 +69,7 @@ struct app {
     drive_state_t seen_state;  /* by the last full round of the main loop, */
     uint32_t round_us;         /* which was then */
     bool hardware;             /* configured: control interrupts come */
+    bool armed;                /* the bridge, for the state that the drive is in: not a second time */
 
     /* parameters */
     hal_config_t hal_config; /* that the hardware runs with */
@@ -92,8 +94,8 @@ struct app {
     int16_t trace_ring[APP_TRACE_NUMBERS];
 };
 
-/* Parameters of the newest valid page over the defaults; false: there are none. `unknown` counts the stored
- * values that this version does not have. */
+/* Parameters of the newest valid page over the defaults; false: not all of the machine's are there. `unknown`
+ * counts the stored values that this version does not have. */
 bool app_load(const hal_t *hal, drive_params_t *params, uint32_t *unknown);
 
 /* A page of all parameters, STORE_WORDS; returns the words that are used. */

@@ -9,6 +9,7 @@
 /* An overrun ends after this time without another lost frame. */
 #define LOST_US      1000000U
 #define CODE_OVERRUN 0x8110U
+#define CODE_SILENCE 0x8130U
 
 static app_t *app_of(void *context)
 {
@@ -204,6 +205,7 @@ static void profile(app_t *app)
         drive_command(&app->drive, &command);
         if (out.clear_fault) {
             (void)drive_clear_fault(&app->drive);
+            app->armed = false; /* the fault has opened the bridge, perhaps unseen by the main loop */
         }
         hal_unlock(app->hal);
     }
@@ -248,6 +250,24 @@ static void watch_bus(app_t *app)
     }
 }
 
+/* Of a master that has enabled the drive: another source of commands is its own business. */
+static void watch_master(app_t *app)
+{
+    const node_silence_t silence = node_silence(&app->node);
+    if (silence == NODE_HEARD) {
+        node_error(&app->node, NODE_ERROR_SILENCE, 0, 0);
+    } else if (cia402_on(&app->cia402)) {
+        node_error(&app->node, NODE_ERROR_SILENCE, CODE_SILENCE, 0);
+        if (silence == NODE_SILENT_OFF) {
+            node_host_alarm(app, CODE_SILENCE);
+        } else {
+            cia402_abandon(&app->cia402);
+        }
+    } else {
+        /* nothing runs by its command */
+    }
+}
+
 /* The node has already reported a lost master. */
 static void tell_fault(app_t *app)
 {
@@ -271,6 +291,7 @@ void app_bus_init(app_t *app)
 void app_bus_run(app_t *app)
 {
     watch_bus(app);
+    watch_master(app);
     profile(app);
     tell_fault(app);
     node_run(&app->node, hal_time_us(app->hal));

@@ -101,7 +101,12 @@ bool app_identify_put(app_t *app, uint16_t slot, int32_t value)
     if (slot != (uint16_t)OD_LIVE_IDENTIFICATION_COMMAND) {
         return false;
     }
+    commissioning_report_t *report =
+        &app->drive.commissioning_report; /* the drive is off: nobody else writes it */
     app->routines = (uint8_t)value;
+    report->state = (uint8_t)COMMISSIONING_IDLE;
+    report->reason = (uint8_t)COMMISSIONING_NO_REASON;
+    report->progress = 0;
     return true;
 }
 

@@ -31,6 +31,21 @@ bool app_stored_value(const hal_t *hal, uint16_t index, uint8_t sub, int32_t *va
     return page >= 0 && store_find(hal_store_page(hal, (uint32_t)page), (uint32_t)index * 256U + sub, value);
 }
 
+/* All that describes the machine: with a preset among it the drive would take it for another one. */
+static bool has_machine(const uint32_t *words)
+{
+    int32_t value;
+    for (uint32_t row = 0; row < od_count; row++) {
+        const od_entry_t *entry = &od_table[row];
+        const bool of_machine =
+            entry->kind == (uint8_t)OD_PARAMETER && entry->group == (uint8_t)OD_GROUP_MACHINE;
+        if (of_machine && !store_find(words, id_of(entry), &value)) {
+            return false;
+        }
+    }
+    return true;
+}
+
 bool app_load(const hal_t *hal, drive_params_t *params, uint32_t *unknown)
 {
     drive_params_default(params);
@@ -41,7 +56,6 @@ bool app_load(const hal_t *hal, drive_params_t *params, uint32_t *unknown)
     }
     const uint32_t *words = hal_store_page(hal, (uint32_t)page);
     const int32_t count = store_check(words);
-    bool any = false;
     for (int32_t n = 0; n < count; n++) {
         const store_pair_t pair = store_pair(words, (uint32_t)n);
         const od_entry_t *entry = entry_of(pair.id);
@@ -49,12 +63,11 @@ bool app_load(const hal_t *hal, drive_params_t *params, uint32_t *unknown)
             ++*unknown;
         } else if (entry->kind == (uint8_t)OD_PARAMETER) {
             drive_param_set(params, (drive_param_id_t)entry->slot, pair.value);
-            any = true;
         } else {
             /* the node's, or the profile's: app_recall() */
         }
     }
-    return any;
+    return has_machine(words);
 }
 
 void app_recall(app_t *app, od_kind_t kind)

@@ -44,6 +44,12 @@ static void switch_off(cia402_t *self, cia402_state_t next, int16_t option)
     self->coast = option == OPTION_COAST;
 }
 
+void cia402_abandon(cia402_t *self)
+{
+    self->controlword = ENABLE_VOLTAGE; /* a quick stop, which ends in the state that is entered here */
+    switch_off(self, CIA402_SWITCH_ON_DISABLED, OPTION_RAMP);
+}
+
 static void enable(cia402_t *self)
 {
     if (self->mode != CIA402_MODE_NONE) {

@@ -134,11 +134,18 @@ static void follow(node_t *node, uint16_t index)
     }
 }
 
+/* Remote frames do not reach the node, and a TPDO says so whatever is written or stored. */
+static void set_word(node_t *node, const od_entry_t *entry, uint32_t value)
+{
+    const bool of_tpdo = is_pdo(entry->index, OD_TPDO) && entry->sub == 1U;
+    object_set_node_word(node, entry, of_tpdo ? value | COB_BIT_30 : value);
+}
+
 uint32_t communication_put(node_t *node, const od_entry_t *entry, uint32_t value)
 {
     const uint32_t code = check(node, entry, value);
     if (code == SDO_OK) {
-        object_set_node_word(node, entry, value);
+        set_word(node, entry, value);
         follow(node, entry->index);
     }
     return code;
@@ -154,7 +161,7 @@ void node_recall(node_t *node, const od_entry_t *entry, int32_t value)
 {
     if (entry->kind == (uint8_t)OD_NODE && !(node->recalled && outlives_reset(entry))) {
         const uint32_t relative = (entry->flags & (uint32_t)OD_NODE_ID) != 0U ? node->id : 0U;
-        object_set_node_word(node, entry, (uint32_t)value + relative);
+        set_word(node, entry, (uint32_t)value + relative);
     }
 }
 

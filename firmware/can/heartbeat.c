@@ -25,6 +25,7 @@ void heartbeat_receive(node_t *node, const node_frame_t *frame)
     for (uint32_t n = 0; n < (uint32_t)NODE_CONSUMERS; n++) {
         node_consumer_t *consumer = &node->consumer[n];
         if (consumer->id == id && frame->length == 1U) {
+            node_hear(node);
             consumer->seen = true;
             consumer->last_us = node->now_us;
         }

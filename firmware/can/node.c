@@ -123,6 +123,7 @@ static void nmt_receive(node_t *node, const node_frame_t *frame)
     if (frame->length != 2U || (frame->data[1] != 0U && frame->data[1] != node->id)) {
         return;
     }
+    node_hear(node);
     switch (frame->data[0]) {
     case NMT_START:
         start(node);
@@ -135,8 +136,8 @@ static void nmt_receive(node_t *node, const node_frame_t *frame)
         break;
     case NMT_RESET:
         leave(node, NODE_STOPPED);
+        node->nmt = NODE_INITIALISING; /* until node_init(), which boots up, if the host returns at all */
         node_host_reset(node->context);
-        node_boot_up(node);
         break;
     case NMT_RESET_COMMUNICATION:
         leave(node, NODE_STOPPED);
@@ -194,6 +195,7 @@ void node_receive(node_t *node, const node_frame_t *frame, uint32_t now_us)
         collide(node);
     } else if (frame->id == ID_SDO + node->id) {
         if (frame->length == 8U && node->nmt != NODE_STOPPED) {
+            node_hear(node);
             sdo_receive(node, frame->data);
         }
     } else if (frame->id > ID_HEARTBEAT && frame->id <= ID_HEARTBEAT + 127U) {
@@ -216,6 +218,15 @@ void node_run(node_t *node, uint32_t now_us)
     if (node->nmt == NODE_OPERATIONAL) {
         pdo_run(node);
     }
+}
+
+node_silence_t node_silence(const node_t *node)
+{
+    const uint32_t time_ms = object_word(node, OD_COMMAND_WATCH, 1);
+    if (time_ms == 0U || !node_elapsed(node, node->heard_us, time_ms * 1000U)) {
+        return NODE_HEARD;
+    }
+    return object_word(node, OD_COMMAND_WATCH, 2) == 0U ? NODE_SILENT_OFF : NODE_SILENT_STOP;
 }
 
 bool node_busy(const node_t *node)

@@ -46,6 +46,9 @@ typedef enum {
 
 typedef enum { NODE_BUS_ACTIVE, NODE_BUS_PASSIVE, NODE_BUS_OFF } node_bus_t;
 
+/* Since the last frame for this node longer than its object 2020h:1 allows, and what 2020h:2 wants then */
+typedef enum { NODE_HEARD, NODE_SILENT_OFF, NODE_SILENT_STOP } node_silence_t;
+
 /* Each has at most one error at a time. */
 typedef enum {
     NODE_ERROR_APPLICATION,
@@ -56,6 +59,7 @@ typedef enum {
     NODE_ERROR_BUS,
     NODE_ERROR_OVERRUN,
     NODE_ERROR_COLLISION, /* another has this node id */
+    NODE_ERROR_SILENCE,   /* of the master, while the application was on */
     NODE_ERRORS,
 } node_error_t;
 
@@ -91,7 +95,7 @@ bool node_host_store(void *context, uint32_t group);   /* OD_GROUP_..., NODE_GRO
 bool node_host_restore(void *context, uint32_t group); /* forgets what is stored */
 void node_host_recall(void *context);                  /* give stored communication objects: node_recall() */
 void node_host_alarm(void *context, uint16_t code);    /* torque off; what EMCY says */
-void node_host_reset(void *context);                   /* restart of all; may return */
+void node_host_reset(void *context);                   /* restart of all; may return before it */
 
 typedef struct node node_t; /* caller-owned: node_state.h */
 
@@ -102,6 +106,7 @@ void node_run(node_t *node, uint32_t now_us);
 bool node_busy(const node_t *node); /* something waits for room to be sent */
 
 void node_bus(node_t *node, node_bus_t state);
+node_silence_t node_silence(const node_t *node);
 
 /* An error is present, or with code 0 no longer: EMCY, 1001h and 1003h follow. `info` goes into the last five
  * bytes. Repeating the same code has no effect. */

@@ -23,6 +23,7 @@ enum {
     OD_HEARTBEAT = 0x1017,
     OD_IDENTITY = 0x1018,
     OD_ERROR_BEHAVIOUR = 0x1029,
+    OD_COMMAND_WATCH = 0x2020,
     OD_RPDO = 0x1400,
     OD_RPDO_MAP = 0x1600,
     OD_TPDO = 0x1800,
@@ -59,6 +60,11 @@ uint32_t node_room(const node_t *node);
 void node_alarm(node_t *node, node_error_t source, uint16_t code); /* the error, and torque off */
 void node_lose_master(node_t *node);                               /* as 1029h says */
 void node_boot_up(node_t *node);                                   /* communication anew */
+
+static inline void node_hear(node_t *node) /* a valid frame for it */
+{
+    node->heard_us = node->now_us;
+}
 
 static inline bool node_elapsed(const node_t *node, uint32_t since_us, uint32_t time_us)
 {

@@ -79,6 +79,7 @@ struct node {
     uint8_t ring_first, ring_count;
     uint32_t dropped; /* frames that found the ring full */
 
+    uint32_t heard_us;     /* the last frame for this node */
     uint32_t heartbeat_us; /* 0: none */
     uint32_t heartbeat_last_us;
     node_consumer_t consumer[NODE_CONSUMERS];

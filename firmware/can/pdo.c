@@ -66,7 +66,7 @@ void pdo_setup(node_t *node, bool receive, uint32_t number)
     const bool maps = count <= (uint32_t)NODE_MAPPED && pdo_length(node, map, count, &length) == SDO_OK;
     pdo->count = maps ? (uint8_t)count : 0U;
     pdo->length = maps ? (uint8_t)length : 0U;
-    pdo->id = (maps && (cob & COB_OFF) == 0U) ? (uint16_t)(cob & COB_ID) : 0U;
+    pdo->id = (pdo->count > 0U && (cob & COB_OFF) == 0U) ? (uint16_t)(cob & COB_ID) : 0U;
 }
 
 void pdo_start(node_t *node)
@@ -100,6 +100,7 @@ static void receive_one(node_t *node, node_pdo_t *pdo, uint32_t number, const no
     }
     node_error(node, NODE_ERROR_LENGTH, frame->length > pdo->length ? (uint16_t)CODE_LONG : 0U, number);
     node_error(node, NODE_ERROR_RPDO, 0, number);
+    node_hear(node);
     (void)memcpy(pdo->data, frame->data, sizeof pdo->data);
     pdo->last_us = node->now_us;
     pdo->timed = true;

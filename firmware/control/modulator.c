@@ -46,8 +46,8 @@ void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t
     const int32_t per_volt = pm_per_volt(pm_max(u.span, v_dc));
     out->limited = u.span > v_dc;
     if (pm_rarely(out->limited)) {
-        const pm_unit_t ratio = pm_share_to_unit(pm_mulh(v_dc, per_volt));
-        v = (pm_ab_t){.alpha = pm_unit(v.alpha, ratio), .beta = pm_unit(v.beta, ratio)};
+        const int32_t ratio = pm_mulh(v_dc, per_volt); /* 1 and a little when the span is just too large */
+        v = (pm_ab_t){.alpha = pm_times_share(v.alpha, ratio), .beta = pm_times_share(v.beta, ratio)};
         self->limited = true;
     }
     const pm_abc_t i = lost_by(config, i_quarter);

@@ -65,6 +65,9 @@ PM_RARE void drive_command(drive_t *drive, const drive_command_t *command)
     drive->references_ready = drive->references_ready && same_references;
     drive->command = *command;
     drive->command.mode = mode;
+    if (drive->state == DRIVE_OFF) {
+        procedure_expect(drive);
+    }
     if (!command->enable && drive->stage == STAGE_PROCEDURE) {
         drive->stage = STAGE_OFF; /* nothing to slow down: the period that comes is without voltage */
     }

@@ -18,7 +18,7 @@ set(PM_IMAGE_foc_DRIVE_STEP_INJECTION 312)
 # the reference set within 64 KiB of flash and 12 KiB of RAM
 set(PM_IMAGE_small_BOARD stm32g431)
 set(PM_IMAGE_small_PROGRAM pmdrive_small)
-set(PM_IMAGE_small_METHODS active_flux back_emf extended_emf flux_linkage pulsating_square synchronous_pi calibrate initial_pulses align identify)
+set(PM_IMAGE_small_METHODS active_flux flux_linkage pulsating_square synchronous_pi calibrate initial_pulses align identify)
 set(PM_IMAGE_small_IN_FLASH)
 set(PM_IMAGE_small_FLASH 63488)
 set(PM_IMAGE_small_RAM 11776)

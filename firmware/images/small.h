@@ -9,6 +9,8 @@
 
 #define PM_WITHOUT_deadbeat 1
 #define PM_WITHOUT_mismatch 1
+#define PM_WITHOUT_back_emf 1
+#define PM_WITHOUT_extended_emf 1
 #define PM_WITHOUT_extended_emf_ab 1
 #define PM_WITHOUT_sliding_mode 1
 #define PM_WITHOUT_ekf_full 1

@@ -249,9 +249,15 @@ static inline int32_t pm_zone_sub(int32_t sum, int32_t x, int32_t height)
 #define PM_SHARE_BITS 20
 #define PM_SHARE_HALF ((int32_t)1 << (PM_SHARE_BITS - 1))
 
-static inline pm_unit_t pm_share_to_unit(int32_t share) /* below 1 */
+static inline pm_unit_t pm_share_to_unit(int32_t share)
 {
-    return pm_shl(share, 31 - PM_SHARE_BITS);
+    return pm_shl(pm_sat_positive(share, PM_SHARE_BITS), 31 - PM_SHARE_BITS);
+}
+
+/* x times a share of 0 to below 2, so that one that rounding has left beyond 1 does not wrap; error 2 LSB. */
+static inline int32_t pm_times_share(int32_t x, int32_t share)
+{
+    return pm_shl(pm_mulh(x, pm_shl(share, 30 - PM_SHARE_BITS)), 2);
 }
 
 static inline int32_t pm_share_of(int32_t share, int32_t whole)

@@ -44,7 +44,7 @@ void hal_bridge_write(hal_t *hal, const drive_out_t *out)
 
 bool hal_bridge_arm(hal_t *hal)
 {
-    hal->armed = hal->configured && !hal->hw_fault && !plant_break_held(hal->plant);
+    hal->armed = hal->configured && !hal->broke && !hal->hw_fault && !plant_break_held(hal->plant);
     return hal->armed;
 }
 
@@ -55,6 +55,12 @@ void hal_bridge_off(hal_t *hal)
         hal->armed = false;
         plant_trip(hal->plant);
     }
+}
+
+void sim_break(hal_t *hal)
+{
+    hal_bridge_off(hal);
+    hal->broke = true;
 }
 
 bool hal_bridge_armed(const hal_t *hal)

@@ -38,6 +38,10 @@ void sim_run_period(hal_t *hal)
         hal->sample_at[1][n] = 0;
     }
     plant_run_period(hal->plant);
+    double after_s;
+    if (plant_broke(hal->plant, &after_s)) {
+        sim_break(hal);
+    }
 }
 
 static void fill_samples(const hal_t *hal, pm_measure_t *more)
@@ -99,14 +103,6 @@ static void fill_more(const hal_t *hal, pm_measure_t *more)
     }
 }
 
-/* Since the last measurement, or still. */
-static bool comparators_tripped(hal_t *hal)
-{
-    double after_s;
-    bool broke = plant_broke(hal->plant, &after_s);
-    return broke || plant_break_held(hal->plant);
-}
-
 void hal_measure(hal_t *hal, drive_in_t *in)
 {
     for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
@@ -114,7 +110,8 @@ void hal_measure(hal_t *hal, drive_in_t *in)
     }
     in->v_dc = hal->adc.v_dc;
     fill_more(hal, &in->more);
-    in->hw_fault = comparators_tripped(hal) || hal->hw_fault;
+    in->hw_fault = hal->broke || plant_break_held(hal->plant) || hal->hw_fault;
+    hal->broke = false;
     if (in->hw_fault) {
         hal_bridge_off(hal);
     }

@@ -29,6 +29,7 @@ struct hal {
     plant_adc_t adc; /* of the present period */
     uint32_t time_us, timer_Hz;
     bool armed, configured;
+    bool broke;                        /* a break that is not reported yet */
     uint16_t timer_counts;             /* of half a period */
     uint16_t sample_at[2][PM_SAMPLES]; /* asked for: for this period, for the next */
     plant_adc_t sample[PM_SAMPLES];    /* taken in the last period ... */
@@ -52,6 +53,9 @@ struct hal {
 
 /* The plant's period, with the samples that were asked for. Once a period after app_control(). */
 void sim_run_period(hal_t *hal);
+
+/* A break of an instant, by the break input. */
+void sim_break(hal_t *hal);
 
 /* Erased store, no faults; the timer's clock of the drive board. */
 void sim_hal_init(hal_t *hal, plant_t *plant);

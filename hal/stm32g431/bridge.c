@@ -158,8 +158,7 @@ bool hal_bridge_arm(hal_t *hal)
     if (hal->refused) {
         return false;
     }
-    processor_lock();
-    TIM1.SR = ~BREAKS; /* stays set while the cause lasts */
+    processor_lock(); /* a trip does not fall between the two */
     if ((TIM1.SR & BREAKS) == 0U) {
         TIM1.BDTR = hal->bridge | TIM_BDTR_MOE;
     }

@@ -12,8 +12,8 @@ void hal_bridge_write(hal_t *hal, const drive_out_t *out)
     }
 }
 
-/* Clear the break flags; if one is set again at once its cause is there: stay off. Otherwise enable the
- * outputs. */
+/* Enable the outputs unless a break flag is set. Do not clear it here: hal_measure() does, when it has reported
+ * the break. */
 bool hal_bridge_arm(hal_t *hal)
 {
     return !hal->refused && hal_bridge_armed(hal);

@@ -68,7 +68,8 @@ bool board_led(board_t *board);
 void board_set_temperature(board_t *board, double temperature_degC);
 void board_set_dial(board_t *board, double fraction);
 void board_press_button(board_t *board, bool pressed);
-void board_hold_break(board_t *board, bool held); /* external break input */
+void board_hold_break(board_t *board, bool held);                       /* external break input */
+void board_pulse_break(board_t *board, double after_s, double width_s); /* the same, from then on so long */
 
 /* Faults of the board itself */
 void board_halt(board_t *board,

@@ -84,6 +84,13 @@ void board_hold_break(board_t *board, bool held)
     tim1_check_break(&board_inside(board)->tim1);
 }
 
+void board_pulse_break(board_t *board, double after_s, double width_s)
+{
+    const rcc_t *rcc = &board_inside(board)->rcc;
+    uint64_t from = cpu_now(board_cpu(board)) + rcc_cycles(rcc, after_s);
+    tim1_pulse_break(&board_inside(board)->tim1, from, rcc_cycles(rcc, width_s));
+}
+
 void board_halt(board_t *board, bool halted)
 {
     board_chip_t *chip = board_inside(board);

@@ -9,6 +9,7 @@
 #define PERIOD_SAME 2.5e-4 /* half a count of the shortest period */
 
 #define UG   0x1u
+#define BG   0x80u
 #define CMS1 0x20u
 #define ARPE 0x80u
 
@@ -19,7 +20,7 @@ static const board_register_t list[] = {
     {TIM1_CR1, "CR1", 0, TIM1_CEN | CMS1 | ARPE, 0x10u},
     {TIM1_CR2, "CR2", 0, 0x00F00000u, 0},
     {TIM1_SR, "SR", 0, TIM1_UIF, TIM1_BIF | TIM1_SBIF},
-    {TIM1_EGR, "EGR", 0, UG, 0},
+    {TIM1_EGR, "EGR", 0, UG | BG, 0},
     {TIM1_CCMR1, "CCMR1", 0, 0x00007878u, 0},
     {TIM1_CCMR2, "CCMR2", 0, 0x00007878u, 0},
     {TIM1_CCER, "CCER", 0, 0x555u, 0},
@@ -283,6 +284,22 @@ static void write_cr1(tim1_t *tim, uint32_t before)
     }
 }
 
+/* Events by software: an update, a break. */
+static void generate(tim1_t *tim)
+{
+    uint32_t events = tim->regs.value[TIM1_EGR / 4];
+    *board_register(&tim->regs, TIM1_EGR) = 0u;
+    if ((events & BG) != 0u) {
+        tim1_break(tim);
+    }
+    if ((events & UG) != 0u) {
+        if (tim->counting) {
+            cpu_fail(tim->chip->cpu, "TIM1_EGR: update by software while counting is not modelled");
+        }
+        load(tim);
+    }
+}
+
 static bool tim1_write(void *self, uint32_t offset, uint32_t value, uint32_t mask)
 {
     tim1_t *tim = self;
@@ -300,11 +317,7 @@ static bool tim1_write(void *self, uint32_t offset, uint32_t value, uint32_t mas
         write_cr1(tim, before);
         break;
     case TIM1_EGR:
-        *board_register(&tim->regs, TIM1_EGR) = 0u;
-        if (tim->counting) {
-            cpu_fail(tim->chip->cpu, "TIM1_EGR: update by software while counting is not modelled");
-        }
-        load(tim);
+        generate(tim);
         break;
     case TIM1_CCMR1:
     case TIM1_CCMR2:

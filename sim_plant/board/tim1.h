@@ -25,6 +25,8 @@ typedef struct {
     uint64_t update;  /* next event */
     uint64_t updates; /* since the start */
     bool armed_before;
+    bool pulsed;        /* the break input, as the filter lets it through ... */
+    uint64_t pulse_end; /* ... until this cycle */
 } tim1_t;
 
 void tim1_init(tim1_t *tim, board_chip_t *chip);
@@ -38,10 +40,12 @@ uint32_t tim1_period(const tim1_t *tim);      /* cycles from one update event to
 void tim1_update(tim1_t *tim);                /* its cycle has come */
 bool tim1_follows_plant(const tim1_t *tim);   /* its update events are ends of the plant's periods */
 
-void tim1_outputs(tim1_t *tim);             /* pins have changed */
-void tim1_break(tim1_t *tim);               /* a comparator has acted in the plant */
-void tim1_check_break(tim1_t *tim);         /* a break input may have changed */
-void tim1_system_break(tim1_t *tim);        /* clock security */
+void tim1_outputs(tim1_t *tim);      /* pins have changed */
+void tim1_break(tim1_t *tim);        /* a comparator has acted in the plant */
+void tim1_check_break(tim1_t *tim);  /* a break input may have changed */
+void tim1_system_break(tim1_t *tim); /* clock security */
+/* The break input is active from that cycle on for so many: with the filter's delay, or too short for it. */
+void tim1_pulse_break(tim1_t *tim, uint64_t cycle, uint64_t cycles);
 void tim1_freeze(tim1_t *tim, bool frozen); /* by the debugger: outputs off; the counter goes on */
 
 /* Whether the comparator of that leg reaches the break input, and how late. */

@@ -2,6 +2,9 @@
 
 #include "sim_plant/board/board_chip.h"
 
+#include <math.h>
+#include <stddef.h>
+
 #define LOCK_1    0x000F70FFu /* BKF, AOE, BKP, BKE, DTG */
 #define LOCK_2    0x00000C00u /* OSSR, OSSI */
 #define BKE       0x1000u
@@ -56,8 +59,8 @@ static bool input_active(const tim1_t *tim)
 {
     uint32_t bdtr = tim->regs.value[TIM1_BDTR / 4];
     uint32_t af1 = tim->regs.value[TIM1_AF1 / 4];
-    bool high =
-        (af1 & BKINE) != 0u && gpio_connects(&tim->chip->gpio, break_pin) && tim->chip->wiring.break_held;
+    bool high = (af1 & BKINE) != 0u && gpio_connects(&tim->chip->gpio, break_pin) &&
+                (tim->chip->wiring.break_held || tim->pulsed);
     high = high || plant_break_held(tim->chip->plant);
     return (bdtr & BKE) != 0u && high == (board_field(bdtr, 13, 1) == 1u);
 }
@@ -77,6 +80,24 @@ void tim1_check_break(tim1_t *tim)
     if (rcc_failed(&tim->chip->rcc) && (tim->regs.value[TIM1_BDTR / 4] & BKE) != 0u) {
         stop(tim, TIM1_SBIF);
     }
+}
+
+static void pulse_changes(void *owner, uint64_t cycle)
+{
+    tim1_t *tim = (tim1_t *)((char *)owner - offsetof(tim1_t, pulsed));
+    tim->pulsed = !tim->pulsed;
+    cpu_alarm(tim->chip->cpu, owner, tim->pulsed ? tim->pulse_end : UINT64_MAX, pulse_changes);
+    (void)cycle;
+    tim1_check_break(tim);
+}
+
+void tim1_pulse_break(tim1_t *tim, uint64_t cycle, uint64_t cycles)
+{
+    uint64_t filter = (uint64_t)lrint(filter_s(tim) * tim->chip->rcc.clock_Hz);
+    bool passes = cycles >= filter && cycles > 0u;
+    tim->pulsed = false;
+    tim->pulse_end = cycle + filter + cycles;
+    cpu_alarm(tim->chip->cpu, &tim->pulsed, passes ? cycle + filter : UINT64_MAX, pulse_changes);
 }
 
 void tim1_break(tim1_t *tim)

@@ -29,7 +29,7 @@ class Project:
         self.folder = tempfile.TemporaryDirectory()
         self.root = Path(self.folder.name)
         headers = [path.relative_to(ROOT).as_posix()
-                   for folder in ("observers", "injection") for path in sorted(ROOT.glob(f"{folder}/*.[hd]*"))]
+                   for folder in ("observers", "injection", "firmware/control") for path in sorted(ROOT.glob(f"{folder}/*.[hd]*"))]
         for path in (generate.SOURCE, generate.FAULTS, generate.LEDGER, LIST, *headers, *generate.parts(ROOT)):
             (self.root / path).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / path, self.root / path)

@@ -46,7 +46,7 @@ void commissioning_set_gains(drive_t *drive)
 /* A share of the period in Q20; the fraction of a count left over goes into the next period. */
 static inline void write_leg(int32_t share, int32_t parts, int32_t *rest, uint16_t *compare)
 {
-    const pm_unit_t within = pm_share_to_unit(pm_sat_positive(share, PM_SHARE_BITS));
+    const pm_unit_t within = pm_share_to_unit(share);
     const uint32_t wanted = (uint32_t)pm_mulh_add(*rest, within, parts);
     *rest = (int32_t)(wanted % PART);
     drive_write_leg(compare, (int32_t)(wanted / PART));

@@ -64,6 +64,25 @@ pm_procedure_t procedure_slow(drive_t *drive)
     }
 }
 
+static void report_identification(drive_t *drive, commissioning_state_t state, commissioning_reason_t reason)
+{
+    commissioning_report_t *report = &drive->commissioning_report;
+    report->state = (uint8_t)state;
+    report->reason = (uint8_t)reason;
+    report->progress = 0;
+}
+
+void procedure_expect(drive_t *drive)
+{
+    if (drive->command.enable && drive->command.mode == DRIVE_MODE_IDENTIFY) {
+        report_identification(drive, COMMISSIONING_RUNNING, COMMISSIONING_NO_REASON);
+    } else if (drive->commissioning_report.state == (uint8_t)COMMISSIONING_RUNNING) {
+        report_identification(drive, COMMISSIONING_FAILED, COMMISSIONING_ABORTED);
+    } else {
+        /* the report of the last one stands */
+    }
+}
+
 void procedure_abort(drive_t *drive)
 {
     const procedure_id_t id = (procedure_id_t)drive->sequence.procedure;
@@ -77,5 +96,8 @@ void procedure_abort(drive_t *drive)
     case PROCEDURE_COUNT:
     default:
         break;
+    }
+    if (drive->commissioning_report.state == (uint8_t)COMMISSIONING_RUNNING) { /* not even begun */
+        report_identification(drive, COMMISSIONING_FAILED, COMMISSIONING_ABORTED);
     }
 }

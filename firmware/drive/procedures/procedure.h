@@ -82,6 +82,8 @@ typedef union {
 
 /* The one of drive->sequence.procedure; nothing with PROCEDURE_NONE. */
 void procedure_begin(drive_t *drive, procedure_id_t id); /* the drive's state and stage, too */
+void procedure_expect(
+    drive_t *drive); /* a command while off: an identification's report is its own from here on */
 pm_procedure_t procedure_slow(drive_t *drive);
 void procedure_abort(drive_t *drive); /* from then on there is none */
 

@@ -34,6 +34,7 @@ typedef struct {
 #define TIM_SR_BIF      (1U << 7)
 #define TIM_SR_SBIF     (1U << 13)
 #define TIM_EGR_UG      (1U << 0)
+#define TIM_EGR_BG      (1U << 7)
 #define TIM_CCMR1_OC1PE (1U << 3)
 #define TIM_CCMR1_OC1M  (7U << 4) /* the lower three of four bits */
 #define TIM_CCMR1_OC2PE (1U << 11)

@@ -14,6 +14,7 @@ struct app {
     volatile uint32_t slow_in_control; /* slow that has run before control returned */
     volatile bool in_control, pend;
     volatile bool feed;
+    volatile uint32_t breaks; /* measurements that have reported one */
     hal_slow_t slow;
 };
 
@@ -23,6 +24,7 @@ void app_control(app_t *app)
 {
     app->in_control = true;
     hal_measure(app->hal, &app->in);
+    app->breaks += app->in.hw_fault ? 1U : 0U;
     hal_bridge_write(app->hal, &app->out);
     app->controls++;
     if (app->pend) {
@@ -335,6 +337,29 @@ static void check_bridge(run_t *run)
     check(run, "off at once", !hal_bridge_armed(run->hal), 0);
 }
 
+/* Its cause is gone at once. */
+static void check_break(run_t *run)
+{
+    struct app *app = &the_app;
+    check(run, "armed for a break", hal_bridge_arm(run->hal), 0);
+    wait_us(run, 1000);
+    const uint32_t before = app->breaks;
+    hal_lock(run->hal); /* before a measurement can have reported it */
+    run->contract->cut(run->hal);
+    const bool stays = hal_bridge_armed(run->hal);
+    const bool again = hal_bridge_arm(run->hal);
+    hal_unlock(run->hal);
+    check(run, "a break disarms at once", !stays, 0);
+    check(run, "not armed before the break is reported", !again, 0);
+    wait_us(run, 1000);
+    check(run, "a break is reported once", app->breaks == before + 1U, (int32_t)(app->breaks - before));
+    check(run, "a break is not forgotten", !hal_bridge_armed(run->hal), 0);
+    check(run, "arms after a break", hal_bridge_arm(run->hal), 0);
+    wait_us(run, 1000);
+    check(run, "stays armed after a break", hal_bridge_armed(run->hal), 0);
+    hal_bridge_off(run->hal);
+}
+
 static bool page_is(const hal_t *hal, uint32_t page, uint32_t first, uint32_t second)
 {
     const uint32_t *words = hal_store_page(hal, page);
@@ -383,6 +408,9 @@ int hal_contract_run(hal_t *hal, const hal_contract_t *contract)
     check_lock(&run);
     check_measurement(&run);
     check_bridge(&run);
+    if (contract->cut != NULL) {
+        check_break(&run);
+    }
     check_store(&run);
     check_bus(&run);
     say(hal, "DONE ");

@@ -16,9 +16,13 @@ typedef struct {
     uint32_t period_us;
     uint32_t channels;        /* NEEDS_...: what it has to declare */
     void (*idle)(hal_t *hal); /* lets time pass; on a processor hal_idle() */
+    void (*cut)(hal_t *hal);  /* a break of an instant, as a comparator makes it; NULL: not to be had */
 } hal_contract_t;
 
 /* Returns the number of failed checks. */
 int hal_contract_run(hal_t *hal, const hal_contract_t *contract);
+
+/* `cut` of a board, in a file beside this one; its build sets PM_CONTRACT_CUT to that name. */
+void stm32g431_cut(hal_t *hal);
 
 #endif

@@ -1,5 +1,11 @@
 /* The contract as an image: its board's own figures stand in the build. */
+#include <stddef.h>
+
 #include "tests/contract/hal/hal_contract.h"
+
+#ifndef PM_CONTRACT_CUT
+#define PM_CONTRACT_CUT NULL
+#endif
 
 int main(void)
 {
@@ -11,6 +17,7 @@ int main(void)
         .period_us = PM_CONTRACT_PERIOD_US,
         .channels = PM_CONTRACT_CHANNELS,
         .idle = hal_idle,
+        .cut = PM_CONTRACT_CUT,
     };
     hal_t *hal = hal_instance();
     (void)hal_contract_run(hal, &contract);

@@ -41,7 +41,7 @@ void keeps_contract(const plant_config_t &config, uint32_t without, uint32_t cha
     static hal_t hal;
     sim_hal_init(&hal, plant.get());
     hal.without = without;
-    const hal_contract_t contract = {{8500, 500, 0, 500}, 100, channels, pass_period};
+    const hal_contract_t contract = {{8500, 500, 0, 500}, 100, channels, pass_period, sim_break};
     EXPECT_EQ(hal_contract_run(&hal, &contract), 0) << hal.console;
     EXPECT_NE(std::string(hal.console).find("DONE 0 of"), std::string::npos) << hal.console;
 }

@@ -26,6 +26,36 @@ std::vector<int> told(Bench *b)
     return codes;
 }
 
+// Boot-ups since asked last
+int boot_ups(Bench *b)
+{
+    int seen = 0;
+    board_frame_t frame;
+    while (board_can_receive(b->board, &frame)) {
+        seen += frame.id == 0x701 && frame.length == 1 && frame.data[0] == 0 ? 1 : 0;
+    }
+    return seen;
+}
+
+TEST(BoardBus, SaysOnceThatItIsThereAfterEachReset)
+{
+    Bench b;
+    b.store(0, bench::params(), 1);
+    b.boot();
+    b.run_ms(20);
+    EXPECT_EQ(boot_ups(&b), 1);
+    const board_frame_t communication = {0, 2, {130, 1, 0, 0, 0, 0, 0, 0}};
+    ASSERT_TRUE(board_can_send(b.board, &communication));
+    b.run_ms(20);
+    EXPECT_EQ(boot_ups(&b), 1);
+    EXPECT_EQ(board_resets(b.board), 0u);
+    const board_frame_t node = {0, 2, {129, 1, 0, 0, 0, 0, 0, 0}};
+    ASSERT_TRUE(board_can_send(b.board, &node));
+    b.run_ms(100);
+    EXPECT_EQ(boot_ups(&b), 1);
+    EXPECT_EQ(board_resets(b.board), 1u);
+}
+
 // Nothing of the master's comes through any more, nor of the image's.
 TEST(BoardBus, ABabblerBeforeWhichNothingPassesOpensTheBridgeInTime)
 {

@@ -1,4 +1,5 @@
 // The application on the simulated board: what stands between the user and a bridge that is on.
+#include "firmware/app/app_parts.h"
 #include "tests/unit/app/bench.h"
 
 #include <cmath>
@@ -111,7 +112,7 @@ TEST(App, NamesOfAnotherVersionAreLeftOut)
     store_end(&writer, page + 4);
     drive_params_t back;
     uint32_t unknown;
-    ASSERT_TRUE(app_load(&x.loop.hal, &back, &unknown));
+    EXPECT_FALSE(app_load(&x.loop.hal, &back, &unknown)); // the machine is not among them
     EXPECT_EQ(unknown, 2U);
     EXPECT_EQ(back.i_max, 2500);
     EXPECT_EQ(back.R_s, defaults().R_s);
@@ -145,6 +146,66 @@ TEST(App, BusOffIsAFault)
     x.run_ms(2);
     EXPECT_EQ(x.fault(), DRIVE_FAULT_REMOTE_LOST);
     EXPECT_FALSE(x.loop.hal.armed);
+}
+
+// One that ends before control has seen it, between two rounds of the main loop
+TEST(App, ABreakIsNotArmedAgainBeforeControlHasReportedIt)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_enabled_ms(600);
+    ASSERT_TRUE(x.loop.hal.armed);
+    sim_break(&x.loop.hal);
+    x.loop.hal.time_us += 1000; // a round is due
+    app_turn(&x.loop.app);
+    EXPECT_FALSE(x.loop.hal.armed);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_HARDWARE);
+    x.run_enabled_ms(100);
+    EXPECT_FALSE(x.loop.hal.armed);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_HARDWARE);
+}
+
+// However the outputs were lost, also without a flag of the port
+TEST(App, LostOutputsAreAFaultAndNotArmedAgain)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_enabled_ms(600);
+    hal_bridge_off(&x.loop.hal);
+    x.run_ms(2);
+    EXPECT_FALSE(x.loop.hal.armed);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_HARDWARE);
+    x.send(false, false);
+    x.run_ms(1);
+    x.send(false, true);
+    x.run_ms(2);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    x.run_enabled_ms(600);
+    EXPECT_TRUE(x.loop.hal.armed);
+}
+
+// Fault, its reset and the next start between two rounds of the main loop
+TEST(App, AResetAndAStartInOneRoundArm)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_enabled_ms(600);
+    sim_break(&x.loop.hal);
+    plant_sample(x.loop.hal.plant, &x.loop.hal.adc);
+    app_control(&x.loop.app);
+    app_control(&x.loop.app); // which sees no break any more
+    x.control(0x00);
+    x.control(0x80);
+    x.send(true);
+    EXPECT_TRUE(app_bus_take(&x.loop.app));
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    app_slow(&x.loop.app);
+    x.run_enabled_ms(600);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    EXPECT_TRUE(x.loop.hal.armed);
 }
 
 TEST(App, BreakInputAndItsClearing)

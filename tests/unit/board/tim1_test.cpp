@@ -190,6 +190,43 @@ TEST_F(Tim1, AHeldBreakInputSwitchesOffAndBarsArming)
     EXPECT_EQ(c.read(bdtr) & moe, moe);
 }
 
+// A filter of 8 samples at 1/16 of the clock is 128 cycles, for either edge.
+TEST_F(Tim1, APulseOfTheBreakInputSwitchesOffWhenItOutlastsTheFilter)
+{
+    for (const uint64_t cycles : {127u, 128u, 170u}) {
+        Chip chip;
+        chip.supply_clocks();
+        chip.clock_170MHz();
+        chip.pins();
+        chip.gates(85, 12);
+        chip.start_timer();
+        chip.write(ccer, 0x555);
+        chip.set(bdtr, moe);
+        tim1_pulse_break(&chip.chip->tim1, chip.processor.now + 1000, cycles);
+        chip.run(1000 + 127);
+        EXPECT_EQ(chip.read(bdtr) & moe, moe);
+        chip.run(2);
+        EXPECT_EQ(chip.read(bdtr) & moe, cycles < 128 ? moe : 0u) << cycles;
+        EXPECT_EQ(chip.read(sr) & bif, cycles < 128 ? 0u : bif) << cycles;
+        chip.run(200);
+        chip.write(sr, ~bif);
+        EXPECT_EQ(chip.read(sr) & bif, 0u);
+        EXPECT_EQ(chip.take_error(), "");
+    }
+}
+
+TEST_F(Tim1, ABreakBySoftwareLeavesItsFlag)
+{
+    c.all();
+    arm();
+    c.write(egr, 0x80);
+    EXPECT_EQ(c.read(bdtr) & moe, 0u);
+    EXPECT_EQ(c.read(sr) & bif, bif);
+    c.write(sr, ~bif);
+    EXPECT_EQ(c.read(sr) & bif, 0u);
+    EXPECT_EQ(c.take_error(), "");
+}
+
 TEST_F(Tim1, ABreakPinOfAnotherFunctionIsNotSeen)
 {
     c.all();

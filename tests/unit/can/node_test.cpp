@@ -60,9 +60,15 @@ TEST(Nmt, ResetOfCommunicationTakesWhatIsStored)
 TEST(Nmt, ResetOfTheNodeIsTheApplications)
 {
     Bench x;
+    x.sent.clear();
     x.nmt(129);
     EXPECT_EQ(x.resets, 1);
-    EXPECT_EQ(x.take(0x701).size(), 2U);
+    x.run_ms(2000);
+    x.nmt(1);
+    EXPECT_TRUE(x.sent.empty()); // until it begins anew
+    EXPECT_EQ(node_nmt(&x.node), NODE_INITIALISING);
+    x.boot();
+    EXPECT_EQ(x.take(0x701).size(), 1U);
     EXPECT_EQ(node_nmt(&x.node), NODE_PRE_OPERATIONAL);
 }
 
@@ -73,6 +79,9 @@ TEST(Nmt, LosingTheMasterWhileOnIsAnAlarm)
         x.operational();
         x.nmt(uint8_t(command));
         EXPECT_TRUE(x.alarms.empty()) << command; // off: nothing happens
+        if (command == 129) {
+            x.boot();
+        }
         x.operational();
         x.on = true;
         x.sent.clear();

@@ -205,6 +205,49 @@ TEST(Communication, RefusesIdentifiersInUse)
     EXPECT_EQ(x.set(0x2080, 2, 300), INVALID);
 }
 
+// Without objects it does not exist, whatever its COB-ID says. CiA 301, 7.5.2.36 and 38
+TEST(Mapping, APdoOfNothingIsNeitherSentNorAccepted)
+{
+    Bench x;
+    ASSERT_EQ(map(x, 0x1800, {}), 0U);
+    ASSERT_EQ(map(x, 0x1801, {}), 0U);
+    configure(x, 0x1800, 255, 0, 10);
+    configure(x, 0x1801, 1, 0, 0);
+    ASSERT_EQ(map(x, 0x1400, {}), 0U);
+    x.operational();
+    x.on = true;
+    x.give(0x201, {});
+    x.give(0x201, {15, 0});
+    x.give(0x80, {});
+    x.run_ms(1000);
+    EXPECT_TRUE(x.take(0x181).empty());
+    EXPECT_TRUE(x.take(0x281).empty());
+    EXPECT_TRUE(x.take(0x81).empty()) << "no complaint about its length or its time";
+    EXPECT_TRUE(x.alarms.empty());
+    EXPECT_EQ(x.value(0x1800, 1), 0x40000181U); // it is there again when something is mapped
+    ASSERT_EQ(map(x, 0x1800, {0x60410010}), 0U);
+    x.run_ms(50);
+    EXPECT_FALSE(x.take(0x181).empty());
+}
+
+// Remote frames do not come through any port, so none is promised.
+TEST(Tpdo, ShowsThatItTakesNoRemoteRequests)
+{
+    for (uint16_t n = 0; n < 4; ++n) {
+        Bench x;
+        const auto index = uint16_t(0x1800 + n);
+        EXPECT_NE(x.value(index, 1) & 0x40000000U, 0U);
+        const uint32_t id = x.value(index, 1) & 0x7FFU;
+        for (const uint32_t flags : {0x80000000U, 0U, 0x40000000U}) {
+            EXPECT_EQ(x.set(index, 1, flags | id), 0U);
+            EXPECT_EQ(x.value(index, 1), flags | id | 0x40000000U) << std::hex << flags;
+        }
+        x.stored[{index, 1}] = int32_t(id - x.node.id); // by a version that took what was written
+        x.boot();
+        EXPECT_EQ(x.value(index, 1), id | 0x40000000U);
+    }
+}
+
 TEST(Tpdo, EventTimer)
 {
     Bench x;

@@ -194,6 +194,35 @@ TEST(Modulator, OvermodulationKeepsTheAngleOnTheHexagon)
     }
 }
 
+// Every link voltage as its reciprocal tells them apart, 16 bits, at the largest of each, where a share of one is
+// nearest; spans from the next number on.
+TEST(Modulator, NoVectorIsTurnedRoundAtTheLimit)
+{
+    const modulator_config_t c = plain();
+    int limited = 0;
+    for (int32_t part = 1 << 12; part <= 1 << 16; ++part) {
+        const int32_t link = std::min((part << 12) + 4094, PM_ONE);
+        for (const double beyond : {0.0, 4e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-2, 1.0}) {
+            for (const double angle : {0.0, 30.0, 90.0, 200.0}) {
+                const Complex v = std::polar(1.0, angle * kDegree);
+                const Legs u = phases(v);
+                const double amplitude = std::min(real(link) * (1 + beyond) / (u.top() - u.bottom()), 3.99);
+                const pm_ab_t asked = bench::ab(amplitude * v);
+                modulator_t self = {};
+                modulator_out_t out;
+                modulator_step(&self, &c, asked, link, {0, 0}, &out);
+                limited += out.limited ? 1 : 0;
+                const Complex ratio = bench::complex(out.v) / bench::complex(asked);
+                ASSERT_NEAR(ratio.real(), std::min(1.0, real(link) / (u.top() - u.bottom()) / amplitude),
+                            3e-4)
+                    << link << ' ' << beyond << ' ' << angle;
+                ASSERT_NEAR(ratio.imag(), 0.0, 1e-6) << link << ' ' << beyond << ' ' << angle;
+            }
+        }
+    }
+    EXPECT_GT(limited, 1000000);
+}
+
 TEST(Modulator, CountsStayWithinTheTimer)
 {
     samples::Random random;

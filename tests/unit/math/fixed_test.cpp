@@ -223,6 +223,37 @@ TEST(MathFixed, ShareOfAWhole)
     }
 }
 
+// Of one and beyond: the largest unit, not the smallest number. All numbers with the next 12 bits around a change.
+TEST(MathFixed, AShareOfOneIsNoNegativeUnit)
+{
+    const auto check = [](int32_t share) {
+        const double within = std::clamp(share * 0x1p-20, 0.0, 1 - 0x1p-20);
+        ASSERT_EQ(pm_share_to_unit(share) * 0x1p-31, within) << share;
+    };
+    for (int32_t share = -(1 << 22); share <= 1 << 22; ++share) {
+        check(share);
+    }
+    for (int64_t share = INT32_MIN; share <= INT32_MAX; share += 4095) {
+        check(int32_t(share));
+    }
+    for (const int32_t x : corners()) {
+        check(x);
+    }
+}
+
+// A vector times a share that a reciprocal has left a little beyond one keeps its sign and its size.
+TEST(MathFixed, TimesAShareUpToTwo)
+{
+    Random random;
+    for (int32_t share = 0; share < 1 << 21; share += 7) {
+        for (const int32_t x : {1 << 27, -(1 << 27), random.word() >> 2}) {
+            ASSERT_NEAR(pm_times_share(x, share), x * (share * 0x1p-20), 2.0) << x << ' ' << share;
+        }
+    }
+    EXPECT_EQ(pm_times_share(PM_ONE, 1 << PM_SHARE_BITS), PM_ONE);
+    EXPECT_EQ(pm_times_share(-PM_ONE, 1 << PM_SHARE_BITS), -PM_ONE);
+}
+
 TEST(MathFixed, WideAndBack)
 {
     for (const int32_t x : corners()) {

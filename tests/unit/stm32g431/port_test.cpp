@@ -166,6 +166,8 @@ TEST_F(Port, BreakIsReportedAndThenCleared)
 {
     drive_in_t in = {};
     TIM1.SR = TIM_SR_BIF;
+    EXPECT_FALSE(hal_bridge_arm(hal)); // which would hide it
+    EXPECT_EQ(TIM1.SR, TIM_SR_BIF);
     hal_measure(hal, &in);
     EXPECT_TRUE(in.hw_fault);
     EXPECT_EQ(TIM1.SR, ~TIM_SR_BIF); // flags are cleared by zeros

@@ -1,0 +1,58 @@
+// Identification as a master sees it.
+#include "tests/unit/app/bench.h"
+
+using app_test::Bench;
+using app_test::defaults;
+
+namespace
+{
+
+// What is read while an identification is on the way to its beginning, or was not begun at all
+TEST(BusIdentification, ItsStateIsNeverThatOfTheOneBefore)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_ms(5);
+    const auto state = [&] { return x.get(0x3000, 2) & 0xFF; };
+    const auto enable = [&] {
+        x.give(0, {1, 0});
+        for (const int word : {0x06, 0x07, 0x0F}) {
+            x.control(uint16_t(word), -2, 0);
+        }
+        x.run_ms(1);
+    };
+    const auto held = [&](int ms) {
+        for (int done = 0; done < ms && state() == COMMISSIONING_RUNNING; done += 100) {
+            x.run_ms(100);
+            x.control(0x0F, -2, 0);
+        }
+    };
+    ASSERT_EQ(x.set(0x3000, 1, COMMISSIONING_RESISTANCE), 0U);
+    EXPECT_EQ(state(), uint32_t(COMMISSIONING_IDLE));
+    enable();
+    EXPECT_EQ(state(), uint32_t(COMMISSIONING_RUNNING)); // the sensors are calibrated first
+    held(10000);
+    ASSERT_EQ(state(), uint32_t(COMMISSIONING_DONE));
+    x.control(0x06, -2, 0);
+    x.run_ms(20);
+    EXPECT_EQ(state(), uint32_t(COMMISSIONING_DONE));
+
+    enable(); // the same again
+    EXPECT_EQ(state(), uint32_t(COMMISSIONING_RUNNING));
+    x.control(0x06, -2, 0); // taken back before it has begun
+    x.run_ms(20);
+    EXPECT_EQ(state(), uint32_t(COMMISSIONING_FAILED));
+    EXPECT_EQ(x.get(0x3000, 4) & 0xFF, uint32_t(COMMISSIONING_ABORTED));
+
+    enable();
+    x.loop.hal.hw_fault = true; // so does a fault
+    x.run_ms(5);
+    EXPECT_EQ(state(), uint32_t(COMMISSIONING_FAILED));
+    x.loop.hal.hw_fault = false;
+    ASSERT_EQ(x.set(0x3000, 1, COMMISSIONING_RESISTANCE), 0U); // the next, which does not start
+    EXPECT_EQ(state(), uint32_t(COMMISSIONING_IDLE));
+    EXPECT_EQ(x.get(0x3000, 4) & 0xFF, uint32_t(COMMISSIONING_NO_REASON));
+}
+
+} // namespace
