@@ -76,7 +76,7 @@ typedef struct {
 void cia402_init(cia402_t *self);
 cia402_out_t cia402_step(cia402_t *self, const cia402_in_t *in);
 uint16_t cia402_statusword(const cia402_t *self, const cia402_in_t *in);
-void cia402_abandon(cia402_t *self); /* the master is silent: slows down, off until a shutdown command */
+void cia402_abandon(cia402_t *self);  /* master silent: slows down, then off until a shutdown */
 bool cia402_on(const cia402_t *self); /* the drive is on, or about to be */
 
 /* Objects of the profile by slot (OD_LIVE_...). False: not one of these. */
