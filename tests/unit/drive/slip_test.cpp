@@ -5,6 +5,7 @@
 
 #include "firmware/drive/slip.h"
 #include "tests/contract/bench.h"
+#include "tests/unit/drive/direct.h"
 
 namespace
 {
@@ -123,6 +124,40 @@ TEST(Slip, EachIsCounted)
         EXPECT_GT(look(self, SOURCE_HALF_TURN, 180, 0.5, 0).ms, 0);
         EXPECT_EQ(self.count, n);
     }
+}
+
+// The drive turns its frame with the position; with one slip too many it gives up. The voltage is that of a rotor at the
+// other pole, whatever the drive does.
+TEST(Slip, ThreeArePutRightTheFourthIsAFault)
+{
+    direct::Drive x(direct::params(1));
+    drive_t &d = x.d;
+    for (pm_q_t &zero : d.zero) {
+        zero = PM_ONE; // mid-scale
+    }
+    x.run_ms(1); // the DC link is known
+    d.state = DRIVE_RUNNING;
+    d.command.enable = true;
+    d.config.protection.lost_ms = UINT16_MAX; // the quality, which such a position has lost, is not asked
+    position_reset(&d.position, &d.config.position, 0, {0, 0}, true);
+    d.stage = STAGE_VECTOR;
+    const pm_q_t omega = d.config.position.omega_low + d.config.position.omega_low / 8;
+    const pm_q_t emf = pm_mul(omega, d.config.machine.psi_m);
+    int turns = 0;
+    for (int ms = 0; ms < 4 * static_cast<int>(SLIP_MS) + 20 && d.fault == DRIVE_FAULT_NONE; ++ms) {
+        d.position.pll = {0, omega};
+        d.position.inject = true;
+        d.voltage.v = {0, -pm_widen(emf)};
+        const drive_slow_in_t slow = {250};
+        drive_slow(&d, &slow);
+        if (d.fault == DRIVE_FAULT_NONE && d.position.pll.theta != 0U) {
+            ++turns;
+            EXPECT_EQ(d.position.pll.theta, PM_TURN(0.5));
+            EXPECT_NE(drive_status(&d)->limits & DRIVE_LIMIT_SLIP, 0U);
+        }
+    }
+    EXPECT_EQ(turns, static_cast<int>(SLIP_MOST));
+    EXPECT_EQ(d.fault, DRIVE_FAULT_POSITION_LOST);
 }
 
 } // namespace
