@@ -2,14 +2,14 @@
  *
  * A regulator stands between references and voltage (regulation.h): sampled at k, its voltage acts over [k+1, k+2).
  * Each of regulators.def has these functions; config is const but in slow_down:
- *   x_reset(self, config, v, i, omega)  the voltage v (Q28) acts at this current and speed: nothing jumps where
- *                                   that is right
+ *   x_reset(self, config, v, i, omega)
+ *                                   the voltage v (Q28) acts at this current and speed: nothing jumps if it is right
  *   x_step(self, config, in, out)   one period; no division, no root unless the limit acts. |out->v| <= v_max
  *   x_slow_down(config, share)      a copy of the configuration to `share` of the bandwidth: what a low-speed source
  *                                   with a slow window asks for
  *   make_x(maker, config)           configuration from SI parameters (x_config.c)
  *   x_bandwidth(maker)              of the closed loop, in Hz
- * References and feed-forward are the drive's; dead time belongs to the modulator.
+ * References are the drive's; dead time belongs to the modulator.
  *
  * Cost of the dispatch: one branch for the default, which is compiled into the caller, none in an image that has no
  * other; a call for the others. Tests: tests/contract/regulator_contract_test.cpp runs all of the list. */

@@ -84,7 +84,7 @@ void tim1_check_break(tim1_t *tim)
 
 static void pulse_changes(void *owner, uint64_t cycle)
 {
-    tim1_t *tim = (tim1_t *)((char *)owner - offsetof(tim1_t, pulsed));
+    tim1_t *tim = (tim1_t *)(void *)((char *)owner - offsetof(tim1_t, pulsed));
     tim->pulsed = !tim->pulsed;
     cpu_alarm(tim->chip->cpu, owner, tim->pulsed ? tim->pulse_end : UINT64_MAX, pulse_changes);
     (void)cycle;
