@@ -11,28 +11,33 @@ void deadbeat_reset(deadbeat_t *self, const deadbeat_config_t *config, pm_dq_t v
     self->v = v;
 }
 
+/* R i and the EMF of a current, saturated: what no machine has cannot overflow. */
+static inline pm_dq_t opposing(const deadbeat_config_t *c, pm_dq_t i, pm_q_t omega)
+{
+    const pm_q_t psi_d = pm_add_sat(c->psi_m, pm_mul_sat(c->L_d, i.d));
+    const pm_q_t psi_q = pm_mul_sat(c->L_q, i.q);
+    return (pm_dq_t){.d = pm_sub_sat(pm_mul_sat(c->R, i.d), pm_mul_sat(omega, psi_q)),
+                     .q = pm_add_sat(pm_mul_sat(c->R, i.q), pm_mul_sat(omega, psi_d))};
+}
+
 /* Where the acting voltage takes the current by the end of the period. */
 static inline pm_dq_t predicted(const deadbeat_t *self, const deadbeat_config_t *c, pm_dq_t i, pm_q_t omega)
 {
-    const pm_q_t psi_d = c->psi_m + pm_mul(c->L_d, i.d);
-    const pm_q_t psi_q = pm_mul(c->L_q, i.q);
-    const pm_q_t w_d = self->v.d - pm_mul(c->R, i.d) + pm_mul(omega, psi_q);
-    const pm_q_t w_q = self->v.q - pm_mul(c->R, i.q) - pm_mul(omega, psi_d);
-    return (pm_dq_t){.d = i.d + pm_mul(c->per_L_d, w_d), .q = i.q + pm_mul(c->per_L_q, w_q)};
+    const pm_dq_t against = opposing(c, i, omega);
+    const pm_q_t change_d = pm_mul_sat(c->per_L_d, pm_sub_sat(self->v.d, against.d));
+    const pm_q_t change_q = pm_mul_sat(c->per_L_q, pm_sub_sat(self->v.q, against.q));
+    return (pm_dq_t){.d = pm_add_sat(i.d, change_d), .q = pm_add_sat(i.q, change_q)};
 }
 
 void deadbeat_step(deadbeat_t *self, const deadbeat_config_t *config, const regulator_in_t *in,
                    regulator_out_t *out)
 {
     const deadbeat_config_t *c = config;
-    const pm_q_t omega = in->omega;
-    const pm_dq_t i = predicted(self, c, in->i, omega);
-    const pm_q_t psi_d = c->psi_m + pm_mul(c->L_d, i.d);
-    const pm_q_t psi_q = pm_mul(c->L_q, i.q);
-    const pm_q_t model_d = pm_mul(c->R, i.d) - pm_mul(omega, psi_q);
-    const pm_q_t model_q = pm_mul(c->R, i.q) + pm_mul(omega, psi_d);
-    pm_dq_t u = {.d = pm_gain_add(pm_widen(model_d), in->i_ref.d - i.d, c->k_d),
-                 .q = pm_gain_add(pm_widen(model_q), in->i_ref.q - i.q, c->k_q)};
+    const pm_dq_t i = predicted(self, c, in->i, in->omega);
+    const pm_dq_t model = opposing(c, i, in->omega);
+    const pm_dq_t e = {.d = pm_sub_sat(in->i_ref.d, i.d), .q = pm_sub_sat(in->i_ref.q, i.q)};
+    pm_dq_t u = {.d = pm_gain_add(pm_widen(model.d), e.d, c->k_d),
+                 .q = pm_gain_add(pm_widen(model.q), e.q, c->k_q)};
     const pm_wide_t top = pm_widen(in->v_max);
     if (pm_rarely(voltage_beyond(u, top))) {
         u = voltage_within(u, top);
