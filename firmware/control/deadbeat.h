@@ -15,7 +15,7 @@
  * a period, so that twice the inductance is the limit of stability. Voltage limit: voltage_circle.h. The slowed
  * form removes `share` of the error a period; a low-speed source asks for it, whose mean current is old.
  *
- * Cost: 59 instructions a period more than the PI. Range: L / T_s below 30 times the base impedance. Functions as regulator.h says.
+ * Cost: 80 instructions a period more than the PI. Range: L / T_s below 30 times the base impedance. Functions as regulator.h says.
  * Tests: tests/unit/control/deadbeat_test.cpp, tests/contract/regulator_contract_test.cpp,
  * tests/scenario/deadbeat.yaml. */
 #ifndef CONTROL_DEADBEAT_H
