@@ -6,12 +6,20 @@ namespace pmsim
 // What the methods of the lists say that they implement.
 static std::vector<Method> claimed(std::vector<Method> all)
 {
-#define PM_CLAIM(number, parameter_name, proof)                                                              \
-    all.at(number - 1).implemented = true;                                                                   \
-    all.at(number - 1).parameter = parameter_name;                                                           \
-    all.at(number - 1).scenario = proof;
+    static const struct {
+        size_t row;
+        const char *parameter, *scenario;
+    } claims[] = {
+#define PM_CLAIM(row, parameter, scenario) {row, parameter, scenario},
 #include "tools/pmsim/methods_of_lists.def"
 #undef PM_CLAIM
+    };
+    for (const auto &claim : claims) {
+        Method &method = all.at(claim.row - 1);
+        method.implemented = true;
+        method.parameter = claim.parameter;
+        method.scenario = claim.scenario;
+    }
     return all;
 }
 
