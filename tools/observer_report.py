@@ -35,27 +35,44 @@ USABLE_DEG = 10  # an observer is usable where its largest error at three loads 
 SEEN = "fault", "angle_error_mean_deg", "angle_error_rms_deg", "angle_error_max_deg"
 
 
+def fail(reason):
+    sys.exit(f"{Path(sys.argv[0]).stem}: {reason}")
+
+
+def fact(file, key):
+    """What the file of a method says of it: keys in the head of firmware/params/parameters.yaml."""
+    match = re.search(rf'^{key}: "(.*)"$', (ROOT / file).read_text(), re.MULTILINE)
+    return match[1] if match else fail(f"{file} does not say `{key}`")
+
+
 def knows(name):
-    """What must be known of the machine beside its speed range: observers/x.yaml."""
-    match = re.search(r'^knows: "(.*)"$', (ROOT / f"observers/{name}.yaml").read_text(), re.MULTILINE)
-    return match[1] if match else sys.exit(f"observer_report: observers/{name}.yaml does not say `knows`")
+    """What must be known of the machine beside its speed range."""
+    return fact(f"observers/{name}.yaml", "knows")
+
+
+def methods(file):
+    """Rows (name, help, traits, needs) of a list of methods."""
+    return re.findall(r'^PM_METHOD\((\w+), "(.*?)", (.*?), (.*?)\)$', (ROOT / file).read_text(), re.MULTILINE)
 
 
 def observers():
-    text = (ROOT / "observers/observers.def").read_text()
-    found = re.findall(r'^PM_METHOD\((\w+), "(.*?)",', text, re.MULTILINE)
-    return found
+    return [row[:2] for row in methods("observers/observers.def")]
 
 
 class Study:
-    """Cases that differ in numbers, over one profile; measured from `start_s` to the end."""
+    """Cases that differ in numbers, over one profile; measured from `start_s` to the end. `parameter` chooses the
+    method."""
+
+    parameter = "observer"
+    theta_e_deg = "40"
 
     def __init__(self, machine, profile, cases, start_s, end_s, drive="", sections=""):
         self.names = [name for name, _ in cases]
         keys = cases[0][1].keys()
         lines = [f"title: comparison\nmachine: {ROOT}/sim_plant/machines/{MACHINES[machine]}"]
         lines += [sections] if sections else []
-        lines += [f"drive: {{observer: 0, {drive}{START[machine]}}}", f"duration_s: {end_s}", "start: {theta_e_deg: 40}", "cases:"]
+        lines += [f"drive: {{{self.parameter}: 0, {drive}{START[machine]}}}", f"duration_s: {end_s}",
+                  f"start: {{theta_e_deg: {self.theta_e_deg}}}", "cases:"]
         for name, values in cases:
             lines.append(f"  - {{name: {json.dumps(name)}, " + ", ".join(f"{k}: {values[k]:.7g}" for k in keys) + "}")
         lines += ["profile:", profile, "expect:", "  - {metric: fault, equals: NONE, book: \"2.3.3\"}"]
@@ -63,17 +80,18 @@ class Study:
             lines.append(f"  - {{metric: {metric}, window_s: [{start_s}, {end_s}], max: 1000, book: \"2.3.3\"}}")
         self.text = "\n".join(lines) + "\n"
 
-    def run(self, observer):
-        """Per case (lost, mean, rms, largest), or None where the drive refuses the observer."""
+    def run(self, method, settings=()):
+        """Per case (lost, mean, rms, largest), or None where the drive refuses the method. settings: name=value."""
+        chosen = [word for setting in (f"{self.parameter}={method}", *settings) for word in ("--set", setting)]
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "study.yaml"
             path.write_text(self.text)
-            run = subprocess.run([PMSIM, "run", path, "--set", f"observer={observer}", "--out", folder],
+            run = subprocess.run([PMSIM, "run", path, *chosen, "--out", folder],
                                  capture_output=True, text=True, check=False)
-            if "refuses parameter observer" in run.stderr:
+            if f"refuses parameter {self.parameter}" in run.stderr:
                 return None
             if run.returncode > 1 or not (Path(folder) / "runs.csv").exists():
-                sys.exit(f"observer_report: {run.stderr or run.stdout}")
+                fail(run.stderr or run.stdout)
             rows = list(csv.reader((Path(folder) / "runs.csv").open()))
         columns = [next(k for k, name in enumerate(rows[0]) if name.startswith(metric)) for metric in SEEN]
         result = []
@@ -133,13 +151,18 @@ def sections(machine):
     return f"inverter: {{dead_time_s: {dead}*$dead}}\nsensor: {{noise_lsb: $noise}}"
 
 
-def misestimated(machine):
-    R, L_d, L_q, L_q_rated, psi, dead = {
-        "IPM-1000": (6.0, 43e-3, 75e-3, 70.835e-3, 0.236, 2e-6),
-        "SPM-400": (0.383, 3.0e-3, 3.3e-3, 3.2966e-3, 0.0776, 1e-6),
+def told(machine):
+    """The parameters of the machine, each told wrong by a factor of the case."""
+    R, L_d, L_q, L_q_rated, psi = {
+        "IPM-1000": (6.0, 43e-3, 75e-3, 70.835e-3, 0.236),
+        "SPM-400": (0.383, 3.0e-3, 3.3e-3, 3.2966e-3, 0.0776),
     }[machine]
-    return (f"{LIMITS}, R_s: {R}*$set_R, L_q: {L_q}*$set_L_q, L_q_rated: {L_q_rated}*$set_L_q, L_d: {L_d}*$set_L_d, "
-            f"psi_m: {psi}*$set_psi, dead_time: {dead}")
+    return (f"R_s: {R}*$set_R, L_q: {L_q}*$set_L_q, L_q_rated: {L_q_rated}*$set_L_q, L_d: {L_d}*$set_L_d, "
+            f"psi_m: {psi}*$set_psi")
+
+
+def misestimated(machine):
+    return f"{LIMITS}, {told(machine)}, dead_time: { {'IPM-1000': 2e-6, 'SPM-400': 1e-6}[machine]}"
 
 
 def other_machine(machine, change):
@@ -196,7 +219,7 @@ def monte_carlo(machine, count, control, alike=False):
 def cost():
     """Name -> (instructions with the loop, bytes of state, of configuration) from the count under QEMU."""
     if not COST.exists():
-        sys.exit(f"observer_report: {COST.relative_to(ROOT)} is missing: build the preset stm32g431")
+        fail(f"{COST.relative_to(ROOT)} is missing: build the preset stm32g431")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "count.json"
         run = subprocess.run([sys.executable, ROOT / "tests/target/count.py", COST, "--function", "period_*",

@@ -11,7 +11,8 @@ EDS_FORMAT = 0x80  # 1022h: the manufacturer's own
 DEVICE_KEYS = ("vendor", "vendor_id", "product", "product_code", "revision", "default_node_id")
 FAULT_LINE = re.compile(r'PM_FAULT\((\w+), "([^"]*)"\)')
 ROW = re.compile(r'^PM_METHOD\((\w+), "([^"]*)"', re.MULTILINE)
-FACTS = ("knows", "period_instructions", "step_instructions", "interrupt", "replay")  # read by tests and reports
+FACTS = ("knows", "period_instructions", "step_instructions", "interrupt", "replay", "compare",
+         "take")  # read by tests and reports
 PART_KEYS = ("methods", "objects", "members", "book") + FACTS  # book: read by tools/book_map.py
 
 

@@ -1,0 +1,327 @@
+#!/usr/bin/env python3
+"""Writes docs/results/injection.md: one set of scenarios over all low-speed position sources of injection/injections.def,
+with the settings that the file of each says under `compare`; a plot beside it.
+
+usage: injection_report.py [--machines N] [--only NAME...] [--out DIR]
+"""
+import argparse
+import csv
+import os
+import random
+import re
+import subprocess
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import observer_report as common
+from observer_report import PMSIM, ROOT, degrees, fact, fail, methods, plt, table
+
+MACHINE = "IPM-1000"
+LIST = "injection/injections.def"
+LOADS = [0, 0.5, 0.75, 1]
+ANGLES = [0, 15, 30, 45]
+TURNS = [1, -1]
+C_LEG = 0.5e-9
+NOISE = 0.5  # LSB
+SPEED = 0.05
+CARRIER_S = 0.2  # the current of the carrier is taken from so much of a trace
+TRAITS = {"SOURCE_HALF_TURN": "poles half a turn apart look alike", "SOURCE_THIRD_TURN": "poles a third of a turn apart "
+          "look alike", "SOURCE_EVENTS": "speaks on events only", "SOURCE_ONE_WAY": "carrier turns one way"}
+
+
+class Source(common.Study):
+    """A study of a source of injections.def, on legs with capacitance unless the sections say otherwise."""
+
+    parameter = "injection"
+    theta_e_deg = "$angle"
+
+    def __init__(self, profile, cases, start_s, end_s, drive="", sections=""):
+        sections = sections or f"inverter: {{c_leg_F: {C_LEG}}}"
+        cases = [(name, {"angle": 40, **values}) for name, values in cases]
+        super().__init__(MACHINE, profile, cases, start_s, end_s, drive, sections)
+
+
+def standstill(cases=None, sections=""):
+    """The torque is the drive's, the speed the dynamometer's. The error depends on where the rotor stands."""
+    cases = cases or [(f"{load} {turn} {angle}", {"load": load * turn, "angle": angle})
+                      for load in LOADS for turn in TURNS for angle in ANGLES]
+    profile = """  - {t_s: 0.0, mode: torque, torque_rel: 0, imposed_speed_rel: 0, enable: true}
+  - {t_s: 0.6, torque_rel: $load, ramp_s: 0.3}"""
+    return Source(profile, cases, 1.5, 2.0, "", sections)
+
+
+TURNING = f"""  - {{t_s: 0.0, mode: speed, speed_rel: {SPEED}*$turn, enable: true}}
+  - {{t_s: 1.5, load_rel: $load, ramp_s: 0.3}}"""
+
+
+def slow():
+    cases = [(f"{load} {turn}", {"load": load * turn, "turn": turn}) for load in LOADS for turn in TURNS]
+    return Source(TURNING, cases, 3.0, 4.0)
+
+
+def both_ways(load=0):
+    return [(str(turn), {"turn": turn, "load": load * turn}) for turn in TURNS]
+
+
+def load_step():
+    return Source(TURNING.replace(", ramp_s: 0.3", ""), both_ways(0.5), 1.4, 3.5)
+
+
+def load_ramp():
+    return Source(TURNING, both_ways(0.5), 1.4, 3.5)
+
+
+def reversal():
+    return Source(TURNING + f"\n  - {{t_s: 2.5, speed_rel: -{SPEED}*$turn}}", both_ways(), 2.4, 4.5)
+
+
+def machines(count):
+    """R_s, L_d, L_q and psi_m up to 10 % either way, each for itself; an inductance at rated current as that without."""
+    draw = random.Random(7)
+    cases = []
+    for n in range(count):
+        wrong = {f"set_{key}": 1 / draw.uniform(0.9, 1.1) for key in ("R", "L_d", "L_q", "psi")}
+        turn = TURNS[n % 2]
+        cases.append((f"machine {n}", {**wrong, "turn": turn, "load": 0.5 * turn}))
+    drive = common.told(MACHINE) + ", L_dh_rated: 42.55e-3*$set_L_d, L_qh_rated: 57.32e-3*$set_L_q"
+    return Source(TURNING, cases, 1.4, 4.0, drive)
+
+
+DISTURBED = [("no leg capacitance", {"c_leg": 0}), ("0.5 nF", {}), ("1 nF", {"c_leg": 2 * C_LEG}),
+             ("noise 2 LSB", {"noise": 4 * NOISE}), ("dead time told 20 % short", {"dead": 2.5e-6})]
+
+
+def disturbances():
+    """5 % speed, half load, one change of inverter or converter at a time."""
+    cases = []
+    for name, change in DISTURBED:
+        values = {"c_leg": C_LEG, "noise": NOISE, "dead": 2e-6, **change}
+        cases += [(f"{name} {turn}", {**values, "turn": turn, "load": 0.5 * turn}) for turn in TURNS]
+    sections = "inverter: {c_leg_F: $c_leg, dead_time_s: $dead}\nsensor: {noise_lsb: $noise}"
+    return Source(TURNING, cases, 3.0, 4.0, "dead_time: 2e-6", sections)
+
+
+def defaults():
+    """Presets of the parameters and what the machine's file sets."""
+    text = subprocess.run([PMSIM, "params"], capture_output=True, text=True, check=True).stdout
+    values = {m[1]: float(m[2]) for m in re.finditer(r"^(\w+) +\S+ +-?[\d.e+-]+ +(-?[\d.e+-]+) ", text, re.MULTILINE)}
+    machine = (ROOT / "sim_plant/machines" / common.MACHINES[MACHINE]).read_text()
+    for name, value in re.findall(r"^  (\w+): +([-\d.e]+)", machine.split("\ndrive:")[1], re.MULTILINE):
+        values[name] = float(value)
+    return values
+
+
+def settings(name):
+    """What the source is compared with beside the defaults: name -> text."""
+    file = f"injection/{name}.yaml"
+    if not re.search("^compare:", (ROOT / file).read_text(), re.MULTILINE):
+        return {}
+    return dict(re.findall(r"(\w+): ([^,]+)", fact(file, "compare")))
+
+
+def carrier(n, chosen):
+    """(frequency, rms of the current) at standstill without load, from a trace of every period."""
+    study = standstill([("trace", {"load": 0})])
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "study.yaml"
+        path.write_text(study.text)
+        sets = [word for x in [f"injection={n}", *chosen] for word in ("--set", x)]
+        run = subprocess.run([PMSIM, "run", path, *sets, "--decimate", "1", "--out", folder], capture_output=True,
+                             text=True, check=False)
+        if run.returncode > 1:
+            fail(run.stderr or run.stdout)
+        with (Path(folder) / "trace.csv").open() as file:
+            rows = list(csv.DictReader(file))
+    t, *rest = (np.array([float(row[key]) for row in rows])
+                for key in ("t_s", "v_alpha_V", "v_beta_V", "id_A", "iq_A"))
+    last = t > t[-1] - CARRIER_S
+    v, i = ((a + 1j * b)[last] for a, b in (rest[:2], rest[2:]))
+    spectrum = np.abs(np.fft.fft(v - v.mean()))
+    frequency = abs(np.fft.fftfreq(len(v), t[1] - t[0])[spectrum.argmax()])
+    return frequency, float(np.sqrt(np.mean(np.abs(i - i.mean()) ** 2)))
+
+
+def sizes(names):
+    """Name -> (bytes of state, of configuration): all members have the same size on the target."""
+    lines = [f'    printf("%zu %zu\\n", sizeof({name}_t), sizeof({name}_config_t));' for name in names]
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "sizes.c").write_text("#include <stdio.h>\n#include \"injection/methods.h\"\nint main(void)\n{\n"
+                                              + "\n".join(lines) + "\n    return 0;\n}\n")
+        subprocess.run([os.environ.get("CC", "cc"), f"-I{ROOT}", "-o", f"{folder}/sizes", f"{folder}/sizes.c"],
+                       check=True)
+        out = subprocess.run([f"{folder}/sizes"], capture_output=True, text=True, check=True).stdout
+    return {name: tuple(line.split()) for name, line in zip(names, out.splitlines())}
+
+
+def needs_in_words(needs):
+    """As the board's channels are called in firmware/math/measure.h."""
+    text = (ROOT / "firmware/math/measure.h").read_text()
+    words = dict(re.findall(r'X\(name, needs, (NEEDS_\w+), "(.*?)"', text))
+    return [words.get(need, need) for need in re.findall(r"NEEDS_\w+", needs)]
+
+
+def worst(part):
+    """Of some results the one with the largest error; a lost one before all."""
+    return max(part, key=lambda r: (r[0], r[3]))
+
+
+def cell(result):
+    lost, mean, rms, largest = result
+    return "lost" if lost else f"{degrees(mean)}, {degrees(rms)}, {degrees(largest)}"
+
+
+def by_load(results, per_load):
+    """Load -> direction -> worst result."""
+    each = per_load // len(TURNS)
+    return [[worst(results[k * per_load + d * each:k * per_load + (d + 1) * each]) for d in range(len(TURNS))]
+            for k in range(len(LOADS))]
+
+
+def plot(results, path):
+    figure, axes = plt.subplots(1, 2, figsize=(11, 4.2), sharey=True)
+    loads = [100 * load for load in LOADS]
+    for axis, key, per_load in (axes[0], "standstill", len(TURNS) * len(ANGLES)), (axes[1], "slow", len(TURNS)):
+        for n, (name, r) in enumerate(results.items()):
+            parts = [worst(part) for part in by_load(r[key], per_load)]
+            axis.plot(loads, [np.nan if p[0] else p[3] for p in parts], f"C{n}o-", ms=4, label=f"{name}, largest")
+            axis.plot(loads, [np.nan if p[0] else abs(p[1]) for p in parts], f"C{n}s--", ms=3, label=f"{name}, |mean|")
+        axis.set(xlabel="load, % of rated", xticks=loads)
+        axis.grid(True, alpha=0.3)
+    axes[0].set(ylabel="error, deg", title=f"{MACHINE}: standstill, worst of directions and angles", ylim=(0, None))
+    axes[1].set_title(f"{MACHINE}: {100 * SPEED:.0f} % speed, worst of directions")
+    axes[0].legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110, metadata={"Software": None})
+    plt.close(figure)
+
+
+def measure(rows, chosen, count):
+    studies = {"standstill": standstill(), "slow": slow(), "step": load_step(), "ramp": load_ramp(),
+               "reversal": reversal(), "machines": machines(count), "disturbed": disturbances()}
+    results = {}
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        jobs = {}
+        for n, (name, *_) in enumerate(rows):
+            if name in chosen:
+                own = [f"{key}={value}" for key, value in settings(name).items()]
+                jobs[name] = {key: pool.submit(study.run, n, own) for key, study in studies.items()}
+                jobs[name]["carrier"] = pool.submit(carrier, n, own)
+        for name, parts in jobs.items():
+            results[name] = {}
+            for key, job in parts.items():
+                results[name][key] = job.result()
+                if results[name][key] is None:
+                    fail(f"the drive refuses {name} for {MACHINE}")
+                print(f"{name}: {key}", flush=True)
+    return results
+
+
+HEAD = f"""# Comparison of the low-speed position sources
+
+One set of scenarios over every source of `injection/injections.def`, on {MACHINE}: the switching plant with dead time, 0.5 nF at
+each leg, converter and its noise, and the period of delay. Made by `tools/injection_report`. Each source has the settings that its
+file says under `compare`, beside them the defaults: the loops are part of what a source can do, and are not the same. Errors are
+electrical degrees, plant minus estimate: mean, rms, largest.
+"""
+
+
+def disturbed(r):
+    parts = [worst(r["disturbed"][k:k + len(TURNS)]) for k in range(0, len(r["disturbed"]), len(TURNS))]
+    return dict(zip([name for name, _ in DISTURBED], parts))
+
+
+def which(results):
+    """The words of each source's file, with the figures of this page."""
+    lines = ["## Which to take\n"]
+    for name, r in results.items():
+        step, reverse = (degrees_or_lost(r[key]) for key in ("step", "reversal"))
+        d = disturbed(r)
+        none, double, usual, noisy = (d[key] for key in ("no leg capacitance", "1 nF", "0.5 nF", "noise 2 LSB"))
+        lost = sum(m[0] for m in r["machines"])
+        lines.append(f"- **`{name}`**: {fact(f'injection/{name}.yaml', 'take')}. Measured: load step {step}, reversal {reverse}; "
+                     f"leg capacitance of 0, 0.5 and 1 nF: mean {', '.join('lost' if x[0] else degrees(x[1]) for x in (none, usual, double))}; "
+                     f"noise of 0.5 and 2 LSB: rms {', '.join('lost' if x[0] else degrees(x[2]) for x in (usual, noisy))}; "
+                     f"{lost} of {len(r['machines'])} machines lost.")
+    return "\n".join(lines) + "\n"
+
+
+def degrees_or_lost(results):
+    return cell_largest(worst(results))
+
+
+def cell_largest(result):
+    return "lost" if result[0] else degrees(result[3])
+
+
+def page(rows, results, plot_name, values, bytes_of):
+    text = [HEAD, which(results)]
+    body = []
+    for name, words, traits, needs in rows:
+        if name not in results:
+            continue
+        own = {**values, **settings(name)}
+        frequency, current = results[name]["carrier"]
+        channels = ["currents, DC-link voltage", *needs_in_words(needs)]
+        body.append([f"`{name}`: {words}", f"{frequency:.0f} Hz, {float(own['v_injection']):.0f} V", f"{1e3 * current:.0f} mA",
+                     f"{float(own['injection_bandwidth']):g} Hz", f"{float(own['speed_bandwidth']):g} Hz",
+                     "; ".join(TRAITS.get(x, x) for x in re.findall(r"SOURCE_\w+", traits)) or "-",
+                     "; ".join(channels), fact(f"injection/{name}.yaml", "knows"), " + ".join(bytes_of[name])])
+    text.append("## Properties\n")
+    text.append(table(["source", "carrier", "its current, rms", "position loop", "speed control", "traits", "measures with",
+                       "needs to know", "bytes of state + configuration"], body))
+    text.append("Carrier and current are taken from a trace at standstill without load; the current is the rms of i_d and i_q about "
+                "their means at the sample instants, converter noise and ripple of the PWM aside.\n")
+    text.append(f"## Error over load\n\n![{MACHINE}]({plot_name})\n")
+    heads = [f"{100 * load:.0f} %" for load in LOADS]
+    for key, per_load, title in (
+            ("standstill", len(TURNS) * len(ANGLES), "Standstill, held by a dynamometer; load is the drive's torque, and of the "
+             f"angles {', '.join(map(str, ANGLES))} degrees the worst counts:"),
+            ("slow", len(TURNS), f"{100 * SPEED:.0f} % speed, free rotor under speed control, load against the rotation:")):
+        body = []
+        for name, r in results.items():
+            loads = by_load(r[key], per_load)
+            body += [[f"`{name}`, {'forwards' if turn > 0 else 'backwards'}", *(cell(part[d]) for part in loads)]
+                     for d, turn in enumerate(TURNS)]
+        text += [title + "\n", table(["source", *heads], body)]
+    text.append(f"## Dynamics and wrong parameters\n\nAt {100 * SPEED:.0f} % speed, largest error of both directions: load 0 to 50 % as a "
+                f"step and within 0.3 s, reversal without load. Machines: R_s, L_d, L_q and psi_m told wrong by up to 10 %, each for "
+                "itself, half load within 0.3 s, directions in turn. Lost: a fault, or 60 degrees of error.\n")
+    body = []
+    for name, r in results.items():
+        kept = [m for m in r["machines"] if not m[0]]
+        body.append([f"`{name}`", *(degrees_or_lost(r[key]) for key in ("step", "ramp", "reversal")),
+                     f"{len(r['machines']) - len(kept)} of {len(r['machines'])}",
+                     degrees(max((m[1] for m in kept), key=abs)) if kept else "-",
+                     degrees(max(m[3] for m in kept)) if kept else "-"])
+    text.append(table(["source", "load step", "load within 0.3 s", "reversal", "machines lost", "their largest mean error",
+                       "their largest error"], body))
+    text.append(f"## Inverter and converter\n\n{100 * SPEED:.0f} % speed, half load, worst direction, one change at a time:\n")
+    text.append(table(["source", *(name for name, _ in DISTURBED)],
+                      [[f"`{name}`", *map(cell, disturbed(r).values())] for name, r in results.items()]))
+    return "\n".join(text)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--machines", type=int, default=20)
+    parser.add_argument("--only", nargs="*")
+    parser.add_argument("--out", type=Path, default=ROOT / "docs/results")
+    options = parser.parse_args()
+    rows = methods(LIST)
+    names = [row[0] for row in rows]
+    chosen = options.only or names
+    if unknown := set(chosen) - set(names):
+        fail(f"{LIST} has no {', '.join(sorted(unknown))}")
+    if options.machines < 1:
+        fail("--machines is 1 or more")
+    options.out.mkdir(parents=True, exist_ok=True)
+    results = measure(rows, chosen, options.machines)
+    plot_name = f"injection_{MACHINE.lower()}.png"
+    plot(results, options.out / plot_name)
+    (options.out / "injection.md").write_text(page(rows, results, plot_name, defaults(), sizes(names)))
+
+
+if __name__ == "__main__":
+    main()
