@@ -5,6 +5,7 @@
  *   rotating   V_h e^{j phi} in the estimated frame, phi = 2 pi k / N: f_h = f_pwm / N, whole N. Seen from
  *              the stator it turns with omega_h + omega; in the estimated frame all amplitudes are constant,
  *              so that a window of N samples nulls what it must at any speed.
+ *   axis       V_h along an axis of the stator, whatever the estimate (axes.h).
  * `ahead` is half of the direction of the estimated frame in the middle of the period in which the voltage
  * acts; amplitudes are Q30, below 2. Two products for the square wave, six for the rotating one. A carrier
  * knows nothing of how its answer is read. Tests: tests/unit/injection. */
@@ -51,6 +52,13 @@ static inline pm_ab_t carrier_rotating(int32_t x, pm_dir_t phase, pm_half_dir_t 
 {
     const pm_dq_t v = {pm_unit(x, phase.cos), pm_unit(x, phase.sin)};
     return pm_park_inverse_quarter(v, ahead);
+}
+
+/* Voltage x (Q28) along an axis of the stator, as a signal. */
+static inline pm_ab_t carrier_along(pm_q_t x, pm_dir_t axis)
+{
+    const pm_ab_t v = {pm_unit(x, axis.cos), pm_unit(x, axis.sin)};
+    return v;
 }
 
 #ifdef __cplusplus

@@ -75,8 +75,11 @@ static inline void injection_step(injection_t *self, const injection_config_t *c
         pulsating_square_step(&self->pulsating_square, &config->pulsating_square, in, out);
     } else {
         /* Only this path needs them in memory; copied by members, so that elsewhere they stay in registers. */
-        const injection_in_t given = {
-            {in->i.alpha, in->i.beta}, {in->dir.cos, in->dir.sin}, in->omega, {in->ahead.cos, in->ahead.sin}};
+        const injection_in_t given = {{in->i.alpha, in->i.beta},
+                                      {in->dir.cos, in->dir.sin},
+                                      in->omega,
+                                      {in->ahead.cos, in->ahead.sin},
+                                      PM_IF_MEASURED(in->more)};
         injection_out_t result;
         injection_step_other(self, config, &given, &result);
         *out = result;

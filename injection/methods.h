@@ -2,7 +2,9 @@
 #ifndef INJECTION_METHODS_H
 #define INJECTION_METHODS_H
 
+#include "injection/inform.h"
 #include "injection/pulsating_square.h"
+#include "injection/pwm_excitation.h"
 #include "injection/rotating_sine.h"
 
 #endif

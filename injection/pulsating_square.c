@@ -45,7 +45,7 @@ void pulsating_square_step(pulsating_square_t *self, const pulsating_square_conf
     self->eps = eps;
     out->eps = eps;
     out->i = pm_park_half(twice, in->dir);
-    out->v = carrier_along_d(-k.first, in->ahead);
+    out->carrier = (excitation_t){.v = carrier_along_d(-k.first, in->ahead)};
 }
 
 obs_out_t pulsating_square_last(const pulsating_square_t *self, const pulsating_square_config_t *config)

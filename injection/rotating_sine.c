@@ -35,7 +35,8 @@ void rotating_sine_step(rotating_sine_t *self, const rotating_sine_config_t *con
     }
     out->eps = self->eps;
     out->i = window_mean(&self->window, config->per_n);
-    out->v = carrier_rotating(pm_shl(config->v_h, 30 - PM_Q_BITS), pm_dir(phi), in->ahead);
+    const int32_t v_h = pm_shl(config->v_h, 30 - PM_Q_BITS);
+    out->carrier = (excitation_t){.v = carrier_rotating(v_h, pm_dir(phi), in->ahead)};
 }
 
 /* p of the header. */

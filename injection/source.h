@@ -14,12 +14,27 @@ typedef struct {
     pm_dir_t dir;        /* direction of the present position theta(k) */
     pm_q_t omega;        /* present electrical speed */
     pm_half_dir_t ahead; /* half of the direction of the estimated frame where the voltage will act */
+#if PM_CARRIES(PM_MEASURED)
+    const obs_more_t *more;
+#endif
 } injection_in_t;
+
+/* What a carrier does to the period [k+1, k+2); what a source does not name is zero. */
+typedef struct {
+    pm_ab_t v; /* added throughout, per-unit */
+#if PM_CARRIES(NEEDS_HALVES)
+    pm_ab_t split; /* added in the first half, up to the all-high zero vector, and taken away in the second:
+                      the mean voltage is what it is without */
+#endif
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    uint16_t sample_at[PM_SAMPLES]; /* as pm_instants_t; delivered at k+2 */
+#endif
+} excitation_t;
 
 typedef struct {
     pm_q_t eps; /* as obs_out_t */
     pm_dq_t i;  /* current at k in the present frame without the answer to the carrier */
-    pm_ab_t v;  /* to be added over [k+1, k+2) */
+    excitation_t carrier;
 } injection_out_t;
 
 /* Asked when configured, in Hz; 0: nothing. */

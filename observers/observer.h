@@ -74,7 +74,8 @@ static inline void observer_step(observer_t *self, const observer_config_t *conf
                                 {in->i.alpha, in->i.beta},
                                 {in->dir.cos, in->dir.sin},
                                 in->omega,
-                                {in->i_dq.d, in->i_dq.q}};
+                                {in->i_dq.d, in->i_dq.q},
+                                PM_IF_MEASURED(in->more)};
         obs_out_t result;
         observer_step_other(self, config, &given, &result);
         *out = result;

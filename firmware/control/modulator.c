@@ -60,3 +60,39 @@ void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t
     out->on[2] = pm_share_of(c, counts);
     out->v = v;
 }
+
+#if PM_CARRIES(NEEDS_HALVES)
+/* By how much all legs must move to lie within 0 ... top. */
+static int32_t into_range(const int32_t on[PM_LEGS], int32_t top)
+{
+    const int32_t lowest = pm_min(on[0], pm_min(on[1], on[2]));
+    const int32_t highest = pm_max(on[0], pm_max(on[1], on[2]));
+    return lowest < 0 ? -lowest : pm_min(0, top - highest);
+}
+
+void modulator_split(modulator_t *self, const modulator_config_t *config, pm_ab_t split, pm_q_t v_dc,
+                     uint16_t compare[PM_LEGS][2])
+{
+    if (split.alpha == 0 && split.beta == 0) {
+        return;
+    }
+    const int32_t per_volt = pm_per_volt(v_dc);
+    const int32_t counts = pm_shl(config->counts, 32 - PM_SHARE_BITS);
+    const pm_abc_t u = pm_clarke_inverse(split);
+    const int32_t shift[PM_LEGS] = {pm_mulh(pm_mulh(u.a, per_volt), counts),
+                                    pm_mulh(pm_mulh(u.b, per_volt), counts),
+                                    pm_mulh(pm_mulh(u.c, per_volt), counts)};
+    for (uint32_t half = 0; half < 2U; half++) {
+        int32_t on[PM_LEGS];
+        for (uint32_t leg = 0; leg < PM_LEGS; leg++) {
+            on[leg] = (int32_t)compare[leg][half] + (half == 0U ? shift[leg] : -shift[leg]);
+        }
+        const int32_t move = into_range(on, config->counts);
+        for (uint32_t leg = 0; leg < PM_LEGS; leg++) {
+            const int32_t fits = pm_clamp(on[leg] + move, 0, config->counts);
+            self->limited = self->limited || fits != on[leg] + move;
+            compare[leg][half] = (uint16_t)fits;
+        }
+    }
+}
+#endif

@@ -16,6 +16,7 @@
 #define CONTROL_MODULATOR_H
 
 #include "firmware/math/frames.h"
+#include "firmware/math/measure.h"
 #include "firmware/math/root.h"
 #include "firmware/params/types.h"
 
@@ -48,6 +49,14 @@ void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t 
 /* i_quarter: a quarter of the current, Q26. */
 void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
                     pm_ab_t i_quarter, modulator_out_t *out);
+
+#if PM_CARRIES(NEEDS_HALVES)
+/* Compare values of both halves, in counts: the first half is given `split` more of voltage and the second as
+ * much less, the period as much as before. Where that leaves the carrier's range all legs of the half move
+ * together, which the motor does not see; what even then does not fit is cut and flagged. One division. */
+void modulator_split(modulator_t *self, const modulator_config_t *config, pm_ab_t split, pm_q_t v_dc,
+                     uint16_t compare[PM_LEGS][2]);
+#endif
 
 void make_modulator(maker_t *m, modulator_config_t *c);
 

@@ -121,15 +121,35 @@ PM_RARE static pm_abc_t complete(const drive_t *drive, pm_abc_t i, uint32_t miss
 }
 #endif
 
-static inline void measure(drive_t *drive, const drive_in_t *in)
+static inline pm_abc_t currents(const drive_t *drive, const uint16_t code[DRIVE_LEGS])
 {
     const pm_q_t *zero = drive->zero;
     const pm_pair_t zero_ab = pm_pair(&zero[0], &zero[1]);
-    pm_abc_t i = {
-        .a = pm_shl(in->i_leg[0], CURRENT_BITS) - zero_ab.first,
-        .b = pm_shl(in->i_leg[1], CURRENT_BITS) - zero_ab.second,
-        .c = pm_shl(in->i_leg[2], CURRENT_BITS) - zero[2],
+    return (pm_abc_t){
+        .a = pm_shl(code[0], CURRENT_BITS) - zero_ab.first,
+        .b = pm_shl(code[1], CURRENT_BITS) - zero_ab.second,
+        .c = pm_shl(code[2], CURRENT_BITS) - zero[2],
     };
+}
+
+#if PM_CARRIES(PM_MEASURED)
+static inline obs_more_t measure_more(const drive_t *drive, const drive_in_t *in)
+{
+    obs_more_t more = {.codes = &in->more};
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    for (uint32_t n = 0; n < PM_SAMPLES; n++) {
+        if ((in->more.sampled >> n & 1U) != 0U) {
+            more.i_sample[n] = pm_clarke(currents(drive, in->more.i_sample[n]));
+        }
+    }
+#endif
+    return more;
+}
+#endif
+
+static inline void measure(drive_t *drive, const drive_in_t *in)
+{
+    pm_abc_t i = currents(drive, in->i_leg);
 #if PM_CARRIES(NEEDS_CURRENT_MASK)
     if (pm_rarely(in->more.missing != 0U)) {
         i = complete(drive, i, in->more.missing);
@@ -138,6 +158,16 @@ static inline void measure(drive_t *drive, const drive_in_t *in)
     drive->i_abc = i;
     drive->i_ab = pm_clarke(i);
     drive->status.v_dc = pm_shl(in->v_dc, VOLTAGE_BITS);
+}
+
+/* What a method asked for is asked for in that period alone. */
+static inline void clear_instants(drive_out_t *out)
+{
+#if PM_CARRIES(PM_DONE_AT)
+    out->instants = (pm_instants_t){0};
+#else
+    (void)out;
+#endif
 }
 
 static void off(drive_out_t *out)
@@ -184,6 +214,7 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
     const bool checked = is_checked(drive, in);
     drive->v_acting = drive->v_next;
     out->trip = 0;
+    clear_instants(out);
     if (!checked) {
         drive->v_next = (pm_ab_t){0, 0};
         drive->hw_fault = in->hw_fault;
@@ -213,6 +244,24 @@ static inline void write_out(const modulator_out_t *m, drive_out_t *out)
     drive_write_leg(out->compare[2], m->on[2]);
     out->legs = PM_LEGS_PWM;
     out->trip = 0;
+    clear_instants(out);
+}
+
+/* What a carrier asks of the period beside its mean voltage. */
+static inline void excite(drive_t *drive, const excitation_t *carrier, drive_out_t *out)
+{
+#if PM_CARRIES(NEEDS_HALVES)
+    modulator_split(&drive->modulator, &drive->config.modulator, carrier->split, drive->status.v_dc,
+                    out->compare);
+#endif
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    for (uint32_t n = 0; n < PM_SAMPLES; n++) {
+        out->instants.sample_at[n] = carrier->sample_at[n];
+    }
+#endif
+    (void)drive;
+    (void)carrier;
+    (void)out;
 }
 
 /* The voltage acts one and a half periods later, when the frame has turned to drive->ahead. */
@@ -231,14 +280,17 @@ static inline void control(drive_t *drive, const position_out_t *frame, bool usu
     const pm_dq_t v = {.d = pm_shl(u->v.d, 30 - PM_WIDE_BITS), .q = pm_shl(u->v.q, 30 - PM_WIDE_BITS)};
     pm_ab_t v_ab = pm_park_inverse_quarter(v, frame->ahead);
     if (drive->carrier) {
-        v_ab.alpha += frame->carrier.alpha;
-        v_ab.beta += frame->carrier.beta;
+        v_ab.alpha += frame->carrier.v.alpha;
+        v_ab.beta += frame->carrier.v.beta;
     }
     modulator_out_t m;
     modulator_step(&drive->modulator, &c->modulator, v_ab, v_dc,
                    pm_park_inverse_quarter(frame->i, frame->ahead), &m);
     drive->v_next = m.v;
     write_out(&m, out);
+    if (drive->carrier) {
+        excite(drive, &frame->carrier, out);
+    }
 }
 
 void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
@@ -248,9 +300,13 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
     if (drive->stage < STAGE_OPEN_LOOP || in->hw_fault || !protection_passed(drive)) {
         without_control(drive, in, out);
     } else {
+        PM_IF_MEASURED(const obs_more_t more = measure_more(drive, in);)
+        const position_in_t seen = {.v = &drive->v_acting,
+                                    .i = drive->i_ab,
+                                    .ahead = &drive->ahead,
+                                    PM_IF_MEASURED(.more = &more)};
         position_out_t frame;
-        position_step(&drive->position, &drive->config.position, &drive->v_acting, drive->i_ab, &drive->ahead,
-                      &frame);
+        position_step(&drive->position, &drive->config.position, &seen, &frame);
         const pm_ab_t next = pm_pair_ab(&drive->v_next);
         drive->v_acting.alpha = next.alpha;
         drive->v_acting.beta = next.beta;

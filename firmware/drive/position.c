@@ -22,27 +22,37 @@ PM_RARE static pm_q_t corrected_eps(position_t *self, const position_config_t *c
     return loop_eps(&self->loop, &config->loop, &self->pll, &self->gains, eps);
 }
 
-void position_step(position_t *self, const position_config_t *config, const pm_ab_t *v, pm_ab_t i,
-                   const pm_dir_t *ahead, position_out_t *out)
+void position_step(position_t *self, const position_config_t *config, const position_in_t *at,
+                   position_out_t *out)
 {
+    const pm_ab_t i = at->i;
     pm_pll_t pll = self->pll;
     pm_pll_predict(&pll, &self->gains);
     const pm_dir_t dir = pm_dir(pll.theta);
-    const pm_half_dir_t frame_ahead = pm_dir_sum(dir, pm_pair_dir(ahead));
+    const pm_half_dir_t frame_ahead = pm_dir_sum(dir, pm_pair_dir(at->ahead));
     const bool inject = self->inject;
     pm_dq_t i_dq;
     pm_q_t low_eps = 0;
     if (inject) {
-        const injection_in_t raw = {.i = i, .dir = dir, .omega = pll.omega, .ahead = frame_ahead};
+        const injection_in_t raw = {.i = i,
+                                    .dir = dir,
+                                    .omega = pll.omega,
+                                    .ahead = frame_ahead,
+                                    PM_IF_MEASURED(.more = at->more)};
         injection_out_t low;
         injection_step(&self->injection, &config->injection, &raw, &low);
         i_dq = low.i;
         low_eps = low.eps;
-        out->carrier = low.v;
+        out->carrier = low.carrier;
     } else {
         i_dq = pm_park(i, dir);
     }
-    const obs_in_t in = {.v = pm_pair_ab(v), .i = i, .dir = dir, .omega = pll.omega, .i_dq = i_dq};
+    const obs_in_t in = {.v = pm_pair_ab(at->v),
+                         .i = i,
+                         .dir = dir,
+                         .omega = pll.omega,
+                         .i_dq = i_dq,
+                         PM_IF_MEASURED(.more = at->more)};
     obs_out_t high;
     observer_step(&self->observer, &config->observer, &in, &high);
     pm_q_t eps = high.eps;
@@ -51,7 +61,7 @@ void position_step(position_t *self, const position_config_t *config, const pm_a
     }
     if (pm_rarely(config->corrects)) {
         self->pll = pll; /* through memory, so that otherwise it stays in registers */
-        eps = corrected_eps(self, config, v, i_dq, eps);
+        eps = corrected_eps(self, config, at->v, i_dq, eps);
         pll = self->pll;
     }
     pm_pll_correct(&pll, &self->gains, eps);

@@ -75,13 +75,22 @@ typedef struct {
     pm_half_dir_t ahead; /* half of the direction of the estimated frame where the next voltage acts */
     pm_dq_t i;           /* fundamental current in the frame at k */
     pm_q_t omega;
-    pm_ab_t carrier; /* to be added to that voltage; only while `inject` */
+    excitation_t carrier; /* only while `inject` */
 } position_out_t;
 
-/* One period: v is the mean voltage over [k-1, k), i the current at k; the frame turns by `ahead` from k to
- * the middle of the period in which the next voltage acts. */
-void position_step(position_t *self, const position_config_t *config, const pm_ab_t *v, pm_ab_t i,
-                   const pm_dir_t *ahead, position_out_t *out);
+typedef struct {
+    const pm_ab_t *v;      /* mean voltage over [k-1, k) */
+    pm_ab_t i;             /* current at k */
+    const pm_dir_t *ahead; /* by which the frame turns from k to the middle of the period in which the next
+                              voltage acts */
+#if PM_CARRIES(PM_MEASURED)
+    const obs_more_t *more;
+#endif
+} position_in_t;
+
+/* One period. */
+void position_step(position_t *self, const position_config_t *config, const position_in_t *in,
+                   position_out_t *out);
 
 /* The configuration names another observer than before: it is seeded at the present position and speed, where
  * the loop had settled with the old one, so nothing jumps. What the old one had learnt of R and of the

@@ -6,6 +6,7 @@
 /* clang-format off */
 #define PM_IMAGE_NAME "small"
 #define PM_IMAGE_TRACE_NUMBERS 3740U
+#define PM_CHANNELS 0x0000U
 
 #define PM_WITHOUT_deadbeat 1
 #define PM_WITHOUT_mismatch 1
@@ -19,5 +20,7 @@
 #define PM_WITHOUT_mras_voltage 1
 #define PM_WITHOUT_mras_simple 1
 #define PM_WITHOUT_rotating_sine 1
+#define PM_WITHOUT_inform 1
+#define PM_WITHOUT_pwm_excitation 1
 
 #endif

@@ -8,6 +8,7 @@
 #define PM_MATH_ESTIMATE_H
 
 #include "firmware/math/frames.h"
+#include "firmware/math/measure.h"
 
 /* Traits of a source, a sum; they stand in its row of a list. */
 enum {
@@ -15,7 +16,19 @@ enum {
     SOURCE_THIRD_TURN = 2, /* eps is the same a third of a turn on */
     SOURCE_EVENTS = 4,     /* speaks in some periods only */
     SOURCE_ONE_WAY = 8,    /* its carrier turns one way: mirrored inputs do not give mirrored outputs */
+    SOURCE_STATOR = 16,    /* its carrier stands in the stator: turned inputs do not give the same outputs */
 };
+
+#if PM_CARRIES(PM_MEASURED)
+/* What was measured in [k-1, k) and at k beside the currents at k and the DC link. A source reads what its
+ * row of a list needs; whether it was measured at all, `codes` says. */
+typedef struct {
+    const pm_measure_t *codes; /* full scales are those of the channel */
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    pm_ab_t i_sample[PM_SAMPLES]; /* per-unit; where codes->sampled says so */
+#endif
+} obs_more_t;
+#endif
 
 typedef struct {
     pm_ab_t v;    /* mean voltage over [k-1, k), per-unit: what the bridge applied, dead time compensated */
@@ -23,6 +36,9 @@ typedef struct {
     pm_dir_t dir; /* direction of the present position theta(k) */
     pm_q_t omega; /* present electrical speed */
     pm_dq_t i_dq; /* fundamental current at k in the present frame */
+#if PM_CARRIES(PM_MEASURED)
+    const obs_more_t *more; /* of a step; NULL otherwise */
+#endif
 } obs_in_t;
 
 typedef struct {

@@ -4,8 +4,8 @@
  * PM_METHOD(name, help, traits, needs). Both are sums of the names in PM_NEED_LIST. Checked twice:
  *   configuration   the parameter that chooses a method is refused with pm_need_text():
  *                   "needs the neutral voltage, which this board does not measure"
- *   build           PM_CHANNELS is what the program carries: everything, unless the build of an image says
- *                   less. A row that needs more fails the build by the method's name (PM_CHECK_NEEDS), a
+ *   build           PM_CHANNELS is what the program carries: everything, or in an image what its manifest
+ *                   names. A row that needs more fails the build by the method's name (PM_CHECK_NEEDS), a
  *                   board that has less by the channel's name (PM_CHECK_BOARD).
  * What is not in PM_CHANNELS has no field here, no instruction and no byte of memory.
  *
@@ -55,6 +55,13 @@
 #define PM_CHANNELS PM_ALL
 #endif
 #define PM_CARRIES(need) (((need)&PM_CHANNELS) != 0U)
+
+/* The code in programs that carry any of PM_MEASURED, else nothing. */
+#if PM_CARRIES(PM_MEASURED)
+#define PM_IF_MEASURED(...) __VA_ARGS__
+#else
+#define PM_IF_MEASURED(...)
+#endif
 
 /* Of a row of a list, in the file that has its dispatch. */
 #define PM_CHECK_NEEDS(name, needs) PM_NEED_LIST(PM_CHECK_NEED, name, needs)

@@ -46,19 +46,57 @@ const Machine kMachine = bench::kIpmLinear;
 const Base kBase = bench::kIpmBase;
 constexpr int kPeriods = 400;
 
+// What a source is given, with the current in the middle of the period that has ended.
+struct Seen : obs_in_t {
+    pm_ab_t between;
+};
+
+// Per-unit.
+struct Carrier {
+    Complex v = 0, split = 0;
+};
+
 class Source
 {
   public:
     virtual ~Source() = default;
-    virtual void reset(const obs_in_t &in) = 0;
-    virtual obs_out_t step(const obs_in_t &in) = 0;
     virtual void aim(double) // angle of the estimated frame where the next voltage acts
     {
     }
-    virtual Complex carrier() // voltage for the coming period, of the base
+    virtual Carrier carrier() // of the coming period
     {
-        return 0;
+        return {};
     }
+
+    void reset(const obs_in_t &in)
+    {
+        asked_[0] = asked_[1] = false;
+        reset_with(in);
+    }
+
+    // A sample that was asked for is there two calls later.
+    obs_out_t step(const Seen &seen)
+    {
+        pm_measure_t codes = {};
+        codes.sampled = asked_[1] ? 1 : 0;
+        const obs_more_t more = {&codes, {seen.between, {0, 0}}};
+        obs_in_t in = seen;
+        in.more = &more;
+        asked_[1] = asked_[0];
+        asked_[0] = false;
+        return step_with(in);
+    }
+
+  protected:
+    virtual void reset_with(const obs_in_t &in) = 0;
+    virtual obs_out_t step_with(const obs_in_t &in) = 0;
+    void ask()
+    {
+        asked_[0] = true;
+    }
+
+  private:
+    bool asked_[2] = {false, false};
 };
 
 class Observer : public Source
@@ -68,14 +106,16 @@ class Observer : public Source
     {
         std::memset(&state_, 0xa5, sizeof state_); // reset owes every member
     }
-    void reset(const obs_in_t &in) override
+
+  protected:
+    void reset_with(const obs_in_t &in) override
     {
         observer_reset(&state_, &config_, &in);
         const obs_out_t none = observer_last(&state_, &config_);
         ASSERT_EQ(none.eps, 0);
         observer_slow(&state_, &config_, &in, &none, PM_ONE); // it leads
     }
-    obs_out_t step(const obs_in_t &in) override
+    obs_out_t step_with(const obs_in_t &in) override
     {
         obs_out_t out;
         observer_step(&state_, &config_, &in, &out);
@@ -97,7 +137,17 @@ class Injection : public Source
     {
         std::memset(&state_, 0xa5, sizeof state_); // reset owes every member
     }
-    void reset(const obs_in_t &in) override
+    void aim(double ahead_rad) override
+    {
+        ahead_ = {fixed(std::cos(ahead_rad), 30), fixed(std::sin(ahead_rad), 30)};
+    }
+    Carrier carrier() override
+    {
+        return {bench::complex(carrier_.v), bench::complex(carrier_.split)};
+    }
+
+  protected:
+    void reset_with(const obs_in_t &in) override
     {
         injection_reset(&state_, &config_, &in);
         const obs_out_t none = injection_last(&state_, &config_);
@@ -105,33 +155,29 @@ class Injection : public Source
         injection_slow(&state_, &config_, &in);
         k_ = 0;
     }
-    obs_out_t step(const obs_in_t &in) override
+    obs_out_t step_with(const obs_in_t &in) override
     {
         if (++k_ % 10 == 0) {
             injection_slow(&state_, &config_, &in);
         }
-        const injection_in_t given = {in.i, in.dir, in.omega, ahead_};
+        const injection_in_t given = {in.i, in.dir, in.omega, ahead_, in.more};
         injection_out_t out;
         injection_step(&state_, &config_, &given, &out);
-        v_ = out.v;
+        carrier_ = out.carrier;
+        if (carrier_.sample_at[0] != 0) {
+            ask();
+        }
+        EXPECT_EQ(carrier_.sample_at[1], 0);
         const obs_out_t last = injection_last(&state_, &config_);
         EXPECT_EQ(last.eps, out.eps);
         return last;
-    }
-    void aim(double ahead_rad) override
-    {
-        ahead_ = {fixed(std::cos(ahead_rad), 30), fixed(std::sin(ahead_rad), 30)};
-    }
-    Complex carrier() override
-    {
-        return bench::complex(v_);
     }
 
   private:
     injection_config_t config_;
     injection_t state_;
     pm_half_dir_t ahead_ = {1 << 30, 0};
-    pm_ab_t v_ = {0, 0};
+    excitation_t carrier_ = {};
     int k_ = 0;
 };
 
@@ -170,18 +216,19 @@ class Drive
         applying_ = commanded_ = v_dq_ * std::polar(1.0, theta_ + omega_ * kBase.period_s / 2);
         commanded_ *= std::polar(1.0, omega_ * kBase.period_s);
         i_past_ = current();
-        const obs_in_t in = seen();
-        source_.reset(in);
+        source_.reset(seen());
     }
 
-    obs_in_t advance(obs_out_t *out)
+    Seen advance(obs_out_t *out)
     {
         run();
-        const obs_in_t in = seen();
+        const Seen in = seen();
         const double turn = 1.5 * omega_ * kBase.period_s;
         source_.aim(theta_ - error_ + turn);
         *out = source_.step(in);
-        commanded_ = v_dq_ * std::polar(1.0, theta_ + turn) + source_.carrier() * kBase.v_V;
+        const Carrier carrier = source_.carrier();
+        commanded_ = v_dq_ * std::polar(1.0, theta_ + turn) + carrier.v * kBase.v_V;
+        split_commanded_ = carrier.split * kBase.v_V;
         return in;
     }
 
@@ -192,11 +239,11 @@ class Drive
     }
 
     // A recording that can be turned and mirrored.
-    static std::vector<obs_in_t> record(const Entry &e, double error_rad, double start_rad = 0.3)
+    static std::vector<Seen> record(const Entry &e, double error_rad, double start_rad = 0.3)
     {
         const std::unique_ptr<Source> source = e.make();
         Drive drive(*source, e.omega_pu, 2.0, error_rad, start_rad);
-        std::vector<obs_in_t> all = {drive.seen()};
+        std::vector<Seen> all = {drive.seen()};
         for (int k = 0; k < kPeriods; ++k) {
             obs_out_t out;
             all.push_back(drive.advance(&out));
@@ -212,10 +259,11 @@ class Drive
         return i * std::polar(1.0, theta_);
     }
 
-    obs_in_t seen() const
+    Seen seen() const
     {
         const Complex i = current() / kBase.i_A;
-        obs_in_t in = {};
+        Seen in = {};
+        in.between = bench::ab(i_between_ / kBase.i_A);
         in.v = bench::ab(v_mean_ / kBase.v_V);
         in.i = bench::ab(i);
         in.dir = bench::direction(theta_ - error_);
@@ -230,22 +278,28 @@ class Drive
         const int n = 20;
         const double t = kBase.period_s / n;
         for (int k = 0; k < n; ++k) {
+            const Complex v = applying_ + (2 * k < n ? split_ : -split_);
             const Complex before = psi_;
             const Complex i = current();
-            psi_ += t * (applying_ - kMachine.R_ohm * i);
+            if (2 * k == n) {
+                i_between_ = i;
+            }
+            psi_ += t * (v - kMachine.R_ohm * i);
             theta_ += omega_ * t;
-            psi_ = before + t * (applying_ - kMachine.R_ohm * 0.5 * (i + current()));
+            psi_ = before + t * (v - kMachine.R_ohm * 0.5 * (i + current()));
         }
         v_mean_ = applying_;
         applying_ = commanded_;
+        split_ = split_commanded_;
     }
 
     Source &source_;
     double omega_, error_, theta_;
     Complex v_dq_, psi_, applying_, commanded_, v_mean_ = 0, i_past_ = 0;
+    Complex split_ = 0, split_commanded_ = 0, i_between_ = 0;
 };
 
-std::vector<obs_out_t> replay(const Entry &e, const std::vector<obs_in_t> &in)
+std::vector<obs_out_t> replay(const Entry &e, const std::vector<Seen> &in)
 {
     const std::unique_ptr<Source> source = e.make();
     source->reset(in[0]);
@@ -264,7 +318,7 @@ class ObserverContract : public ::testing::TestWithParam<Entry>
 TEST_P(ObserverContract, ZeroInputGivesZero)
 {
     const std::unique_ptr<Source> source = GetParam().make();
-    obs_in_t in = {};
+    Seen in = {};
     in.dir = bench::direction(0);
     source->reset(in);
     for (int k = 0; k < kPeriods; ++k) {
@@ -332,11 +386,12 @@ TEST_P(ObserverContract, MirroredInputGivesMirroredOutput)
     if ((GetParam().traits & SOURCE_ONE_WAY) != 0) {
         GTEST_SKIP() << "its carrier is not mirrored";
     }
-    const std::vector<obs_in_t> in = Drive::record(GetParam(), 0.15);
-    std::vector<obs_in_t> mirrored = in;
-    for (obs_in_t &x : mirrored) {
+    const std::vector<Seen> in = Drive::record(GetParam(), 0.15);
+    std::vector<Seen> mirrored = in;
+    for (Seen &x : mirrored) {
         x.v.beta = -x.v.beta;
         x.i.beta = -x.i.beta;
+        x.between.beta = -x.between.beta;
         x.dir.sin = -x.dir.sin;
         x.omega = -x.omega;
         x.i_dq.q = -x.i_dq.q;
@@ -357,13 +412,17 @@ TEST_P(ObserverContract, MirroredInputGivesMirroredOutput)
 // pi.
 TEST_P(ObserverContract, TurnedInputGivesTheSame)
 {
-    const std::vector<obs_in_t> in = Drive::record(GetParam(), 0.15);
+    if ((GetParam().traits & SOURCE_STATOR) != 0) {
+        GTEST_SKIP() << "its carrier does not turn with the world";
+    }
+    const std::vector<Seen> in = Drive::record(GetParam(), 0.15);
     const std::vector<obs_out_t> a = replay(GetParam(), in);
     for (const double turn : {-0.3, -0.3 - 1e-6, -1.3, bench::kPi / 2, bench::kPi, 3.0}) {
-        std::vector<obs_in_t> turned = in;
-        for (obs_in_t &x : turned) {
+        std::vector<Seen> turned = in;
+        for (Seen &x : turned) {
             x.v = bench::ab(bench::complex(x.v) * std::polar(1.0, turn));
             x.i = bench::ab(bench::complex(x.i) * std::polar(1.0, turn));
+            x.between = bench::ab(bench::complex(x.between) * std::polar(1.0, turn));
             const double angle = std::atan2(real(x.dir.sin, 31), real(x.dir.cos, 31));
             x.dir = bench::direction(angle + turn);
         }
@@ -390,10 +449,10 @@ TEST_P(ObserverContract, WholeTurnsAreNothing)
 
 TEST_P(ObserverContract, SameInputSameBits)
 {
-    const std::vector<obs_in_t> in = Drive::record(GetParam(), -0.2);
+    const std::vector<Seen> in = Drive::record(GetParam(), -0.2);
     const std::unique_ptr<Source> used = GetParam().make();
     // one that has worked on something else before is as good as a new one
-    const std::vector<obs_in_t> other = Drive::record(GetParam(), 0.4, 2.0);
+    const std::vector<Seen> other = Drive::record(GetParam(), 0.4, 2.0);
     used->reset(other[0]);
     for (size_t k = 1; k < other.size(); ++k) {
         used->step(other[k]);
@@ -421,14 +480,15 @@ TEST_P(ObserverContract, CornersOfTheConvertersAreHarmless)
     samples::Random random;
     for (int n = 0; n < 20000; ++n) {
         const std::unique_ptr<Source> source = GetParam().make();
-        obs_in_t in[4];
-        for (obs_in_t &x : in) {
+        Seen in[4];
+        for (Seen &x : in) {
             const auto end = [&random](double limit) { return random.word() < 0 ? -limit : limit; };
             x.v = bench::ab({end(2.0 / 3), end(2.0 / 3)});
             x.i = bench::ab({end(4.0 / 3), end(4.0 / 3)});
             x.dir = bench::direction(random.within(-4, 4));
             x.omega = fixed(end(1.25), 28);
             x.i_dq = bench::dq({end(4.0 / 3), end(4.0 / 3)});
+            x.between = bench::ab({end(4.0 / 3), end(4.0 / 3)});
         }
         source->reset(in[0]);
         for (int k = 0; k < 12; ++k) {
@@ -443,7 +503,7 @@ TEST_P(ObserverContract, CornersOfTheConvertersAreHarmless)
 TEST_P(ObserverContract, ConstantExtremesForASecondAreHarmless)
 {
     const std::unique_ptr<Source> source = GetParam().make();
-    obs_in_t in = {};
+    Seen in = {};
     in.v = bench::ab({2.0 / 3, 0});
     in.dir = bench::direction(0);
     source->reset(in);

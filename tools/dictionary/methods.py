@@ -1,4 +1,4 @@
-"""The methods of the firmware: the rows PM_METHOD(name, ...) of its lists (*.def)."""
+"""The methods of the firmware: the rows PM_METHOD(name, ...) of its lists (*.def), and the channels that they need."""
 import re
 from pathlib import Path
 
@@ -6,6 +6,22 @@ from .source import SourceError
 
 LISTS = ("firmware", "observers", "injection", "bldc")
 ROW = re.compile(r"^PM_METHOD\((\w+),", re.MULTILINE)
+ROW_WITH_NEEDS = re.compile(r"^PM_METHOD\((\w+),(.*)\)$", re.MULTILINE)
+CHANNELS = "firmware/math/measure.h"
+CHANNEL = re.compile(r"^#define NEEDS_(\w+)\s+0x", re.MULTILINE)
+NEED = re.compile(r"\bNEEDS_(\w+)")
+
+
+def channels(root):
+    """Names of the channels that a board may have beside currents and DC link, as in a manifest."""
+    return [name.lower() for name in CHANNEL.findall((Path(root) / CHANNELS).read_text(encoding="utf-8"))]
+
+
+def needs(root):
+    """Method -> channels of its row."""
+    return {name: [need.lower() for need in NEED.findall(rest)]
+            for path in {Path(root) / path for path in known(root).values()}
+            for name, rest in ROW_WITH_NEEDS.findall(path.read_text(encoding="utf-8"))}
 
 
 def known(root):

@@ -120,14 +120,14 @@ Result run(const Record &r, const drive_config_t &config)
     pm_pll_t pll = {turns(first.theta_rad),
                     static_cast<pm_q_t>(first.omega_rad_s / r.omega_base_rad_s * 0x1p28)};
     observer_t observer;
-    obs_in_t in = {first.v, first.i, pm_dir(pll.theta), pll.omega, {}};
+    obs_in_t in = {first.v, first.i, pm_dir(pll.theta), pll.omega, {}, nullptr};
     in.i_dq = pm_park(in.i, in.dir);
     observer_reset(&observer, &c.observer, &in);
     Result result;
     for (size_t k = 1; k < r.periods.size(); ++k) {
         const Period &p = r.periods[k];
         pm_pll_predict(&pll, &c.pll_high);
-        in = {p.v, p.i, pm_dir(pll.theta), pll.omega, {}};
+        in = {p.v, p.i, pm_dir(pll.theta), pll.omega, {}, nullptr};
         in.i_dq = pm_park(in.i, in.dir);
         obs_out_t out;
         observer_step(&observer, &c.observer, &in, &out);

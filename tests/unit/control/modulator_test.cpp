@@ -301,4 +301,73 @@ TEST(Modulator, CompensationSwitchedOffIsNone)
     }
 }
 
+// Mean voltage of a half of the period, per-unit.
+Complex of_half(const uint16_t compare[PM_LEGS][2], int half, double v_dc)
+{
+    modulator_out_t out = {};
+    for (int leg = 0; leg < 3; ++leg) {
+        out.on[leg] = compare[leg][half];
+    }
+    return realised(out, kCounts, v_dc);
+}
+
+struct Split {
+    uint16_t compare[PM_LEGS][2];
+    bool limited;
+};
+
+Split split(Complex v, Complex more, double v_dc)
+{
+    const modulator_config_t c = plain();
+    const modulator_out_t out = step(c, v, v_dc);
+    Split s = {};
+    for (int leg = 0; leg < 3; ++leg) {
+        s.compare[leg][0] = s.compare[leg][1] = static_cast<uint16_t>(out.on[leg]);
+    }
+    modulator_t self = {};
+    modulator_split(&self, &c, bench::ab(more), fixed(v_dc, 28), s.compare);
+    s.limited = self.limited;
+    return s;
+}
+
+// As long as the sum of both lies in the hexagon's inner circle, whatever the zero vectors must be.
+TEST(Modulator, SplitGivesToTheFirstHalfWhatItTakesFromTheSecond)
+{
+    constexpr double kCount_pu = 3 * kLink / kCounts; // a count per leg, twice rounded
+    for (int a = 0; a < 360; a += 7) {
+        for (int b = 0; b < 360; b += 11) {
+            for (const double share : {0.0, 0.3, 0.6}) {
+                const double circle = kLink / std::sqrt(3.0);
+                const Complex v = std::polar(share * circle, a * kDegree);
+                const Complex more = std::polar((1 - share - 1e-3) * circle, b * kDegree);
+                const Split s = split(v, more, kLink);
+                ASSERT_LT(std::abs(of_half(s.compare, 0, kLink) - (v + more)), kCount_pu) << a << ' ' << b;
+                ASSERT_LT(std::abs(of_half(s.compare, 1, kLink) - (v - more)), kCount_pu) << a << ' ' << b;
+                ASSERT_FALSE(s.limited) << a << ' ' << b;
+            }
+        }
+    }
+}
+
+TEST(Modulator, NothingToSplitChangesNothing)
+{
+    const Split s = split(std::polar(0.2, 0.4), 0, kLink);
+    for (const auto &leg : s.compare) {
+        EXPECT_EQ(leg[0], leg[1]);
+    }
+}
+
+TEST(Modulator, ASplitThatDoesNotFitIsFlagged)
+{
+    for (int b = 0; b < 360; b += 11) {
+        const Split s = split(std::polar(0.9 * kLink / std::sqrt(3.0), 0.3), std::polar(0.7 * kLink, b * kDegree),
+                              kLink);
+        EXPECT_TRUE(s.limited) << b;
+        for (const auto &leg : s.compare) {
+            EXPECT_LE(leg[0], kCounts);
+            EXPECT_LE(leg[1], kCounts);
+        }
+    }
+}
+
 } // namespace

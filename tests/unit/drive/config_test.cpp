@@ -493,7 +493,7 @@ double injection_gain(const drive_config_t &c, double i_q)
     switch (c.position.injection.id) {
 #define PM_METHOD(x, help, traits, needs)                                                                    \
     case INJECTION_##x:                                                                                      \
-        return at(c.position.injection.x.saliency);
+        return at(gains::saliency_of(c.position.injection.x));
 #include "injection/injections.def"
 #undef PM_METHOD
     default:

@@ -164,13 +164,40 @@ TEST(Drive, ModeIsLatchedOnlyWhenOff)
     EXPECT_EQ(x.d.command.mode, DRIVE_MODE_TORQUE);
 }
 
+// PWM excitation: halves that differ and a sample between them, from when injection leads; nothing of that stays in the
+// output when it has ended.
+TEST(Drive, WhatACarrierAsksOfThePeriodIsDone)
+{
+    drive_params_t p = direct::params(1);
+    p.injection = INJECTION_pwm_excitation;
+    Closed x(ipm(), p);
+    x.command(true, 10);
+    x.run_ms(600);
+    ASSERT_EQ(x.state(), DRIVE_RUNNING);
+    const drive_out_t &out = x.loop.app.out;
+    EXPECT_NE(out.compare[0][0], out.compare[0][1]);
+    EXPECT_EQ(out.instants.sample_at[0], static_cast<uint16_t>(p.timer_counts));
+    EXPECT_EQ(out.instants.sample_at[1], 0);
+    x.command(true, 60); // the observer leads
+    x.run_ms(1500);
+    ASSERT_EQ(x.state(), DRIVE_RUNNING);
+    EXPECT_EQ(out.compare[0][0], out.compare[0][1]);
+    EXPECT_EQ(out.instants.sample_at[0], 0);
+    x.command(true, 10);
+    x.run_ms(1500);
+    EXPECT_EQ(out.instants.sample_at[0], static_cast<uint16_t>(p.timer_counts));
+    drive_trip(&x.loop.app.drive, DRIVE_FAULT_REMOTE_LOST);
+    x.run_ms(1);
+    EXPECT_EQ(out.instants.sample_at[0], 0);
+}
+
 // One base register reaches all that a control period of the default sources uses: LDRD's offset ends at 1020.
 // Behind them is the window of a sine carrier.
 TEST(Drive, StateIsSmall)
 {
     EXPECT_LE(offsetof(drive_t, position.injection) + sizeof(pulsating_square_t), 1020U);
     // 28 bytes of them say which regulator it is, what the machine is, and whether the position slips
-    EXPECT_LE(sizeof(drive_t), 1328U + sizeof(rotating_sine_t));
+    EXPECT_LE(sizeof(drive_t), 1328U + sizeof(injection_t));
 }
 
 TEST(Drive, StaysOffWithoutACommand)

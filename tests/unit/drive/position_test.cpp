@@ -28,6 +28,7 @@ constexpr double kLow = 0.12, kHigh = 0.24;
 // Where the voltage acts does not matter here.
 constexpr pm_dir_t kNoTurn = {PM_UNIT_MAX, 0};
 constexpr pm_ab_t kNoVoltage = {0, 0};
+constexpr position_in_t kStill = {&kNoVoltage, {0, 0}, &kNoTurn, nullptr};
 
 pm_pll_config_t loop(double hertz)
 {
@@ -155,7 +156,8 @@ class Running
             if (imposed != nullptr && k % 10 == 0) {
                 position_force(&self, &c_, imposed);
             }
-            position_step(&self, &c_, &in.v, in.i, &kNoTurn, &out);
+            const position_in_t at = {&in.v, in.i, &kNoTurn, nullptr};
+            position_step(&self, &c_, &at, &out);
             if (k % 10 == 9) {
                 position_slow(&self, &c_, in.i, out.i);
             }
@@ -212,7 +214,7 @@ TEST(Position, QualityFallsWithoutAVoltageOrACurrentThatFits)
     int ms = 0;
     for (; r.self.quality > 0 && ms < 500; ++ms) {
         for (int k = 0; k < 10; ++k) {
-            position_step(&r.self, &c, &kNoVoltage, {0, 0}, &kNoTurn, &r.out);
+            position_step(&r.self, &c, &kStill, &r.out);
         }
         position_slow(&r.self, &c, {0, 0}, r.out.i);
     }
@@ -227,7 +229,7 @@ TEST(Position, QualityFallsWithoutTheCarrier)
     for (; self.quality > 0 && ms < 500; ++ms) {
         for (int k = 0; k < 10; ++k) {
             position_out_t out;
-            position_step(&self, &c, &kNoVoltage, {0, 0}, &kNoTurn, &out);
+            position_step(&self, &c, &kStill, &out);
         }
         position_slow(&self, &c, {0, 0}, {0, 0});
     }

@@ -14,6 +14,7 @@ MANIFEST = """\
 help: a few
 board: bench
 program: few
+channels: [held]
 methods: [first, third]
 trace_numbers: 100
 in_flash: [slow_path]
@@ -27,6 +28,8 @@ budgets:
 """
 LIST = '/* PM_METHOD(name, help) */\nPM_METHOD(first, "one", 0, 0)\nPM_METHOD(second, "two", 0, 0)\n'
 OTHER = 'PM_METHOD(third, "three", 0, 0)\n'
+NEEDY = 'PM_METHOD(fourth, "four", 0, NEEDS_HELD)\nPM_METHOD(fifth, "five", 0, NEEDS_HELD | NEEDS_NEUTRAL)\n'
+CHANNELS = "#define NEEDS_NEUTRAL 0x0004U /* star point */\n#define NEEDS_HELD    0x0200U\n"
 
 
 class Images(unittest.TestCase):
@@ -36,6 +39,7 @@ class Images(unittest.TestCase):
         self.root = Path(folder.name)
         self.put("observers/some.def", LIST)
         self.put("firmware/drive/parts/other.def", OTHER)
+        self.put("firmware/math/measure.h", CHANNELS)
         self.put("hal/bench/port.h", "")
         self.put("firmware/images/few.yaml", MANIFEST)
 
@@ -49,6 +53,31 @@ class Images(unittest.TestCase):
         with self.assertRaises(SourceError) as caught:
             gen_images.files(self.root)
         return str(caught.exception)
+
+    def test_channels_stand_in_the_header(self):
+        self.assertIn("#define PM_CHANNELS (NEEDS_HELD)\n", gen_images.files(self.root)["firmware/images/few.h"])
+        self.put("firmware/images/few.yaml", MANIFEST.replace("[held]", "[held, neutral]"))
+        self.assertIn("#define PM_CHANNELS (NEEDS_HELD | NEEDS_NEUTRAL)\n",
+                      gen_images.files(self.root)["firmware/images/few.h"])
+        self.put("firmware/images/few.yaml", MANIFEST.replace("[held]", "[]"))
+        self.assertIn("#define PM_CHANNELS 0x0000U\n", gen_images.files(self.root)["firmware/images/few.h"])
+
+    def test_all_methods_are_those_with_enough_channels(self):
+        self.put("injection/needy.def", NEEDY)
+        for channels, absent in (("[]", ["fourth", "fifth"]), ("[held]", ["fifth"]), ("[held, neutral]", [])):
+            manifest = MANIFEST.replace("[held]", channels).replace("[first, third]", "all")
+            self.put("firmware/images/few.yaml", manifest)
+            text = gen_images.files(self.root)["firmware/images/few.h"]
+            left_out = [line for line in text.splitlines() if "WITHOUT" in line]
+            self.assertEqual(left_out, [f"#define PM_WITHOUT_{name} 1" for name in absent])
+
+    def test_method_without_its_channel_is_refused(self):
+        self.put("injection/needy.def", NEEDY)
+        self.assertEqual(self.refused("[first, third]", "[first, fifth]"),
+                         "firmware/images/few.yaml:5: method `fifth` needs the channel `neutral`, which `channels` does not name")
+        self.assertEqual(self.refused("[held]", "[held, tilt]"),
+                         "firmware/images/few.yaml:4: unknown channel `tilt`; known are: held, neutral")
+        self.assertEqual(self.refused("[held]", "[held, held]"), "firmware/images/few.yaml:4: channel `held` stands twice")
 
     def test_header_leaves_out_what_is_not_named(self):
         text = gen_images.files(self.root)["firmware/images/few.h"]
@@ -70,14 +99,14 @@ class Images(unittest.TestCase):
 
     def test_mistakes_are_named_with_file_and_line(self):
         for old, new, place, text in (
-                ("[first, third]", "\n  - first\n  - fifth", "few.yaml:6:", "unknown method `fifth`; known are: first"),
-                ("[first, third]", "\n  - first\n  - first", "few.yaml:5:", "`first` stands twice"),
-                ("in_flash:", "in_ram:", "few.yaml:6:", "unknown key `in_ram`"),
+                ("[first, third]", "\n  - first\n  - fifth", "few.yaml:7:", "unknown method `fifth`; known are: first"),
+                ("[first, third]", "\n  - first\n  - first", "few.yaml:6:", "`first` stands twice"),
+                ("in_flash:", "in_ram:", "few.yaml:7:", "unknown key `in_ram`"),
                 ("  ccm: 10\n", "", "few.yaml:", "key `ccm` is missing"),
-                ("mean: 42", "median: 42", "few.yaml:12:", "unknown key `median`"),
-                ("flash: 1000", "flash: much", "few.yaml:8:", "`much` is not an integer"),
+                ("mean: 42", "median: 42", "few.yaml:13:", "unknown key `median`"),
+                ("flash: 1000", "flash: much", "few.yaml:9:", "`much` is not an integer"),
                 ("flash: 1000", "flash: 0", "few.yaml:", "flash must be above 0"),
-                ("trace_numbers: 100", "trace_numbers: 7", "few.yaml:5:", "trace_numbers must be"),
+                ("trace_numbers: 100", "trace_numbers: 7", "few.yaml:6:", "trace_numbers must be"),
                 ("board: bench", "board: bank", "few.yaml:2:", "there is no board hal/bank"),
                 ("program: few", "program: a b", "few.yaml:3:", "`a b` is not a name")):
             with self.subTest(new):

@@ -19,4 +19,28 @@ inline Names must_be_positive(const rotating_sine_config_t &c)
             {"sine n", c.n - 7}};
 }
 
+inline Names must_be_positive(const inform_config_t &c)
+{
+    return {{"inform v_h", c.v_h}, {"inform gain_0", c.axes.saliency.gain_0}, {"inform lag", c.axes.lag}};
+}
+
+inline Names must_be_positive(const pwm_excitation_config_t &c)
+{
+    return {{"excitation v_h", c.v_h},
+            {"excitation gain_0", c.axes.saliency.gain_0},
+            {"excitation lag", c.axes.lag},
+            {"excitation between", c.between}};
+}
+
+// Of a configuration that has a saliency of its own or that of the axes.
+template <class Config> auto saliency_of(const Config &c) -> decltype((c.saliency))
+{
+    return c.saliency;
+}
+
+template <class Config> auto saliency_of(const Config &c) -> decltype((c.axes.saliency))
+{
+    return c.axes.saliency;
+}
+
 } // namespace gains

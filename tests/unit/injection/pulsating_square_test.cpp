@@ -107,7 +107,7 @@ class Carrier
         EXPECT_EQ(last.eps, out.eps);
         fundamental = bench::complex(out.i) * kBase.i_A * std::polar(1.0, theta_hat);
         run(applying_);
-        applying_ = bench::complex(out.v) * kBase.v_V;
+        applying_ = bench::complex(out.carrier.v) * kBase.v_V;
         return last;
     }
 
@@ -286,7 +286,7 @@ TEST(PulsatingSquare, VoltageAlternatesAlongD)
     for (int k = 0; k < 10; ++k) {
         injection_out_t out;
         pulsating_square_step(&self, &c, &in, &out);
-        const Complex v = bench::complex(out.v) * kBase.v_V * std::polar(1.0, -ahead);
+        const Complex v = bench::complex(out.carrier.v) * kBase.v_V * std::polar(1.0, -ahead);
         EXPECT_NEAR(v.real(), k % 2 == 0 ? kCarrier_V : -kCarrier_V, 1e-5) << k;
         EXPECT_NEAR(v.imag(), 0, 1e-5) << k;
     }

@@ -68,7 +68,7 @@ Settled settled(const rotating_sine_config_t &c, double error_rad, double R_ohm,
             slow.i_dq = out.i;
             rotating_sine_slow(&self, &c, &slow);
         }
-        commanded = bench::complex(out.v) * kBase.v_V;
+        commanded = bench::complex(out.carrier.v) * kBase.v_V;
         const Complex v = v_steady + applying * std::polar(1.0, -theta);
         for (int n = 0; n < 50; ++n) {
             const double t = kBase.period_s / 50;
@@ -149,14 +149,14 @@ TEST(RotatingSine, TheSameCarrierAfterEveryTurn)
         injection_out_t out;
         rotating_sine_step(&self, &c, &in, &out);
         EXPECT_EQ(out.eps, 0);
-        EXPECT_NEAR(std::abs(bench::complex(out.v)) * kBase.v_V, 35, 1e-4);
+        EXPECT_NEAR(std::abs(bench::complex(out.carrier.v)) * kBase.v_V, 35, 1e-4);
         if (k < c.n) {
-            first.push_back(out.v);
+            first.push_back(out.carrier.v);
             const double angle = 2 * bench::kPi * k / c.n;
-            EXPECT_LT(std::abs(bench::complex(out.v) * kBase.v_V - 35.0 * std::polar(1.0, angle)), 1e-4) << k;
+            EXPECT_LT(std::abs(bench::complex(out.carrier.v) * kBase.v_V - 35.0 * std::polar(1.0, angle)), 1e-4) << k;
         } else {
-            EXPECT_EQ(out.v.alpha, first[static_cast<size_t>(k % c.n)].alpha);
-            EXPECT_EQ(out.v.beta, first[static_cast<size_t>(k % c.n)].beta);
+            EXPECT_EQ(out.carrier.v.alpha, first[static_cast<size_t>(k % c.n)].alpha);
+            EXPECT_EQ(out.carrier.v.beta, first[static_cast<size_t>(k % c.n)].beta);
         }
     }
 }
