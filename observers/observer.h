@@ -70,12 +70,9 @@ static inline void observer_step(observer_t *self, const observer_config_t *conf
         active_flux_step(&self->active_flux, &config->active_flux, in, out);
     } else {
         /* Only this path needs them in memory; copied by members, so that elsewhere they stay in registers. */
-        const obs_in_t given = {{in->v.alpha, in->v.beta},
-                                {in->i.alpha, in->i.beta},
-                                {in->dir.cos, in->dir.sin},
-                                in->omega,
-                                {in->i_dq.d, in->i_dq.q},
-                                PM_IF_MEASURED(in->more)};
+        const obs_in_t given = {{in->v.alpha, in->v.beta},  {in->i.alpha, in->i.beta},
+                                {in->dir.cos, in->dir.sin}, in->omega,
+                                {in->i_dq.d, in->i_dq.q},   PM_IF_MEASURED(in->more)};
         obs_out_t result;
         observer_step_other(self, config, &given, &result);
         *out = result;

@@ -301,10 +301,8 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
         without_control(drive, in, out);
     } else {
         PM_IF_MEASURED(const obs_more_t more = measure_more(drive, in);)
-        const position_in_t seen = {.v = &drive->v_acting,
-                                    .i = drive->i_ab,
-                                    .ahead = &drive->ahead,
-                                    PM_IF_MEASURED(.more = &more)};
+        const position_in_t seen = {
+            .v = &drive->v_acting, .i = drive->i_ab, .ahead = &drive->ahead, PM_IF_MEASURED(.more = &more)};
         position_out_t frame;
         position_step(&drive->position, &drive->config.position, &seen, &frame);
         const pm_ab_t next = pm_pair_ab(&drive->v_next);

@@ -34,11 +34,8 @@ void position_step(position_t *self, const position_config_t *config, const posi
     pm_dq_t i_dq;
     pm_q_t low_eps = 0;
     if (inject) {
-        const injection_in_t raw = {.i = i,
-                                    .dir = dir,
-                                    .omega = pll.omega,
-                                    .ahead = frame_ahead,
-                                    PM_IF_MEASURED(.more = at->more)};
+        const injection_in_t raw = {
+            .i = i, .dir = dir, .omega = pll.omega, .ahead = frame_ahead, PM_IF_MEASURED(.more = at->more)};
         injection_out_t low;
         injection_step(&self->injection, &config->injection, &raw, &low);
         i_dq = low.i;

@@ -360,8 +360,8 @@ TEST(Modulator, NothingToSplitChangesNothing)
 TEST(Modulator, ASplitThatDoesNotFitIsFlagged)
 {
     for (int b = 0; b < 360; b += 11) {
-        const Split s = split(std::polar(0.9 * kLink / std::sqrt(3.0), 0.3), std::polar(0.7 * kLink, b * kDegree),
-                              kLink);
+        const Split s =
+            split(std::polar(0.9 * kLink / std::sqrt(3.0), 0.3), std::polar(0.7 * kLink, b * kDegree), kLink);
         EXPECT_TRUE(s.limited) << b;
         for (const auto &leg : s.compare) {
             EXPECT_LE(leg[0], kCounts);

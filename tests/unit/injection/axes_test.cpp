@@ -110,8 +110,8 @@ class Rotor
     void run(const excitation_t &e)
     {
         const Machine &m = kMachine;
-        const Complex steady = m.R_ohm * i_A + kJ * omega_ * Complex(m.L_d0_H * i_A.real() + m.psi_m_Wb,
-                                                                     m.L_q0_H * i_A.imag());
+        const Complex steady =
+            m.R_ohm * i_A + kJ * omega_ * Complex(m.L_d0_H * i_A.real() + m.psi_m_Wb, m.L_q0_H * i_A.imag());
         const int n = 100;
         const double t = kBase.period_s / n;
         for (int k = 0; k < n; ++k) {

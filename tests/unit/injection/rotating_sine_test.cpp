@@ -153,7 +153,9 @@ TEST(RotatingSine, TheSameCarrierAfterEveryTurn)
         if (k < c.n) {
             first.push_back(out.carrier.v);
             const double angle = 2 * bench::kPi * k / c.n;
-            EXPECT_LT(std::abs(bench::complex(out.carrier.v) * kBase.v_V - 35.0 * std::polar(1.0, angle)), 1e-4) << k;
+            EXPECT_LT(std::abs(bench::complex(out.carrier.v) * kBase.v_V - 35.0 * std::polar(1.0, angle)),
+                      1e-4)
+                << k;
         } else {
             EXPECT_EQ(out.carrier.v.alpha, first[static_cast<size_t>(k % c.n)].alpha);
             EXPECT_EQ(out.carrier.v.beta, first[static_cast<size_t>(k % c.n)].beta);
