@@ -36,8 +36,8 @@ void deadbeat_step(deadbeat_t *self, const deadbeat_config_t *config, const regu
     const pm_dq_t i = predicted(self, c, in->i, in->omega);
     const pm_dq_t model = opposing(c, i, in->omega);
     const pm_dq_t e = {.d = pm_sub_sat(in->i_ref.d, i.d), .q = pm_sub_sat(in->i_ref.q, i.q)};
-    pm_dq_t u = {.d = pm_gain_add(pm_widen(model.d), e.d, c->k_d),
-                 .q = pm_gain_add(pm_widen(model.q), e.q, c->k_q)};
+    pm_dq_t u = {.d = pm_widen(model.d) + pm_shl(pm_mulh(e.d, c->k_d), 1),
+                 .q = pm_widen(model.q) + pm_shl(pm_mulh(e.q, c->k_q), 1)};
     const pm_wide_t top = pm_widen(in->v_max);
     if (pm_rarely(voltage_beyond(u, top))) {
         u = voltage_within(u, top);

@@ -1,5 +1,5 @@
-/* Deadbeat current control with a modulated voltage (METHODS.md 12.5.2, continuous set; the choice of a
- * switch state, finite set, is not here).
+/* Deadbeat current control with a modulated voltage (METHODS.md 12.5.2, continuous set; the finite one:
+ * finite_set.h).
  *
  * The voltage commanded a period ago acts until k+1; the model says where it takes the current:
  *   i_d' = i_d + T_s/L_d (v_d - R i_d + omega L_q i_q)
@@ -15,7 +15,8 @@
  * a period, so that twice the inductance is the limit of stability. Voltage limit: voltage_circle.h. The slowed
  * form removes `share` of the error a period; a low-speed source asks for it, whose mean current is old.
  *
- * Cost: 80 instructions a period more than the PI. Range: L / T_s below 30 times the base impedance. Functions as regulator.h says.
+ * Cost: 80 instructions a period more than the PI. Range: L / T_s below 60 times the base impedance.
+ * Functions as regulator.h says.
  * Tests: tests/unit/control/deadbeat_test.cpp, tests/contract/regulator_contract_test.cpp,
  * tests/scenario/deadbeat.yaml. */
 #ifndef CONTROL_DEADBEAT_H
@@ -32,7 +33,7 @@ typedef struct {
     pm_q_t R; /* per-unit */
     pm_q_t L_d, L_q, psi_m;
     pm_q_t per_L_d, per_L_q; /* T_s / L */
-    pm_gain_t k_d, k_q;      /* L / T_s, and share of it */
+    int32_t k_d, k_q;        /* L / T_s, and share of it, Q25 */
 } deadbeat_config_t;
 
 typedef struct {

@@ -2,10 +2,16 @@
 
 #include "firmware/params/maker.h"
 
-static void make_axis(maker_t *m, drive_param_id_t L, pm_gain_t *k, pm_q_t *per_L)
+#define K_BITS 25
+
+static void make_axis(maker_t *m, drive_param_id_t L, int32_t *k, pm_q_t *per_L)
 {
     const pm_num_t per_period = pm_num_div(pm_num_div(si(m, L), m->base.t_s), m->impedance);
-    *k = gain(m, per_period, GAIN_BITS, L);
+    if (pm_num_cmp(per_period, pm_num(60)) > 0) { /* 8 times it, the largest error, must fit */
+        refuse(m, L, "over a PWM period is beyond 60 times v_full_scale / i_full_scale");
+        return;
+    }
+    *k = gain(m, per_period, K_BITS, L);
     *per_L = fixed(m, pm_num_div(pm_num(1), per_period), Q_BITS, L);
 }
 

@@ -3,21 +3,35 @@
 #define CONTROL_REGULATION_H
 
 #include "firmware/math/frames.h"
+#include "firmware/math/measure.h"
 #include "firmware/params/types.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
+/* Traits of a regulator, a sum; they stand in its row of the list. */
+enum {
+    REGULATOR_SWITCHES = 1, /* gives a switch state, not a voltage: it ripples, and no carrier can be added */
+};
+
 typedef struct {
     pm_dq_t i, i_ref; /* at k, in the estimated frame */
     pm_q_t omega;     /* electrical */
     pm_q_t v_max;     /* the voltage vector may have this length */
+#if PM_CARRIES(NEEDS_HELD)
+    pm_half_dir_t ahead; /* half of the direction of the frame in the middle of [k+1, k+2) */
+    pm_q_t v_dc;
+#endif
 } regulator_in_t;
 
 typedef struct {
     pm_dq_t v;    /* for [k+1, k+2), in the frame at its middle; Q22 */
     bool limited; /* set when it was shortened to v_max; the reader clears it */
+#if PM_CARRIES(NEEDS_HELD)
+    uint16_t
+        legs; /* 0: v is modulated; else PM_LEGS_...: held so over the period, of which v is the voltage */
+#endif
 } regulator_out_t;
 
 #ifdef __cplusplus

@@ -9,7 +9,8 @@
  *                                   with a slow window asks for
  *   make_x(maker, config)           configuration from SI parameters (x_config.c)
  *   x_bandwidth(maker)              of the closed loop, in Hz
- * References are the drive's; dead time belongs to the modulator.
+ * References are the drive's; dead time belongs to the modulator. A regulator with the trait REGULATOR_SWITCHES gives
+ * a switch state instead, and the voltage that it makes.
  *
  * Cost of the dispatch: one branch for the default, which is compiled into the caller, none in an image that has no
  * other; a call for the others. Tests: tests/contract/regulator_contract_test.cpp runs all of the list. */
@@ -55,6 +56,7 @@ typedef union {
 #undef PM_METHOD
 } regulator_t;
 
+uint32_t regulator_traits(regulator_id_t id); /* REGULATOR_... */
 void regulator_reset(regulator_t *self, const regulator_config_t *config, pm_dq_t v, pm_dq_t i, pm_q_t omega);
 void regulator_slow_down(regulator_config_t *config, pm_unit_t share);
 
@@ -74,7 +76,12 @@ static inline void regulator_step_usual(regulator_t *self, const regulator_confi
         synchronous_pi_step(&self->synchronous_pi, &config->synchronous_pi, in, out);
     } else {
         /* Only this path needs it in memory; copied by members, so that elsewhere it stays in registers. */
-        const regulator_in_t given = {{in->i.d, in->i.q}, {in->i_ref.d, in->i_ref.q}, in->omega, in->v_max};
+        const regulator_in_t given = {{in->i.d, in->i.q},
+                                      {in->i_ref.d, in->i_ref.q},
+                                      in->omega,
+                                      in->v_max,
+                                      PM_IF_HELD({in->ahead.cos, in->ahead.sin}, in->v_dc)};
+        PM_IF_HELD(out->legs = 0U;)
         regulator_step_other(self, config, &given, out);
     }
 }

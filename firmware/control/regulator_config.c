@@ -2,6 +2,16 @@
 #include "firmware/math/image.h"
 #include "firmware/params/maker.h"
 
+uint32_t regulator_traits(regulator_id_t id)
+{
+    static const uint8_t traits_of[REGULATOR_COUNT] = {
+#define PM_METHOD(name, help, traits, needs) (uint8_t)(traits),
+#include "firmware/control/regulators.def"
+#undef PM_METHOD
+    };
+    return traits_of[id];
+}
+
 void make_regulator(maker_t *m, regulator_config_t *c)
 {
     c->id = (regulator_id_t)m->params->regulator;

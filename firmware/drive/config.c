@@ -163,6 +163,9 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     require(&m, sequence_needs((sequence_id_t)config->start), DRIVE_PARAM_start_method);
     make_modulator(&m, &config->modulator);
     make_regulator(&m, &config->regulator);
+    if (config->injection && (regulator_traits(config->regulator.id) & REGULATOR_SWITCHES) != 0U) {
+        refuse(&m, DRIVE_PARAM_regulator, "cannot add an injected voltage: start_method 2");
+    }
     make_speed_control(&m, &config->speed);
     make_mtpa(&m, &config->mtpa);
     m.i_d_rated = i_d_rated(&m, &config->mtpa);

@@ -272,13 +272,23 @@ static inline void control(drive_t *drive, const position_out_t *frame, bool usu
     const regulator_in_t in = {.i = frame->i,
                                .i_ref = pm_pair_dq(&drive->i_ref),
                                .omega = frame->omega,
-                               .v_max = pm_unit(v_dc, drive->v_share)};
+                               .v_max = pm_unit(v_dc, drive->v_share),
+                               PM_IF_HELD(.ahead = frame->ahead, .v_dc = v_dc)};
     regulator_out_t *u = &drive->voltage;
     regulator_step_usual(&drive->regulator, &drive->regulator_config, usual, &in, u);
     drive->status.i = frame->i;
 
     const pm_dq_t v = {.d = pm_shl(u->v.d, 30 - PM_WIDE_BITS), .q = pm_shl(u->v.q, 30 - PM_WIDE_BITS)};
     pm_ab_t v_ab = pm_park_inverse_quarter(v, frame->ahead);
+#if PM_CARRIES(NEEDS_HELD)
+    if (pm_rarely(u->legs != 0U)) {
+        drive->v_next = v_ab;
+        out->legs = u->legs;
+        out->trip = 0;
+        clear_instants(out);
+        return;
+    }
+#endif
     if (drive->carrier) {
         v_ab.alpha += frame->carrier.v.alpha;
         v_ab.beta += frame->carrier.v.beta;

@@ -9,6 +9,7 @@
 #define PM_CHANNELS 0x0000U
 
 #define PM_WITHOUT_deadbeat 1
+#define PM_WITHOUT_finite_set 1
 #define PM_WITHOUT_mismatch 1
 #define PM_WITHOUT_back_emf 1
 #define PM_WITHOUT_extended_emf 1

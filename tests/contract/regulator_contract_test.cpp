@@ -39,12 +39,27 @@ constexpr int32_t kMirror = 40; // of 2^-22
 constexpr double kCircle = 4e-4;
 // 10 to 90 % of a first order, 0.35 / f; delay and whole periods beside it.
 constexpr double kRise = 0.35, kRisePeriods = 3;
+// The link, and what the current moves in a period under the longest vector of a switch state against the EMF of 0.6:
+// (2/3 300 V + 57 V) 100 us / 43 mH.
+constexpr double kLink = 300.0 / 450;
+constexpr double kRipple = 0.06;
 
 struct RegulatorCase {
     std::string name;
     regulator_config_t config;
     drive_params_t params;
     double bandwidth_Hz;
+    unsigned traits;
+
+    bool switches() const
+    {
+        return (traits & REGULATOR_SWITCHES) != 0;
+    }
+
+    double ripple() const
+    {
+        return switches() ? kRipple : 0;
+    }
 };
 
 void PrintTo(const RegulatorCase &c, std::ostream *out)
@@ -69,14 +84,15 @@ regulator_config_t configured(const drive_params_t &p, double *bandwidth_Hz = nu
 std::vector<RegulatorCase> cases()
 {
     std::vector<RegulatorCase> all;
-    const auto add = [&all](regulator_id_t id, const char *name) {
+    const auto add = [&all](regulator_id_t id, const char *name, unsigned traits) {
         drive_params_t p = bench::parameters(kMachine, kBase);
         p.regulator = static_cast<int32_t>(id);
-        RegulatorCase x = {name, {}, p, 0};
+        p.start_method = (traits & REGULATOR_SWITCHES) != 0 ? 2 : 0;
+        RegulatorCase x = {name, {}, p, 0, traits};
         x.config = configured(p, &x.bandwidth_Hz);
         all.push_back(x);
     };
-#define PM_METHOD(name, help, traits, needs) add(REGULATOR_##name, #name);
+#define PM_METHOD(name, help, traits, needs) add(REGULATOR_##name, #name, traits);
 #include "firmware/control/regulators.def"
 #undef PM_METHOD
     return all;
@@ -93,7 +109,8 @@ class Regulator
 
     regulator_out_t raw(Complex i, Complex ref, double omega, double v_max)
     {
-        const regulator_in_t in = {bench::dq(i), bench::dq(ref), fixed(omega, 28), fixed(v_max, 28)};
+        const regulator_in_t in = {bench::dq(i),     bench::dq(ref), fixed(omega, 28),
+                                   fixed(v_max, 28), {1 << 30, 0},   fixed(kLink, 28)};
         regulator_out_t out = {};
         regulator_step(&state_, &config_, &in, &out);
         return out;
@@ -148,13 +165,17 @@ TEST_P(RegulatorContract, ReachesTheReferenceAtAnySpeed)
         for (const Complex ref : {Complex{0, 0.3}, Complex{-0.2, 0.2}, Complex{-0.1, -0.3}}) {
             const Complex i = respond(GetParam().config, omega, ref, 1500).back();
             // the frame turns on while the voltage acts: part of the decoupling is left to what integrates
-            EXPECT_LE(std::abs(i - ref), kSettled + 0.01 * std::abs(omega)) << omega << ' ' << ref;
+            EXPECT_LE(std::abs(i - ref), kSettled + 0.01 * std::abs(omega) + GetParam().ripple())
+                << omega << ' ' << ref;
         }
     }
 }
 
 TEST_P(RegulatorContract, RisesWithItsBandwidthAndLittleOvershoot)
 {
+    if (GetParam().switches()) {
+        GTEST_SKIP() << "the step is as large as its ripple";
+    }
     const Complex ref = {0, 0.05};
     const std::vector<Complex> i = respond(GetParam().config, 0, ref, 400);
     const double expected = kRise / GetParam().bandwidth_Hz / kBase.period_s;
@@ -168,7 +189,7 @@ TEST_P(RegulatorContract, SeededWithTheActingVoltageNothingMoves)
 {
     for (const double omega : {0.0, 0.4, -0.4}) {
         for (const Complex &i : respond(GetParam().config, omega, 0, 50)) {
-            ASSERT_LE(std::abs(i), kSeeded) << omega;
+            ASSERT_LE(std::abs(i), kSeeded + GetParam().ripple()) << omega;
         }
     }
 }
@@ -181,7 +202,7 @@ TEST_P(RegulatorContract, RecoversFromTheVoltageLimit)
     const auto top =
         std::max_element(i.begin(), i.end(), [](Complex a, Complex b) { return a.imag() < b.imag(); });
     EXPECT_LE(top->imag(), 0.5 * (1 + kOvershoot));
-    EXPECT_LE(std::abs(i.back() - ref), 0.01);
+    EXPECT_LE(std::abs(i.back() - ref), 0.01 + GetParam().ripple());
 }
 
 TEST_P(RegulatorContract, StaysInsideTheCircleForAnyInput)
@@ -195,7 +216,8 @@ TEST_P(RegulatorContract, StaysInsideTheCircleForAnyInput)
         };
         const double v_max = random.within(0.01, 0.8);
         const Complex v = regulator.step(any(), 0.7 * any(), random.within(-1.2, 1.2), v_max);
-        ASSERT_LE(std::abs(v), v_max + kCircle / v_max) << n;
+        const double top = GetParam().switches() ? 2 * kLink / 3 : v_max;
+        ASSERT_LE(std::abs(v), top + kCircle / top) << n;
         limited += regulator.limited ? 1 : 0;
     }
     EXPECT_GT(limited, 5000);
@@ -219,6 +241,9 @@ TEST_P(RegulatorContract, TurnsWithTheMachine)
 
 TEST_P(RegulatorContract, SlowedItTakesLongerAndStaysSettled)
 {
+    if (GetParam().switches()) {
+        GTEST_SKIP() << "the step is as large as its ripple";
+    }
     const Complex ref = {0, 0.05};
     const double fast = rise_periods(respond(GetParam().config, 0, ref, 400), 0.005, 0.045);
     regulator_config_t slowed = GetParam().config;
@@ -238,7 +263,7 @@ TEST_P(RegulatorContract, StableWithInductancesOffByAThird)
         const Complex ref = {-0.1, 0.3};
         const std::vector<Complex> i = respond(configured(p), 0.3, ref, 1500);
         for (auto x = i.end() - 100; x != i.end(); ++x) {
-            ASSERT_LE(std::abs(*x - ref), 0.03) << share;
+            ASSERT_LE(std::abs(*x - ref), 0.03 + GetParam().ripple()) << share;
         }
     }
 }

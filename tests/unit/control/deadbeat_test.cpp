@@ -28,7 +28,7 @@ constexpr double kEuler = 0.01;
 deadbeat_config_t config(double share = 1)
 {
     const double z = kBase.impedance_ohm(), t = kBase.period_s;
-    const auto k = [&](double L_H) { return fixed(share * L_H / t / z, 26); };
+    const auto k = [&](double L_H) { return fixed(share * L_H / t / z, 25); };
     const auto per_L = [&](double L_H) { return fixed(t * z / (share * L_H), 28); };
     deadbeat_config_t c = {};
     c.R = fixed(kMachine.R_ohm / z, 28);
@@ -54,8 +54,9 @@ std::vector<Complex> respond(const deadbeat_config_t &c, double omega, Complex r
         if (k >= 0) {
             i.push_back(winding.i());
         }
-        const regulator_in_t in = {bench::dq(winding.i()), bench::dq(k < 0 ? 0 : ref), fixed(omega, 28),
-                                   fixed(v_max, 28)};
+        const regulator_in_t in = {bench::dq(winding.i()), bench::dq(k < 0 ? 0 : ref),
+                                   fixed(omega, 28),       fixed(v_max, 28),
+                                   {1 << 30, 0},           PM_ONE};
         regulator_out_t out = {};
         deadbeat_step(&self, &c, &in, &out);
         winding.run(Complex{real(out.v.d, 22), real(out.v.q, 22)} + unknown);

@@ -20,4 +20,9 @@ inline Names must_be_positive(const deadbeat_config_t &c)
             {"deadbeat per_L_q", c.per_L_q}};
 }
 
+inline Names must_be_positive(const finite_set_config_t &c)
+{
+    return must_be_positive(c.deadbeat);
+}
+
 } // namespace gains

@@ -103,7 +103,8 @@ class Law
 regulator_out_t step(synchronous_pi_t &self, const synchronous_pi_config_t &c, Complex i, Complex ref,
                      double omega, double v_max)
 {
-    const regulator_in_t in = {bench::dq(i), bench::dq(ref), fixed(omega, 28), fixed(v_max, 28)};
+    const regulator_in_t in = {bench::dq(i),     bench::dq(ref), fixed(omega, 28),
+                               fixed(v_max, 28), {1 << 30, 0},   PM_ONE};
     regulator_out_t out = {};
     synchronous_pi_step(&self, &c, &in, &out);
     out.v = {pm_narrow(out.v.d), pm_narrow(out.v.q)}; // as signals

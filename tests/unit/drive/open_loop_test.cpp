@@ -133,7 +133,7 @@ Complex current_vector(const Drive &x)
 Complex next_voltage(const drive_t &d, pm_dq_t i, pm_q_t omega)
 {
     regulator_t regulator = d.regulator;
-    const regulator_in_t in = {i, i, omega, PM_ONE};
+    const regulator_in_t in = {i, i, omega, PM_ONE, {1 << 30, 0}, PM_ONE};
     regulator_out_t out = {};
     regulator_step(&regulator, &d.config.regulator, &in, &out);
     return {real(out.v.d, PM_WIDE_BITS), real(out.v.q, PM_WIDE_BITS)};

@@ -212,7 +212,7 @@ ENTRIES = (
     Entry(0x2200, 8, "i_fw_max", "control", "i32", "live", "A", -3, 0, 0, 1000000, 3000, False, True, "application", "none", {}, 'largest demagnetising current of field weakening; 0: off', ""),
     Entry(0x2200, 9, "dead_time_comp", "control", "i32", "live", "1", 0, 0, 0, 1, 1, False, True, "application", "none", {}, '1: compensate dead time and device drops', "5.6.1.1 #57"),
     Entry(0x2200, 10, "comp_zone", "control", "i32", "live", "A", -3, 0, 1, 100000, 30, False, True, "application", "none", {}, 'current below which the compensation is linear', "5.6.1.1 #57"),
-    Entry(0x2200, 11, "regulator", "control", "i32", "off", "1", 0, 0, 0, 1, 0, False, True, "application", "none", {0: 'PI in the estimated frame, bandwidth as current_bandwidth', 1: 'deadbeat: the current predicted at the end of the period reaches its reference in the next'}, 'control of the current', "12.5.2 #146"),
+    Entry(0x2200, 11, "regulator", "control", "i32", "off", "1", 0, 0, 0, 2, 0, False, True, "application", "none", {0: 'PI in the estimated frame, bandwidth as current_bandwidth', 1: 'deadbeat: the current predicted at the end of the period reaches its reference in the next', 2: 'deadbeat, legs held in the nearest of eight switch states: without injection'}, 'control of the current', "12.5.2 #146"),
     Entry(0x2300, 0, "position.count", "position", "u8", "const", "", 0, 0, None, None, 20, False, False, "none", "none", {}, 'highest sub-index', ""),
     Entry(0x2300, 1, "start_method", "position", "i32", "off", "1", 0, 0, 0, 3, 0, False, True, "application", "none", {}, ('0: by saliency; 1: pulses, injection; 2: align, open-loop start; 3: align, '
  'injection'), "5.9 #69"),
