@@ -53,6 +53,19 @@ static pm_num_t base_of(const drive_config_t *config, base_t base)
     }
 }
 
+/* I_1 T_dt / v_dc, with the voltage that modulator_config.c takes. */
+static int32_t leg_capacitance(const app_t *app)
+{
+    const drive_params_t *p = &app->params;
+    int32_t pF = 0;
+    const pm_num_t move = pm_num_mul(
+        pm_num_from_fixed(app->drive.commissioning_report.result.move, PM_Q_BITS), app->drive.config.base.i);
+    const pm_num_t time = pm_num_dec(p->dead_time, drive_param_exp10[DRIVE_PARAM_dead_time]);
+    const pm_num_t v_dc = pm_num_dec(p->v_dc_nominal, drive_param_exp10[DRIVE_PARAM_v_dc_nominal]);
+    (void)pm_num_to_fixed(pm_num_mul(pm_num_div(pm_num_mul(move, time), v_dc), pm_num_dec(1, 12)), 0, &pF);
+    return pF;
+}
+
 static int32_t in_row(const app_t *app, const result_row_t *row)
 {
     const uint8_t *memory = (const uint8_t *)&app->drive.commissioning_report.result;
@@ -82,6 +95,9 @@ bool app_identify_value(const app_t *app, uint16_t slot, int32_t *value)
         return true;
     case OD_LIVE_IDENTIFICATION_REASON:
         *value = report->reason;
+        return true;
+    case OD_LIVE_IDENTIFICATION_LEG_CAPACITANCE:
+        *value = leg_capacitance(app);
         return true;
     case OD_LIVE_IDENTIFICATION_L_QH_RATED:
         *value = app_in_units(commissioning_tangent(r, 16), base_of(&app->drive.config, IN_HENRY), 9);

@@ -12,7 +12,9 @@ typedef struct {
 void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t v_dc)
 {
     const int32_t lost = config->dead + pm_mulh(config->drop, pm_per_volt(v_dc));
-    self->lost = config->compensate ? pm_shl(pm_sat(lost, PM_SHARE_BITS - 2), PM_HEIGHT_BITS) : 0;
+    const int32_t all = config->compensate ? pm_shl(pm_sat(lost, PM_SHARE_BITS - 2), PM_HEIGHT_BITS) : 0;
+    self->far = pm_frac(all, config->far);
+    self->near = all - self->far;
 }
 
 /* The common part of the legs is free. Here it is that of phase A with b = -c: then the mean of the smallest
@@ -38,6 +40,19 @@ static inline pm_abc_t lost_by(const modulator_config_t *config, pm_ab_t i)
     return (pm_abc_t){.a = a, .b = y - pm_half(a), .c = y + pm_half(a)}; /* c has the opposite sign */
 }
 
+/* Both parts, the second with an edge eight times as far: one saturation each. */
+static inline int32_t zones_add(int32_t sum, int32_t x, pm_pair_t height)
+{
+    const int32_t near = pm_zone_add(sum, x, height.first);
+    return pm_mulh_add(near, pm_shl_sat(x, PM_ZONE_LIFT - 3, PM_ZONE_BITS + PM_ZONE_LIFT), height.second);
+}
+
+static inline int32_t zones_sub(int32_t sum, int32_t x, pm_pair_t height)
+{
+    const int32_t near = pm_zone_sub(sum, x, height.first);
+    return pm_mulh_sub(near, pm_shl_sat(x, PM_ZONE_LIFT - 3, PM_ZONE_BITS + PM_ZONE_LIFT), height.second);
+}
+
 void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
                     pm_ab_t i_quarter, modulator_out_t *out)
 {
@@ -48,13 +63,14 @@ void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t
     if (pm_rarely(out->limited)) {
         const int32_t ratio = pm_mulh(v_dc, per_volt); /* 1 and a little when the span is just too large */
         v = (pm_ab_t){.alpha = pm_times_share(v.alpha, ratio), .beta = pm_times_share(v.beta, ratio)};
-        self->limited = true;
+        self->limited = ratio;
     }
     const pm_abc_t i = lost_by(config, i_quarter);
     const int32_t counts = config->counts;
-    const int32_t a = pm_zone_add(pm_mulh_add(PM_SHARE_HALF, u.leg.a, per_volt), i.a, self->lost);
-    const int32_t b = pm_zone_add(pm_mulh_add(PM_SHARE_HALF, u.leg.b, per_volt), i.b, self->lost);
-    const int32_t c = pm_zone_sub(pm_mulh_sub(PM_SHARE_HALF, u.leg.c, per_volt), i.c, self->lost);
+    const pm_pair_t lost = pm_pair(&self->near, &self->far);
+    const int32_t a = zones_add(pm_mulh_add(PM_SHARE_HALF, u.leg.a, per_volt), i.a, lost);
+    const int32_t b = zones_add(pm_mulh_add(PM_SHARE_HALF, u.leg.b, per_volt), i.b, lost);
+    const int32_t c = zones_sub(pm_mulh_sub(PM_SHARE_HALF, u.leg.c, per_volt), i.c, lost);
     out->on[0] = pm_share_of(a, counts);
     out->on[1] = pm_share_of(b, counts);
     out->on[2] = pm_share_of(c, counts);
@@ -90,7 +106,9 @@ void modulator_split(modulator_t *self, const modulator_config_t *config, pm_ab_
         const int32_t move = into_range(on, config->counts);
         for (uint32_t leg = 0; leg < PM_LEGS; leg++) {
             const int32_t fits = pm_clamp(on[leg] + move, 0, config->counts);
-            self->limited = self->limited || fits != on[leg] + move;
+            if (fits != on[leg] + move) {
+                self->limited = pm_shl(1, PM_SHARE_BITS);
+            }
             compare[leg][half] = (uint16_t)fits;
         }
     }

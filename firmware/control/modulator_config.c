@@ -2,10 +2,24 @@
 
 #include "firmware/params/maker.h"
 
+/* 1.7 C v_dc / T_dt, A. */
+static pm_num_t zone_of_capacitance(const maker_t *m)
+{
+    const pm_num_t charge = pm_num_mul(si(m, DRIVE_PARAM_leg_capacitance), si(m, DRIVE_PARAM_v_dc_nominal));
+    if (m->params->dead_time == 0) {
+        return pm_num(0);
+    }
+    return pm_num_mul(pm_num_div(charge, si(m, DRIVE_PARAM_dead_time)), pm_num_ratio(17, 10));
+}
+
 void make_modulator(maker_t *m, modulator_config_t *c)
 {
     const pm_num_t duty = pm_num_mul(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm));
-    const pm_num_t zone = pm_num_div(si(m, DRIVE_PARAM_comp_zone), m->base.i);
+    const pm_num_t least_zone = si(m, DRIVE_PARAM_comp_zone);
+    const pm_num_t by_capacitance = zone_of_capacitance(m);
+    const bool two_parts = pm_num_cmp(by_capacitance, least_zone) > 0;
+    const pm_num_t zone = pm_num_div(two_parts ? by_capacitance : least_zone, m->base.i);
+    c->far = two_parts ? PM_FRAC(0.25) : 0;
     c->counts = m->params->timer_counts;
     c->dead = fixed(m, duty, PM_SHARE_BITS, DRIVE_PARAM_dead_time);
     c->drop = per_unit(m, DRIVE_PARAM_device_drop, m->base.v);

@@ -260,9 +260,9 @@ static void report(drive_t *drive)
 void drive_slow(drive_t *drive, const drive_slow_in_t *in)
 {
     drive->temperature_dC = in->temperature_dC;
-    drive->status.limits = drive->voltage.limited || drive->modulator.limited ? DRIVE_LIMIT_VOLTAGE : 0U;
+    drive->status.limits = drive->voltage.limited || drive->modulator.limited != 0 ? DRIVE_LIMIT_VOLTAGE : 0U;
     drive->voltage.limited = false;
-    drive->modulator.limited = false;
+    drive->modulator.limited = 0;
     if (drive->fault == DRIVE_FAULT_NONE) {
         if (!drive->references_ready && !is_alone(drive)) {
             reference_take(drive);

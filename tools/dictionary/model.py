@@ -150,8 +150,8 @@ def check(entry):
             raise entry.error(f"only printable ASCII without backslash is possible in texts, quotes in help alone: {text}")
     if entry.book and not (BOOK.fullmatch(entry.book) and 1 <= int(BOOK.fullmatch(entry.book)[3]) <= ROWS):
         raise entry.error(f'book is section and row, as in "5.2.2.2 #51"; not `{entry.book}`')
-    if not -9 <= entry.exp10 <= 9:
-        raise entry.error("exp10 must be -9 to 9")
+    if not -12 <= entry.exp10 <= 9:
+        raise entry.error("exp10 must be -12 to 9")
     if entry.exp2 not in (0, -32) or (entry.exp2 and (entry.exp10 or entry.type != "u32")):
         raise entry.error("exp2 is -32, for a u32 without exp10")
     if (entry.exp10 or entry.exp2) and not entry.unit:

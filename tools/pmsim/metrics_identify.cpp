@@ -141,6 +141,9 @@ class Identified : public Metric
                                   inverter.v_diode_V * 2 * gap;
             return relative(last_.lost_V, lost_V);
         }
+        if (kind_ == "identify_leg_capacitance_F") {
+            return last_.move_A * inverter.dead_time_s / setup_.plant.dclink.v_source_V;
+        }
         const double speed_rad_s = setup_.rated.speed_rated_rad_s; // friction at rated speed, of rated torque
         const double truth_Nm = setup_.plant.mech.B_Nms * speed_rad_s + setup_.plant.mech.T_coulomb_Nm;
         const double found_Nm = last_.viscous_Nms * speed_rad_s + last_.coulomb_Nm;
@@ -168,6 +171,8 @@ std::vector<SpecialMetric> identify_metrics()
          make_special<Identified>},
         number("identify_R_s_error_rel", "resistance found against winding and switch"),
         number("identify_lost_error_rel", "voltage that a leg loses, found against dead time and drops"),
+        {{"identify_leg_capacitance_F", "F", "output capacitance of a leg found", false, false, {}},
+         make_special<Identified>},
         number("identify_L_d_error_rel", "L_d at zero current, found against the plant's"),
         number("identify_L_q_error_rel", "L_q at zero current, found against the plant's"),
         number("identify_L_q_rated_error_rel", "psi_q / i_q at rated current, found against the plant's"),

@@ -30,7 +30,7 @@ typedef struct {
 /* What the drive has found out about its machine; 0: nothing yet. */
 typedef struct {
     int state, reason; /* COMMISSIONING_... */
-    double R_s_ohm, lost_V;
+    double R_s_ohm, lost_V, move_A;
     double L_d_H, L_q_H, L_q_rated_H, L_qh_rated_H, L_dq_rated_H;
     double psi_m_Wb;
     double J_kgm2, viscous_Nms, coulomb_Nm;

@@ -74,6 +74,7 @@ static rig_identified_t identified(const rig_scale_t *scale, const commissioning
         .reason = report->reason,
         .R_s_ohm = R_ohm * r->R,
         .lost_V = scale->v_V * r->lost,
+        .move_A = scale->i_A * r->move,
         .L_d_H = L_H * r->L_d,
         .L_q_H = L_H * r->L_q,
         .L_q_rated_H = L_H * r->L_q_rated,

@@ -111,15 +111,17 @@ static size_t control(void *before, const void *memory, bool event[FIGURE_EVENTS
     const memory_t *image = memory;
     drive_out_t out = image->out;
     const bool current = drive->voltage.limited;
-    const bool modulator = drive->modulator.limited;
+    const int32_t modulator = drive->modulator.limited;
     const bool fault = drive->fault != DRIVE_FAULT_NONE;
     drive->voltage.limited = false;
-    drive->modulator.limited = false;
+    drive->modulator.limited = 0;
     drive_step(drive, &image->in, &out);
-    event[FIGURE_LIMITED] = drive->voltage.limited || drive->modulator.limited;
+    event[FIGURE_LIMITED] = drive->voltage.limited || drive->modulator.limited != 0;
     event[FIGURE_FAULT] = !fault && drive->fault != DRIVE_FAULT_NONE;
     drive->voltage.limited = drive->voltage.limited || current;
-    drive->modulator.limited = drive->modulator.limited || modulator;
+    if (drive->modulator.limited == 0) {
+        drive->modulator.limited = modulator;
+    }
     return difference(drive, &out, image);
 }
 

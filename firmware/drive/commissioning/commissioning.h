@@ -5,7 +5,7 @@
  * of the machine. One sequence; steps that the selected routines do not need are left out:
  *   sweep       voltage rises until the current flows; the vector turns the rotor onto phase A
  *   resistance  four currents, controlled slowly through the voltage:
- *               slope R, intercept 4/3 of the voltage lost in a leg
+ *               slope R, intercept 4/3 of the voltage lost in a leg; curvature: the capacitance of a leg
  *   L_d, L_q    square wave of +-V along each axis, without mean: change of flux over change of current
  *   rotation    the current vector turns and pulls the rotor along: up, two currents at speed, down
  *   L_q rated   square wave on q at rated current with the i_d of most torque per ampere:
@@ -48,10 +48,11 @@ typedef enum {
 
 /* Per-unit of the drive's bases; 0: not measured yet. */
 typedef struct {
-    pm_q_t R;          /* v / i */
-    pm_q_t lost;       /* v; voltage lost in a leg by dead time and device drops */
-    pm_q_t L_d, L_q;   /* psi / i; at zero current */
-    pm_q_t L_q_rated;  /* psi_q / i_q at the test current */
+    pm_q_t R;         /* v / i */
+    pm_q_t lost;      /* v; voltage lost in a leg by dead time and device drops */
+    pm_q_t move;      /* i; current that moves a leg's capacitance within the dead time, I_1 of modulator.h */
+    pm_q_t L_d, L_q;  /* psi / i; at zero current */
+    pm_q_t L_q_rated; /* psi_q / i_q at the test current */
     pm_q_t L_dq_rated; /* incremental cross inductance there */
     pm_q_t psi_m;      /* psi */
     pm_q_t J;          /* torque that changes omega mechanical by 1 / COMMISSIONING_J_STEPS in a slow step */
@@ -107,6 +108,7 @@ typedef struct {
             pm_q_t U;
             pm_q_t R_hat;                  /* voltage over current, with what is lost */
             pm_q_t slope_v, slope_i, v, i; /* over the levels: weighted with 3, 1, -1, -3, and plain */
+            pm_q_t bend_v, bend_i;         /* with 1, -1, -1, 1 */
         } resistance;
         struct {
             pm_q_t omega, omega_ref; /* at the top, and now, without what damps the swing */

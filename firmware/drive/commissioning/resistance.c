@@ -1,8 +1,12 @@
-/* Resistance and the voltage lost in a leg (METHODS.md 5.6.1.1): current along phase A with the rotor on it.
+/* Resistance, the voltage lost in a leg and the capacitance of a leg (METHODS.md 5.6.1): current along phase A with the
+ * rotor on it.
  *
- *   v = R i + 4/3 v_lost
- * Beyond the small currents where output capacitance matters, dead time takes the same voltage from each
- * leg; so four currents of 100, 80, 60, 40 % give both by regression. */
+ *   v = R i + 4/3 v_lost - K / i,  K = v_lost I_1
+ * A leg whose current moves its capacitance within the dead time gives back v_lost I_1 / (2 i) (modulator.h); phase A
+ * has i, the others half of it. Four currents of 100, 80, 60, 40 % of I give the three: with weights of
+ *   (3, 1, -1, -3)   the slope,      in which K / I counts -59/12,
+ *   (1, -1, -1, 1)   the curvature,  -7/12,
+ *   (1, 1, 1, 1)     the mean,       -77/12. */
 #include "firmware/drive/commissioning/commissioning_parts.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
@@ -67,6 +71,8 @@ void levels_enter(drive_t *drive)
     identify_t *self = &drive->procedure.identify;
     self->of.resistance.slope_v = 0;
     self->of.resistance.slope_i = 0;
+    self->of.resistance.bend_v = 0;
+    self->of.resistance.bend_i = 0;
     self->of.resistance.v = 0;
     self->of.resistance.i = 0;
 }
@@ -78,10 +84,16 @@ static phase_result_t conclude(drive_t *drive)
     if (self->of.resistance.slope_i <= 0 || self->of.resistance.slope_v <= 0) {
         return (phase_result_t){.failed = COMMISSIONING_IMPLAUSIBLE};
     }
-    const pm_q_t R = pm_div(self->of.resistance.slope_v, self->of.resistance.slope_i);
-    const pm_q_t gap = self->of.resistance.v - pm_mul(R, self->of.resistance.i); /* of all levels */
+    const pm_q_t slope_i = self->of.resistance.slope_i;
+    const pm_q_t first = pm_div(self->of.resistance.slope_v, slope_i);
+    const pm_q_t bend = self->of.resistance.bend_v - pm_mul(first, self->of.resistance.bend_i);
+    const pm_q_t back = pm_max(pm_mul(-bend, PM_Q(12.0 / 7)), 0); /* K / I */
+    const pm_q_t R = pm_div(self->of.resistance.slope_v - pm_mul(back, PM_Q(59.0 / 12)), slope_i);
+    const pm_q_t gap =
+        self->of.resistance.v - pm_mul(R, self->of.resistance.i) + pm_mul(back, PM_Q(77.0 / 12));
     r->R = R;
     r->lost = pm_max(pm_mul(gap, PM_Q(0.75 / LEVELS)), 0);
+    r->move = r->lost > 0 ? pm_mul(pm_div(back, r->lost), commissioning_current(drive)) : 0;
     self->R = R;
     self->lost = r->lost;
     return (phase_result_t){.done = true};
@@ -94,6 +106,9 @@ static void take_level(identify_t *self)
     const pm_q_t v = commissioning_mean(self, 2);
     self->of.resistance.slope_i += weights[self->part] * i;
     self->of.resistance.slope_v += weights[self->part] * v;
+    static const int32_t curved[LEVELS] = {1, -1, -1, 1};
+    self->of.resistance.bend_i += curved[self->part] * i;
+    self->of.resistance.bend_v += curved[self->part] * v;
     self->of.resistance.i += i;
     self->of.resistance.v += v;
 }

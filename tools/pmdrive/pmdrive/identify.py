@@ -17,7 +17,7 @@ from .motion import Motion
 
 ROUTINES = {"resistance": 1, "inductance": 2, "flux": 4, "mechanics": 8}
 RESULTS = {
-    "resistance": ("R_s", "dead_voltage"),
+    "resistance": ("R_s", "dead_voltage", "leg_capacitance"),
     "inductance": ("L_d", "L_q", "L_q_rated", "L_dh_rated", "L_qh_rated", "L_dqh_rated", "cross_half"),
     "flux": ("psi_m",),
     "mechanics": ("J", "friction", "coulomb"),
@@ -99,6 +99,7 @@ def parameters(drive, found):
         gap = float(drive.get("dead_time")) * float(drive.get("f_pwm")) * float(drive.get("dc_link_voltage"))
         wanted["R_s"] = x["R_s"]
         wanted["device_drop"] = max(0.0, x["dead_voltage"] - gap)
+        wanted["leg_capacitance"] = x["leg_capacitance"]
     if "inductance" in found:
         _inductances(x)
         wanted.update((name, x[name]) for name in RESULTS["inductance"])
