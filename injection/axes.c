@@ -8,7 +8,7 @@
 
 static pm_dir_t axis(uint16_t at)
 {
-    const pm_angle_t pair = (pm_angle_t)(at >> 1U) * PM_TURN(1.0 / 3);
+    const pm_angle_t pair = (pm_angle_t)(at / 2U) * PM_TURN(1.0 / 3);
     const uint32_t other_first = at >= AXES_ROUND / 2U ? 1U : 0U;
     return pm_dir(pair + ((at ^ other_first) & 1U) * PM_TURN(0.5));
 }

@@ -15,7 +15,7 @@ void pwm_excitation_step(pwm_excitation_t *self, const pwm_excitation_config_t *
 {
     const pm_ab_t i = in->i;
     pm_ab_t change = {0, 0};
-    if ((in->more->codes->sampled & 1U) != 0U) {
+    if (pm_sampled(in->more->codes, 0)) {
         const pm_ab_t mid = in->more->i_sample[0];
         change.alpha = mid.alpha - pm_half(self->i.alpha + i.alpha);
         change.beta = mid.beta - pm_half(self->i.beta + i.beta);

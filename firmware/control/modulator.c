@@ -87,7 +87,7 @@ static int32_t into_range(const int32_t on[PM_LEGS], int32_t top)
 }
 
 void modulator_split(modulator_t *self, const modulator_config_t *config, pm_ab_t split, pm_q_t v_dc,
-                     uint16_t compare[PM_LEGS][2])
+                     uint16_t (*compare)[2])
 {
     if (split.alpha == 0 && split.beta == 0) {
         return;

@@ -60,7 +60,7 @@ void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t
  * much less, the period as much as before. Where that leaves the carrier's range all legs of the half move
  * together, which the motor does not see; what even then does not fit is cut and flagged. One division. */
 void modulator_split(modulator_t *self, const modulator_config_t *config, pm_ab_t split, pm_q_t v_dc,
-                     uint16_t compare[PM_LEGS][2]);
+                     uint16_t (*compare)[2]);
 #endif
 
 void make_modulator(maker_t *m, modulator_config_t *c);

@@ -138,7 +138,7 @@ static inline obs_more_t measure_more(const drive_t *drive, const drive_in_t *in
     obs_more_t more = {.codes = &in->more};
 #if PM_CARRIES(NEEDS_SECOND_SAMPLE)
     for (uint32_t n = 0; n < PM_SAMPLES; n++) {
-        if ((in->more.sampled >> n & 1U) != 0U) {
+        if (pm_sampled(&in->more, n)) {
             more.i_sample[n] = pm_clarke(currents(drive, in->more.i_sample[n]));
         }
     }

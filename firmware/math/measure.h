@@ -128,6 +128,14 @@ typedef struct {
     pm_capture_t capture[PM_CAPTURES];
 #endif
 } pm_measure_t;
+
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+/* Sample n was asked for and is here. */
+static inline bool pm_sampled(const pm_measure_t *m, uint32_t n)
+{
+    return ((uint32_t)m->sampled >> n & 1U) != 0U;
+}
+#endif
 #endif
 
 #if PM_CARRIES(PM_DONE_AT)
