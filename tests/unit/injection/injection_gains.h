@@ -11,12 +11,16 @@ inline Names must_be_positive(const pulsating_square_config_t &c)
     return {{"v_h", c.v_h}, {"gain_0", c.saliency.gain_0}, {"h_d", c.h_d}, {"h_d_inverse", c.h_d_inverse}};
 }
 
+inline Names and_of(const sine_config_t &c, Names own)
+{
+    own.insert(own.end(),
+               {{"sine v_h", c.v_h}, {"sine per_length", c.per_length}, {"sine length", c.length - 7}});
+    return own;
+}
+
 inline Names must_be_positive(const rotating_sine_config_t &c)
 {
-    return {{"sine v_h", c.v_h},
-            {"sine gain_0", c.saliency.gain_0},
-            {"sine per_n", c.per_n},
-            {"sine n", c.n - 7}};
+    return and_of(c.sine, {{"sine gain_0", c.saliency.gain_0}});
 }
 
 inline Names must_be_positive(const inform_config_t &c)
