@@ -22,5 +22,6 @@
 #define PM_WITHOUT_rotating_sine 1
 #define PM_WITHOUT_inform 1
 #define PM_WITHOUT_pwm_excitation 1
+#define PM_WITHOUT_pulsating_sine 1
 
 #endif

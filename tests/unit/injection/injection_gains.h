@@ -23,6 +23,11 @@ inline Names must_be_positive(const rotating_sine_config_t &c)
     return and_of(c.sine, {{"sine gain_0", c.saliency.gain_0}});
 }
 
+inline Names must_be_positive(const pulsating_sine_config_t &c)
+{
+    return and_of(c.sine, {{"pulsating gain_0", c.saliency.gain_0}, {"pulsating h_d", c.h_d}});
+}
+
 inline Names must_be_positive(const inform_config_t &c)
 {
     return {{"inform v_h", c.v_h}, {"inform gain_0", c.axes.saliency.gain_0}, {"inform lag", c.axes.lag}};
