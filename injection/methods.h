@@ -7,5 +7,6 @@
 #include "injection/pulsating_square.h"
 #include "injection/pwm_excitation.h"
 #include "injection/rotating_sine.h"
+#include "injection/stationary_sine.h"
 
 #endif

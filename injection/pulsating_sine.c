@@ -2,9 +2,6 @@
 
 #include "firmware/math/root.h"
 
-/* A transient of the current must not turn the phase further than the inverter could: rad. */
-#define DELTA_MOST PM_Q(0.7)
-
 void pulsating_sine_reset(pulsating_sine_t *self, const pulsating_sine_config_t *config, const obs_in_t *in)
 {
     sine_reset(&self->sine, &config->sine, in->i_dq);
@@ -16,24 +13,12 @@ void pulsating_sine_reset(pulsating_sine_t *self, const pulsating_sine_config_t 
     self->misfit = 0;
 }
 
-/* Of each axis the part in phase with `phase`. */
-static inline pm_dq_t in_phase(const pulsating_sine_t *self, const pulsating_sine_config_t *config)
-{
-    const pm_dir_t phase = self->phase;
-    const pm_dq_t c = window_cosine(&self->sine.window, config->sine.per_length);
-    const pm_dq_t s = window_sine(&self->sine.window, config->sine.per_length);
-    pm_dq_t h;
-    h.d = pm_shl(pm_mulh2(c.d, phase.cos, s.d, phase.sin), 2); /* of 1/N and of Q31 */
-    h.q = pm_shl(pm_mulh2(c.q, phase.cos, s.q, phase.sin), 2);
-    return h;
-}
-
 void pulsating_sine_step(pulsating_sine_t *self, const pulsating_sine_config_t *config,
                          const injection_in_t *in, injection_out_t *out)
 {
     const pm_angle_t phi = sine_step(&self->sine, &config->sine, pm_park(in->i, in->dir));
     if (sine_ready(&self->sine)) {
-        const pm_dq_t h = in_phase(self, config);
+        const pm_dq_t h = sine_in_phase(&self->sine, &config->sine, self->phase);
         self->h = h;
         self->eps = pm_small_gain(pm_small(h.q + pm_unit(h.d, self->lambda)), self->gain);
     }
@@ -49,12 +34,11 @@ void pulsating_sine_slow(pulsating_sine_t *self, const pulsating_sine_config_t *
     self->gain = saliency_gain(&config->saliency, i_q);
     self->lambda = pm_shl(pm_sat(saliency_lambda(&config->saliency, i_q), PM_Q_BITS), 31 - PM_Q_BITS);
     if (self->sine.warm == 0U) {
-        const pm_q_t c = window_cosine(&self->sine.window, config->sine.per_length).d;
-        const pm_q_t s = window_sine(&self->sine.window, config->sine.per_length).d;
+        const pm_q_t c = window_cosine(&self->sine.window, config->sine.per_n).d;
+        const pm_q_t s = window_sine(&self->sine.window, config->sine.per_n).d;
         self->misfit = pm_div(2 * pm_hypot(c, s) - config->h_d, config->h_d);
         if (config->phase_measured) {
-            const pm_q_t delta = pm_angle_to_rad((int32_t)pm_atan2(s, c));
-            self->phase = pm_dir((pm_angle_t)pm_rad_to_angle(pm_clamp(delta, -DELTA_MOST, DELTA_MOST)));
+            self->phase = sine_phase(c, s);
         }
     }
 }

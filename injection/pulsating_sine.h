@@ -36,7 +36,7 @@ typedef struct {
 
 typedef struct {
     sine_t sine;
-    pm_dir_t phase;   /* e^{-j delta} */
+    pm_dir_t phase;   /* e^{j delta} */
     int32_t gain;     /* rad per unit of current, Q20 */
     pm_unit_t lambda; /* at the present current */
     pm_dq_t h;

@@ -19,7 +19,7 @@ void rotating_sine_step(rotating_sine_t *self, const rotating_sine_config_t *con
                         injection_out_t *out)
 {
     const pm_angle_t phi = sine_step(&self->sine, &config->sine, pm_park(in->i, in->dir));
-    const pm_dq_t negative = window_negative(&self->sine.window, config->sine.per_length);
+    const pm_dq_t negative = window_negative(&self->sine.window, config->sine.per_n);
     self->negative = negative;
     if (sine_ready(&self->sine)) {
         const pm_q_t across = pm_shl(pm_mulh2(negative.q, self->turn.cos, negative.d, self->turn.sin), 1);
@@ -49,7 +49,7 @@ void rotating_sine_slow(rotating_sine_t *self, const rotating_sine_config_t *con
 {
     const pm_q_t i_q = in->i_dq.q;
     const pm_q_t i_p = saliency_i_p(&config->saliency, i_q);
-    const pm_dq_t positive = window_positive(&self->sine.window, config->sine.per_length);
+    const pm_dq_t positive = window_positive(&self->sine.window, config->sine.per_n);
     pm_q_t rho = config->rho_0;
     self->gain = saliency_gain(&config->saliency, i_q);
     if (self->sine.warm == 0U) {

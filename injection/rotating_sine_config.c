@@ -20,7 +20,7 @@ static pm_num_t seen_share(const maker_t *m)
 
 injection_limits_t rotating_sine_limits(const maker_t *m)
 {
-    return sine_limits(m, 1);
+    return sine_limits(m);
 }
 
 /* kappa = (L_q - L_d) / (L_q + L_d) >= 0.1 */
@@ -33,7 +33,7 @@ static bool load_counts(const maker_t *m)
 
 void make_rotating_sine(maker_t *m, rotating_sine_config_t *c)
 {
-    make_sine(m, &c->sine, 1);
+    make_sine(m, &c->sine);
     make_saliency_sequence(m, &c->saliency, sine_flux(m));
     c->rho_0 = fixed(m, rho(m), Q_BITS, DRIVE_PARAM_R_s);
     c->rho_m0 = fixed(m, pm_num_mul(rho(m), seen_share(m)), Q_BITS, DRIVE_PARAM_R_s);
@@ -44,5 +44,5 @@ void make_rotating_sine(maker_t *m, rotating_sine_config_t *c)
 pm_num_t rotating_sine_answer(const maker_t *m)
 {
     const inductances_t L = inductances_at_zero(m);
-    return sine_answer(m, pm_num_div(slope_sequence(&L, sine_flux(m)), pm_num(2)), 1); /* I_n */
+    return sine_answer(m, pm_num_div(slope_sequence(&L, sine_flux(m)), pm_num(2))); /* I_n */
 }

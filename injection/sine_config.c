@@ -28,39 +28,37 @@ pm_num_t sine_flux(const maker_t *m)
 }
 
 /* From the position to the error signal: half a window and 1.5 periods. */
-static pm_num_t delay(const maker_t *m, int32_t carriers)
+static pm_num_t delay(const maker_t *m)
 {
-    return pm_num_mul(pm_num_ratio(carriers * periods(m) + 2, 2), m->base.t_s);
+    return pm_num_mul(pm_num_ratio(periods(m) + 2, 2), m->base.t_s);
 }
 
-static pm_num_t bandwidth(const maker_t *m, pm_num_t phase, int32_t carriers)
+static pm_num_t bandwidth(const maker_t *m, pm_num_t phase)
 {
-    return pm_num_div(phase, pm_num_mul(PM_NUM_TWO_PI, delay(m, carriers)));
+    return pm_num_div(phase, pm_num_mul(PM_NUM_TWO_PI, delay(m)));
 }
 
-injection_limits_t sine_limits(const maker_t *m, int32_t carriers)
+injection_limits_t sine_limits(const maker_t *m)
 {
-    return (injection_limits_t){.pll_max = bandwidth(m, pm_num_ratio(3, 10), carriers),
-                                .current_max = bandwidth(m, pm_num_ratio(4, 10), carriers)};
+    return (injection_limits_t){.pll_max = bandwidth(m, pm_num_ratio(3, 10)),
+                                .current_max = bandwidth(m, pm_num_ratio(4, 10))};
 }
 
-pm_num_t sine_answer(const maker_t *m, pm_num_t amplitude, int32_t carriers)
+pm_num_t sine_answer(const maker_t *m, pm_num_t amplitude)
 {
-    return pm_num_mul(amplitude, pm_num_sqrt(pm_num_ratio(carriers * periods(m), 2)));
+    return pm_num_mul(amplitude, pm_num_sqrt(pm_num_ratio(periods(m), 2)));
 }
 
-void make_sine(maker_t *m, sine_config_t *c, int32_t carriers)
+void make_sine(maker_t *m, sine_config_t *c)
 {
     const int32_t n = periods(m);
-    if (n < CARRIER_LEAST || carriers * n > WINDOW_MOST) {
-        refuse(m, DRIVE_PARAM_f_injection,
-               carriers > 1 ? "must lie between a twentieth and an eighth of f_pwm"
-                            : "must lie between a fortieth and an eighth of f_pwm");
+    if (n < CARRIER_LEAST || n > WINDOW_MOST) {
+        refuse(m, DRIVE_PARAM_f_injection, "must lie between a fortieth and an eighth of f_pwm");
         return;
     }
     c->v_h = per_unit(m, DRIVE_PARAM_v_injection, m->base.v);
-    c->length = (uint16_t)(carriers * n);
-    c->per_length = fixed(m, pm_num_ratio(1, carriers * n), FRAC_BITS, DRIVE_PARAM_f_injection);
+    c->n = (uint16_t)n;
+    c->per_n = fixed(m, pm_num_ratio(1, n), FRAC_BITS, DRIVE_PARAM_f_injection);
     c->step = UINT32_MAX / (uint32_t)n;
     c->lag = 3U * (c->step / 2U) + PM_TURN(0.25);
 }

@@ -23,5 +23,6 @@
 #define PM_WITHOUT_inform 1
 #define PM_WITHOUT_pwm_excitation 1
 #define PM_WITHOUT_pulsating_sine 1
+#define PM_WITHOUT_stationary_sine 1
 
 #endif

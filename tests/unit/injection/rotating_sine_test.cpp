@@ -93,7 +93,7 @@ TEST(RotatingSine, TheSameCarrierAfterEveryTurn)
     rotating_sine_t self;
     rotating_sine_reset(&self, &own, &none);
     std::vector<pm_ab_t> first;
-    for (int k = 0; k < 5 * own.sine.length; ++k) {
+    for (int k = 0; k < 5 * own.sine.n; ++k) {
         injection_in_t in = {};
         in.dir = bench::direction(0);
         in.ahead = {1 << 30, 0};
@@ -101,16 +101,16 @@ TEST(RotatingSine, TheSameCarrierAfterEveryTurn)
         rotating_sine_step(&self, &own, &in, &out);
         EXPECT_EQ(out.eps, 0);
         EXPECT_NEAR(std::abs(bench::complex(out.carrier.v)) * rig::kBase.v_V, 35, 1e-4);
-        if (k < own.sine.length) {
+        if (k < own.sine.n) {
             first.push_back(out.carrier.v);
-            const double angle = 2 * bench::kPi * k / own.sine.length;
+            const double angle = 2 * bench::kPi * k / own.sine.n;
             EXPECT_LT(
                 std::abs(bench::complex(out.carrier.v) * rig::kBase.v_V - 35.0 * std::polar(1.0, angle)),
                 1e-4)
                 << k;
         } else {
-            EXPECT_EQ(out.carrier.v.alpha, first[static_cast<size_t>(k % own.sine.length)].alpha);
-            EXPECT_EQ(out.carrier.v.beta, first[static_cast<size_t>(k % own.sine.length)].beta);
+            EXPECT_EQ(out.carrier.v.alpha, first[static_cast<size_t>(k % own.sine.n)].alpha);
+            EXPECT_EQ(out.carrier.v.beta, first[static_cast<size_t>(k % own.sine.n)].beta);
         }
     }
 }
