@@ -8,5 +8,6 @@
 #include "injection/pwm_excitation.h"
 #include "injection/rotating_sine.h"
 #include "injection/stationary_sine.h"
+#include "injection/stationary_square.h"
 
 #endif

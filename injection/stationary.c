@@ -13,13 +13,14 @@ void stationary_reset(stationary_t *self, const stationary_config_t *config)
     self->finding = config->find ? STATIONARY_VALUES : 0U;
 }
 
-bool stationary_find(stationary_t *self, const stationary_config_t *config, pm_q_t along, pm_dir_t dir,
+bool stationary_find(stationary_t *self, const stationary_config_t *config, pm_q_t along, const obs_in_t *in,
                      pm_q_t i_p)
 {
     const bool beta = stationary_on_beta(self);
-    const int32_t cos_twice = pm_mulh(dir.cos, dir.cos) - pm_mulh(dir.sin, dir.sin); /* Q30 */
-    const pm_q_t salient = pm_shl(pm_mulh(config->i_n, cos_twice), 2);
-    const pm_q_t found = pm_div(beta ? along + salient : along - salient, i_p);
+    const pm_half_dir_t twice = pm_dir_sum(in->dir, in->dir);
+    const pm_q_t turned = pm_shl(pm_sat(pm_mulh(in->omega, config->between), 16), PM_Q_BITS - 16);
+    const pm_q_t moved = pm_mul(pm_shl(pm_mulh(config->i_n, twice.sin), 2), turned);
+    const pm_q_t found = pm_div(along - moved, i_p);
     self->found += pm_frac(pm_clamp(found, FOUND_LEAST, FOUND_MOST), PER_VALUES);
     self->finding--;
     return self->finding == 0U || beta != stationary_on_beta(self);

@@ -69,8 +69,9 @@ static void look(stationary_sine_t *self, const stationary_sine_config_t *config
     }
     if (stationary_finding(&self->stationary)) {
         /* without what dead time takes: |answer| / cos delta */
-        const pm_q_t full = pm_div(pm_hypot(answer.d, answer.q), pm_max(self->phase.cos >> 3, PM_Q(0.5)));
-        if (stationary_find(&self->stationary, &config->stationary, full, in->dir, i_p)) {
+        const pm_q_t full =
+            pm_div(pm_hypot(answer.d, answer.q), pm_max(pm_unit(PM_ONE, self->phase.cos), PM_Q(0.5)));
+        if (stationary_find(&self->stationary, &config->stationary, full, in, i_p)) {
             sine_reset(&self->sine, &config->sine, in->i_dq);
         }
     }
@@ -84,8 +85,7 @@ void stationary_sine_slow(stationary_sine_t *self, const stationary_sine_config_
     if (self->sine.warm == 0U) {
         look(self, config, in, i_p);
     }
-    const pm_q_t known = stationary_finding(&self->stationary) ? i_p : pm_mul(self->stationary.found, i_p);
-    self->i_p = pm_unit(known, self->phase.cos);
+    self->i_p = pm_unit(stationary_i_p(&self->stationary, i_p), self->phase.cos);
     const pm_q_t turn = pm_mul(config->tau, in->omega) - 2 * saliency_shift(&config->saliency, i_q);
     self->turn = pm_dir((pm_angle_t)pm_rad_to_angle(turn));
 }

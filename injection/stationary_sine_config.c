@@ -15,7 +15,7 @@ static pm_num_t slope(const maker_t *m)
 void make_stationary_sine(maker_t *m, stationary_sine_config_t *c)
 {
     make_sine(m, &c->sine);
-    make_stationary(m, &c->stationary, slope(m));
+    make_stationary(m, &c->stationary, slope(m), (uint16_t)(c->sine.n + 2U));
     make_saliency_sequence(m, &c->saliency, sine_flux(m));
     const pm_num_t tau = pm_num_mul(pm_num_ratio((int32_t)c->sine.n - 1, 2), m->base.t_s);
     c->tau = fixed(m, pm_num_mul(tau, m->base.omega), Q_BITS, DRIVE_PARAM_f_pwm);

@@ -24,5 +24,6 @@
 #define PM_WITHOUT_pwm_excitation 1
 #define PM_WITHOUT_pulsating_sine 1
 #define PM_WITHOUT_stationary_sine 1
+#define PM_WITHOUT_stationary_square 1
 
 #endif

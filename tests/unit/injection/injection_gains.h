@@ -35,6 +35,14 @@ inline Names must_be_positive(const stationary_sine_config_t &c)
                            {"stationary tau", c.tau}});
 }
 
+inline Names must_be_positive(const stationary_square_config_t &c)
+{
+    return {{"square v_h", c.v_h},
+            {"square gain_0", c.saliency.gain_0},
+            {"square i_p_0", c.saliency.i_p_0},
+            {"square i_n", c.stationary.i_n}};
+}
+
 inline Names must_be_positive(const inform_config_t &c)
 {
     return {{"inform v_h", c.v_h}, {"inform gain_0", c.axes.saliency.gain_0}, {"inform lag", c.axes.lag}};
