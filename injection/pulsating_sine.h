@@ -15,7 +15,7 @@
  *
  * A frame that turns makes no error: the carrier's flux across d lags it by a quarter of a period.
  * eps is exact for small e and 1/2 sin 2e beyond. misfit: h_d against its value without load, relative. Bandwidths:
- * sine.h. Each period 100 instructions; delta at 1 kHz. Functions as injection.h says.
+ * sine.h. Each period 135 instructions; delta at 1 kHz. Functions as injection.h says.
  * Tests: tests/unit/injection/pulsating_sine_test.cpp, tests/scenario/pulsating_sine.yaml. */
 #ifndef INJECTION_PULSATING_SINE_H
 #define INJECTION_PULSATING_SINE_H

@@ -4,10 +4,11 @@
  *   f_h  = f_pwm / N,  a = 2 pi / N,  phi_k = k a: phase of the voltage for [k+1, k+2)
  *   F    = V_h T_s / (2 sin(a / 2)):  flux amplitude at the samples, of a voltage in steps
  *   phi' = phi_k - 1.5 a - pi / 2:    phase of the current at k, of a voltage that was commanded 1.5 periods ago
- * The window takes the current at the phase phi' over a period of the carrier (window.h). For so long after a reset, and until the first answer, it holds other things too and is not to be read.
+ * The window takes the current at the phase phi' over a period of the carrier (window.h). For so long after a reset, and
+ * until the first answer, it holds other things too and is not to be read.
  *
- * The samples in it are (N - 1) / 2 periods old, and so is the mean of the current: current control is slowed
- * while the source leads, to a phase of 0.4 rad, and the position loop may have 0.3 rad. */
+ * The samples in it are (N - 1) / 2 periods old, and so is the mean of the current: current control is slowed while the
+ * source leads, to a phase of 0.4 rad, and the position loop may have 0.3 rad. */
 #ifndef INJECTION_SINE_H
 #define INJECTION_SINE_H
 

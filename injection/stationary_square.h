@@ -12,7 +12,7 @@
  *
  * Whatever the estimate is, the carrier is the same. eps is exact for small errors and 1/2 sin 2e beyond; it is 0 in the
  * first four steps after a reset and held in those after a change of the axis. misfit: mean |y| against I_n, relative. The
- * fundamental current is the mean of two samples. Each period 75 instructions; I_p and the turn at 1 kHz. Functions as
+ * fundamental current is the mean of two samples. Each period 110 instructions; I_p and the turn at 1 kHz. Functions as
  * injection.h says.
  * Tests: tests/unit/injection/stationary_square_test.cpp, tests/scenario/stationary_square.yaml. */
 #ifndef INJECTION_STATIONARY_SQUARE_H
