@@ -2,13 +2,14 @@
  * stationary frame (METHODS.md 4.3.1 to 4.4.3).
  *
  *   square     +-V_h along d of the estimated frame, alternating each period: f_h = f_pwm / 2
- *   rotating   V_h e^{j phi} in the estimated frame, phi = 2 pi k / N: f_h = f_pwm / N, whole N. Seen from
+ *   pulsating  V_h cos phi along d, phi = 2 pi k / N: f_h = f_pwm / N, whole N
+ *   rotating   V_h e^{j phi} in the estimated frame, phi likewise. Seen from
  *              the stator it turns with omega_h + omega; in the estimated frame all amplitudes are constant,
  *              so that a window of N samples nulls what it must at any speed.
  *   axis       V_h along an axis of the stator, whatever the estimate (axes.h).
  * `ahead` is half of the direction of the estimated frame in the middle of the period in which the voltage
- * acts; amplitudes are Q30, below 2. Two products for the square wave, six for the rotating one. A carrier
- * knows nothing of how its answer is read. Tests: tests/unit/injection. */
+ * acts; amplitudes are Q30, below 2. Two products for the square wave, three for the pulsating one, six for the
+ * rotating one. A carrier knows nothing of how its answer is read. Tests: tests/unit/injection. */
 #ifndef INJECTION_CARRIER_H
 #define INJECTION_CARRIER_H
 
@@ -45,6 +46,12 @@ static inline void carrier_advance(carrier_phase_t *self, uint16_t n)
     if (self->at >= n) {
         self->at = 0;
     }
+}
+
+/* Voltage of amplitude x (Q30) along d, swinging with the cosine of `phase`, as a signal. */
+static inline pm_ab_t carrier_pulsating(int32_t x, pm_dir_t phase, pm_half_dir_t ahead)
+{
+    return carrier_along_d(pm_unit(x, phase.cos), ahead);
 }
 
 /* Voltage of amplitude x (Q30) at `phase` before d, as a signal. */

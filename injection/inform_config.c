@@ -1,11 +1,6 @@
 #include "injection/inform.h"
 #include "injection/saliency_config.h"
 
-static pm_num_t flux(const maker_t *m)
-{
-    return pm_num_mul(si(m, DRIVE_PARAM_v_injection), m->base.t_s);
-}
-
 /* The fundamental current is half a period old in the mean, as that of the square wave. */
 injection_limits_t inform_limits(const maker_t *m)
 {
@@ -15,12 +10,12 @@ injection_limits_t inform_limits(const maker_t *m)
 
 void make_inform(maker_t *m, inform_config_t *c)
 {
-    make_axes(m, &c->axes, flux(m));
+    make_axes(m, &c->axes, flux_of_period(m));
     c->v_h = per_unit(m, DRIVE_PARAM_v_injection, m->base.v);
 }
 
 /* The mean of a round of differences of two samples has the noise of one / sqrt(6). */
 pm_num_t inform_answer(const maker_t *m)
 {
-    return pm_num_mul(axes_amplitude(m, flux(m)), pm_num_sqrt(pm_num(6)));
+    return pm_num_mul(axes_amplitude(m, flux_of_period(m)), pm_num_sqrt(pm_num(6)));
 }

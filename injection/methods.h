@@ -3,8 +3,11 @@
 #define INJECTION_METHODS_H
 
 #include "injection/inform.h"
+#include "injection/pulsating_sine.h"
 #include "injection/pulsating_square.h"
 #include "injection/pwm_excitation.h"
 #include "injection/rotating_sine.h"
+#include "injection/stationary_sine.h"
+#include "injection/stationary_square.h"
 
 #endif

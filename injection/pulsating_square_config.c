@@ -1,11 +1,6 @@
 #include "injection/pulsating_square.h"
 #include "injection/saliency_config.h"
 
-static pm_num_t flux(const maker_t *m)
-{
-    return pm_num_mul(si(m, DRIVE_PARAM_v_injection), m->base.t_s);
-}
-
 /* The mean of two samples is half a period old: up to there control of the current overshoots by a tenth. */
 injection_limits_t pulsating_square_limits(const maker_t *m)
 {
@@ -14,8 +9,8 @@ injection_limits_t pulsating_square_limits(const maker_t *m)
 
 void make_pulsating_square(maker_t *m, pulsating_square_config_t *c)
 {
-    const pm_num_t h_d = pm_num_div(pm_num_div(flux(m), si(m, DRIVE_PARAM_L_d)), m->base.i);
-    make_saliency_across(m, &c->saliency, flux(m));
+    const pm_num_t h_d = pm_num_div(pm_num_div(flux_of_period(m), si(m, DRIVE_PARAM_L_d)), m->base.i);
+    make_saliency_across(m, &c->saliency, flux_of_period(m));
     c->v_h = per_unit(m, DRIVE_PARAM_v_injection, m->base.v);
     c->h_d = fixed(m, h_d, Q_BITS, DRIVE_PARAM_v_injection);
     c->h_d_inverse = fixed(m, pm_num_div(pm_num(1), h_d), SMALL_BITS, DRIVE_PARAM_v_injection);
@@ -27,5 +22,5 @@ void make_pulsating_square(maker_t *m, pulsating_square_config_t *c)
 pm_num_t pulsating_square_answer(const maker_t *m)
 {
     const inductances_t L = inductances_at_zero(m);
-    return pm_num_div(slope_across(&L, flux(m)), pm_num(2));
+    return pm_num_div(slope_across(&L, flux_of_period(m)), pm_num(2));
 }

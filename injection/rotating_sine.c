@@ -2,41 +2,33 @@
 
 #include "firmware/math/root.h"
 
-/* From the first command to the first answer. */
-#define ANSWER 2U
 /* A transient of the current must not turn the correction further than the inverter could: rad. */
 #define RHO_MOST PM_Q(0.5)
 
 void rotating_sine_reset(rotating_sine_t *self, const rotating_sine_config_t *config, const obs_in_t *in)
 {
-    window_reset(&self->window, config->n, in->i_dq);
+    sine_reset(&self->sine, &config->sine, in->i_dq);
     self->turn = pm_dir((pm_angle_t)pm_rad_to_angle(pm_shl(config->rho_0, 1)));
     self->gain = config->saliency.gain_0;
     self->negative = (pm_dq_t){0, 0};
     self->eps = 0;
     self->misfit = 0;
-    self->phase = (carrier_phase_t){0};
-    self->warm = (uint16_t)(config->n + ANSWER);
 }
 
 void rotating_sine_step(rotating_sine_t *self, const rotating_sine_config_t *config, const injection_in_t *in,
                         injection_out_t *out)
 {
-    const pm_angle_t phi = carrier_angle(&self->phase, config->step);
-    window_step(&self->window, self->phase.at, pm_dir(phi - config->lag), pm_park(in->i, in->dir));
-    carrier_advance(&self->phase, config->n);
-    const pm_dq_t negative = window_negative(&self->window, config->per_n);
+    const pm_angle_t phi = sine_step(&self->sine, &config->sine, pm_park(in->i, in->dir));
+    const pm_dq_t negative = window_negative(&self->sine.window, config->sine.per_n);
     self->negative = negative;
-    if (self->warm > 0U) {
-        self->warm--;
-    } else {
+    if (sine_ready(&self->sine)) {
         const pm_q_t across = pm_shl(pm_mulh2(negative.q, self->turn.cos, negative.d, self->turn.sin), 1);
         self->eps = pm_small_gain(pm_small(across), self->gain);
     }
     out->eps = self->eps;
-    out->i = window_mean(&self->window, config->per_n);
-    const int32_t v_h = pm_shl(config->v_h, 30 - PM_Q_BITS);
-    out->carrier = (excitation_t){.v = carrier_rotating(v_h, pm_dir(phi), in->ahead)};
+    out->i = sine_mean(&self->sine, &config->sine);
+    out->carrier =
+        (excitation_t){.v = carrier_rotating(sine_amplitude(&config->sine), pm_dir(phi), in->ahead)};
 }
 
 /* p of the header. */
@@ -57,10 +49,10 @@ void rotating_sine_slow(rotating_sine_t *self, const rotating_sine_config_t *con
 {
     const pm_q_t i_q = in->i_dq.q;
     const pm_q_t i_p = saliency_i_p(&config->saliency, i_q);
-    const pm_dq_t positive = window_positive(&self->window, config->per_n);
+    const pm_dq_t positive = window_positive(&self->sine.window, config->sine.per_n);
     pm_q_t rho = config->rho_0;
     self->gain = saliency_gain(&config->saliency, i_q);
-    if (self->warm == 0U) {
+    if (self->sine.warm == 0U) {
         self->misfit = pm_div(pm_hypot(positive.d, positive.q) - i_p, i_p);
         if (config->positive_sequence) {
             const pm_q_t measured = pm_angle_to_rad((int32_t)pm_atan2(positive.q, positive.d));

@@ -1,12 +1,11 @@
 /* Rotating sine injection, negative sequence demodulated, with what the inverter and the resistance do to it
  * taken from the positive sequence (METHODS.md 4.4.1, 5.6.4.2, 5.7; row 39).
  *
- * Added in the estimated frame (carrier.h), f_h = f_pwm / N:
+ * Added in the estimated frame (carrier.h), with phi, phi' and F of sine.h:
  *   v = V_h e^{j phi_k}
- * The answer in that frame, a = 2 pi / N, delay of 1.5 periods from command to sample:
+ * The answer in that frame, e: position error:
  *   i   = i_f + I_p e^{j (phi' + rho)} + I_n e^{j (-phi' + 2 e + theta_m - 2 rho')}
- *   phi' = phi_k - 1.5 a - pi / 2,  e: position error
- *   F   = V_h T_s / (2 sin(a / 2)),  I_p = F L_sa / D,  I_n = F K / D
+ *   I_p = F L_sa / D,  I_n = F K / D
  * rho comes from the resistance and from what dead time and leg capacitance add to it. A window of N samples
  * (window.h) gives the fundamental current i_f and the complex amplitudes of both sequences:
  *   rho_m = arg of the positive sequence,  rho_0 = R / (omega_h L_p): without the inverter
@@ -17,8 +16,7 @@
  * Of a nearly round machine, kappa < 0.1, the second amplifies every error of rho_0: p stays 3/4.
  *
  * eps is exact for small e and 1/2 sin 2e beyond. misfit: the positive sequence against I_p(i_q), relative. The
- * fundamental current is (N - 1) / 2 periods old: current control is slowed while this source leads, to a phase
- * of 0.4 rad, and the position loop may have 0.3 rad. Both bandwidths must suit the machine: with those of the
+ * bandwidths that sine.h allows must also suit the machine: with those of the
  * scenario, 7 Hz for the position and 2 Hz for the speed, a compressor of 2e-4 kg m2 loses its position under a
  * load of 0.3 s rise. Each period 120 instructions; rho' at 1 kHz.
  * State 400 bytes. Functions as injection.h says. Tests: tests/unit/injection/rotating_sine_test.cpp,
@@ -26,37 +24,29 @@
 #ifndef INJECTION_ROTATING_SINE_H
 #define INJECTION_ROTATING_SINE_H
 
-#include "firmware/math/window.h"
-#include "injection/carrier.h"
 #include "injection/saliency.h"
-#include "injection/source.h"
+#include "injection/sine.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
 typedef struct {
-    pm_q_t v_h;
+    sine_config_t sine;
     saliency_config_t saliency;
-    pm_q_t rho_0;    /* rad */
-    pm_q_t rho_m0;   /* rho_0 (1 + kappa^2) */
-    pm_frac_t per_n; /* 1 / N */
-    pm_angle_t step; /* a */
-    pm_angle_t lag;  /* 1.5 a + a quarter of a turn */
-    uint16_t n;
+    pm_q_t rho_0;           /* rad */
+    pm_q_t rho_m0;          /* rho_0 (1 + kappa^2) */
     bool with_load;         /* p depends on the load */
     bool positive_sequence; /* rho' from rho_m; else rho_0 alone */
 } rotating_sine_config_t;
 
 typedef struct {
-    window_t window;
+    sine_t sine;
     pm_dir_t turn; /* e^{j (2 rho' - theta_m)} */
     int32_t gain;  /* rad per unit of current, Q20 */
     pm_dq_t negative;
     pm_q_t eps;
     pm_q_t misfit;
-    carrier_phase_t phase;
-    uint16_t warm; /* periods until the window holds nothing but answers to the carrier */
 } rotating_sine_t;
 
 void rotating_sine_reset(rotating_sine_t *self, const rotating_sine_config_t *config, const obs_in_t *in);

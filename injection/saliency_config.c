@@ -16,6 +16,11 @@ inductances_t inductances_at_rated(const maker_t *m)
                            si(m, DRIVE_PARAM_L_dqh_rated)};
 }
 
+pm_num_t flux_of_period(const maker_t *m)
+{
+    return pm_num_mul(si(m, DRIVE_PARAM_v_injection), m->base.t_s);
+}
+
 static pm_num_t saliency_d(const inductances_t *L)
 {
     return pm_num_sub(pm_num_mul(L->L_d, L->L_q), square(L->L_dq));

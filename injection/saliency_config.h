@@ -16,6 +16,9 @@ typedef struct {
 inductances_t inductances_at_zero(const maker_t *m);
 inductances_t inductances_at_rated(const maker_t *m);
 
+/* Of V_h over a PWM period, Wb: that of a square wave. */
+pm_num_t flux_of_period(const maker_t *m);
+
 /* Current per radian of a source's error signal, for a carrier of the given flux (Wb). */
 pm_num_t slope_across(const inductances_t *L, pm_num_t flux);   /* of h_q + lambda h_d */
 pm_num_t slope_sequence(const inductances_t *L, pm_num_t flux); /* of the negative sequence: 2 I_n */

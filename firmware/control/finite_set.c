@@ -8,14 +8,13 @@
 /* Wide enough for any voltage that deadbeat control asks for. */
 #define V_ANY PM_Q(7.9)
 
-#define HIGH          PM_LEG_HIGH
-#define LOW           PM_LEG_LOW
-#define HELD(a, b, c) (uint16_t)((uint32_t)(a) | (uint32_t)(b) << 4U | (uint32_t)(c) << 8U)
+#define HIGH PM_LEG_HIGH
+#define LOW  PM_LEG_LOW
 
 /* Of e_0 ... e_5. */
 static const uint16_t legs_of[SECTORS] = {
-    HELD(HIGH, LOW, LOW),  HELD(HIGH, HIGH, LOW), HELD(LOW, HIGH, LOW),
-    HELD(LOW, HIGH, HIGH), HELD(LOW, LOW, HIGH),  HELD(HIGH, LOW, HIGH),
+    PM_LEGS_OF(HIGH, LOW, LOW),  PM_LEGS_OF(HIGH, HIGH, LOW), PM_LEGS_OF(LOW, HIGH, LOW),
+    PM_LEGS_OF(LOW, HIGH, HIGH), PM_LEGS_OF(LOW, LOW, HIGH),  PM_LEGS_OF(HIGH, LOW, HIGH),
 };
 
 void finite_set_reset(finite_set_t *self, const finite_set_config_t *config, pm_dq_t v, pm_dq_t i,
@@ -83,9 +82,9 @@ void finite_set_step(finite_set_t *self, const finite_set_config_t *config, cons
     /* Q25 with a direction of Q30: Q23. Far beyond the link, only the direction counts. */
     const pm_dq_t v = {.d = pm_shl(pm_sat(wanted.v.d, 28), 3), .q = pm_shl(pm_sat(wanted.v.q, 28), 3)};
     const nearest_t n = nearest_to(pm_park_inverse_quarter(v, in->ahead));
-    const pm_q_t third = pm_frac(in->v_dc, PM_FRAC(1.0 / 3));
+    const pm_q_t third = pm_frac(in->v_dc, PM_FRAC(1.0 / 3 / 32)); /* Q23 */
     pm_ab_t given = {.alpha = 0, .beta = 0};
-    if (n.along > (third >> (PM_Q_BITS - 23))) {
+    if (n.along > third) {
         given = voltage_of(n.sector, in->v_dc);
         self->legs = legs_of[n.sector];
     } else {
@@ -95,7 +94,7 @@ void finite_set_step(finite_set_t *self, const finite_set_config_t *config, cons
     const pm_dq_t dq = {.d = pm_mulh_add(pm_mulh(given.alpha, in->ahead.cos), given.beta, in->ahead.sin),
                         .q = pm_mulh_sub(pm_mulh(given.beta, in->ahead.cos), given.alpha, in->ahead.sin)};
     self->deadbeat.v = (pm_dq_t){.d = pm_shl(dq.d, 2), .q = pm_shl(dq.q, 2)};
-    out->v = (pm_dq_t){.d = dq.d >> (26 - PM_WIDE_BITS), .q = dq.q >> (26 - PM_WIDE_BITS)};
+    out->v = (pm_dq_t){.d = pm_widen(self->deadbeat.v.d), .q = pm_widen(self->deadbeat.v.q)};
     out->legs = self->legs;
     const pm_wide_t beyond = pm_widen(in->v_dc);
     out->limited = out->limited || pm_abs(wanted.v.d) > beyond || pm_abs(wanted.v.q) > beyond;

@@ -23,5 +23,8 @@
 #define PM_WITHOUT_rotating_sine 1
 #define PM_WITHOUT_inform 1
 #define PM_WITHOUT_pwm_excitation 1
+#define PM_WITHOUT_pulsating_sine 1
+#define PM_WITHOUT_stationary_sine 1
+#define PM_WITHOUT_stationary_square 1
 
 #endif

@@ -27,9 +27,11 @@ typedef enum {
 #define PM_LEGS_OFF        PM_LEGS_ALL(PM_LEG_OFF)
 #define PM_LEGS_PWM        PM_LEGS_ALL(PM_LEG_PWM)
 
+#define PM_LEGS_OF(a, b, c) (uint16_t)((uint32_t)(a) | (uint32_t)(b) << 4U | (uint32_t)(c) << 8U)
+
 static inline uint16_t pm_legs_of(pm_leg_t a, pm_leg_t b, pm_leg_t c)
 {
-    return (uint16_t)((uint32_t)a | (uint32_t)b << 4U | (uint32_t)c << 8U);
+    return PM_LEGS_OF(a, b, c);
 }
 
 static inline pm_leg_t pm_leg(uint16_t legs, uint32_t leg)

@@ -4,8 +4,10 @@
  *   mean     = 1/N sum x
  *   positive = 1/N sum x e^{-j phi},   the part of x that turns with e^{+j phi}
  *   negative = 1/N sum x e^{+j phi},   the part that turns with e^{-j phi}
+ *   cosine   = 1/N sum x cos phi,      half the part of x that swings with cos phi
+ *   sine     = 1/N sum x sin phi
  * over the last N samples; phi turns once in N samples and is the same at the same place of the window, to the
- * last bit. Each amplitude is free of the mean and of the other one. The sums are exact, so nothing drifts;
+ * last bit. Each amplitude is free of the mean, positive and negative of each other, cosine and sine likewise. The sums are exact, so nothing drifts;
  * samples are rounded to 2^-24. Delay (N - 1) / 2 samples.
  *
  * window_reset() fills the window with a constant. window_step() costs 44 instructions, 12 of which are multiply-
@@ -65,6 +67,18 @@ static inline pm_dq_t window_negative(const window_t *self, pm_frac_t per_n)
     pm_dq_t r;
     r.d = window_amplitude(self->dc - self->qs, per_n);
     r.q = window_amplitude(self->ds + self->qc, per_n);
+    return r;
+}
+
+static inline pm_dq_t window_cosine(const window_t *self, pm_frac_t per_n)
+{
+    const pm_dq_t r = {window_amplitude(self->dc, per_n), window_amplitude(self->qc, per_n)};
+    return r;
+}
+
+static inline pm_dq_t window_sine(const window_t *self, pm_frac_t per_n)
+{
+    const pm_dq_t r = {window_amplitude(self->ds, per_n), window_amplitude(self->qs, per_n)};
     return r;
 }
 

@@ -11,12 +11,36 @@ inline Names must_be_positive(const pulsating_square_config_t &c)
     return {{"v_h", c.v_h}, {"gain_0", c.saliency.gain_0}, {"h_d", c.h_d}, {"h_d_inverse", c.h_d_inverse}};
 }
 
+inline Names and_of(const sine_config_t &c, Names own)
+{
+    own.insert(own.end(), {{"sine v_h", c.v_h}, {"sine per_n", c.per_n}, {"sine n", c.n - 7}});
+    return own;
+}
+
 inline Names must_be_positive(const rotating_sine_config_t &c)
 {
-    return {{"sine v_h", c.v_h},
-            {"sine gain_0", c.saliency.gain_0},
-            {"sine per_n", c.per_n},
-            {"sine n", c.n - 7}};
+    return and_of(c.sine, {{"sine gain_0", c.saliency.gain_0}});
+}
+
+inline Names must_be_positive(const pulsating_sine_config_t &c)
+{
+    return and_of(c.sine, {{"pulsating gain_0", c.saliency.gain_0}, {"pulsating h_d", c.h_d}});
+}
+
+inline Names must_be_positive(const stationary_sine_config_t &c)
+{
+    return and_of(c.sine, {{"stationary gain_0", c.saliency.gain_0},
+                           {"stationary i_p_0", c.saliency.i_p_0},
+                           {"stationary i_n", c.stationary.i_n},
+                           {"stationary tau", c.tau}});
+}
+
+inline Names must_be_positive(const stationary_square_config_t &c)
+{
+    return {{"square v_h", c.v_h},
+            {"square gain_0", c.saliency.gain_0},
+            {"square i_p_0", c.saliency.i_p_0},
+            {"square i_n", c.stationary.i_n}};
 }
 
 inline Names must_be_positive(const inform_config_t &c)

@@ -50,6 +50,15 @@ class Window
         return complex(window_positive(&self_, per_n()));
     }
 
+    Complex cosine() const
+    {
+        return complex(window_cosine(&self_, per_n()));
+    }
+    Complex sine() const
+    {
+        return complex(window_sine(&self_, per_n()));
+    }
+
     // 1/N sum x e^{j sign phi} in double precision.
     Complex reference(int sign) const
     {
@@ -95,6 +104,10 @@ TEST(Window, AmplitudesAreThoseOfTheLastSamples)
             EXPECT_LT(std::abs(w.mean() - w.reference(0)), kRounding) << n << ' ' << k;
             EXPECT_LT(std::abs(w.negative() - w.reference(1)), kRounding + kDirection) << n << ' ' << k;
             EXPECT_LT(std::abs(w.positive() - w.reference(-1)), kRounding + kDirection) << n << ' ' << k;
+            const Complex cosine = (w.reference(1) + w.reference(-1)) / 2.0;
+            const Complex sine = (w.reference(1) - w.reference(-1)) / Complex(0, 2);
+            EXPECT_LT(std::abs(w.cosine() - cosine), kRounding + kDirection) << n << ' ' << k;
+            EXPECT_LT(std::abs(w.sine() - sine), kRounding + kDirection) << n << ' ' << k;
         }
     }
 }
