@@ -25,7 +25,7 @@ void stationary_square_reset(stationary_square_t *self, const stationary_square_
 }
 
 /* The second difference with the sign of the carrier, which two periods ago was that of the coming one. */
-static inline pm_dq_t difference(stationary_square_t *self, pm_ab_t i, pm_dir_t dir)
+static inline pm_dq_t second_difference(stationary_square_t *self, pm_ab_t i, pm_dir_t dir)
 {
     const pm_ab_t change = {i.alpha - self->i.alpha, i.beta - self->i.beta};
     const pm_dq_t now = pm_park_half(change, dir);
@@ -42,7 +42,7 @@ void stationary_square_step(stationary_square_t *self, const stationary_square_c
     (void)config;
     const pm_ab_t twice = {in->i.alpha + self->i.alpha, in->i.beta + self->i.beta};
     self->carrier = -self->carrier;
-    const pm_dq_t h = difference(self, in->i, in->dir);
+    const pm_dq_t h = second_difference(self, in->i, in->dir);
     if (self->warm <= STATIONARY_SQUARE_SETTLED) {
         const pm_dq_t known = pm_park(stationary_on(&self->stationary, self->i_p), in->dir);
         const pm_dq_t left = {h.d - known.d, h.q - known.q};

@@ -28,7 +28,8 @@ NOISE = 0.5  # LSB
 SPEED = 0.05
 CARRIER_S = 0.2  # the current of the carrier is taken from so much of a trace
 TRAITS = {"SOURCE_HALF_TURN": "poles half a turn apart look alike", "SOURCE_THIRD_TURN": "poles a third of a turn apart "
-          "look alike", "SOURCE_EVENTS": "speaks on events only", "SOURCE_ONE_WAY": "carrier turns one way"}
+          "look alike", "SOURCE_EVENTS": "speaks on events only", "SOURCE_ONE_WAY": "carrier turns one way",
+          "SOURCE_STATOR": "carrier stands in the stator"}
 
 
 class Source(common.Study):
