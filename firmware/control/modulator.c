@@ -24,7 +24,7 @@ static inline centred_t centred(pm_ab_t v)
     const pm_q_t a = v.alpha + pm_half(v.alpha);
     const pm_q_t b = pm_mulh_sub(v.beta, v.beta, PM_FRAC(0.133974596215561353)); /* 1 - sqrt(3)/2 */
     const pm_q_t size = pm_magnitude(b);
-    const pm_q_t beyond = a - pm_clamp(a, -size, size);
+    const pm_q_t beyond = pm_max(a - size, 0) + pm_min(a + size, 0); /* of -size ... size; one of both is 0 */
     const pm_q_t zero = pm_half(beyond);
     return (centred_t){
         .leg = {.a = a - zero, .b = b - zero, .c = b + zero},
