@@ -27,6 +27,30 @@ static void set_leg(const hal_t *hal, int leg, const drive_out_t *out, plant_pwm
     pwm->driven[leg] = state != PM_LEG_OFF && hal->armed;
 }
 
+static plant_leg_state_t state_of(pm_leg_t state)
+{
+    switch (state) {
+    case PM_LEG_HIGH:
+        return PLANT_LEG_HIGH;
+    case PM_LEG_LOW:
+        return PLANT_LEG_LOW;
+    default:
+        return switches_of(state);
+    }
+}
+
+void sim_commutate(hal_t *hal, uint16_t legs)
+{
+    plant_leg_state_t state[PLANT_LEGS] = {PLANT_LEG_PWM};
+    bool driven[PLANT_LEGS] = {false};
+    for (uint32_t leg = 0; leg < DRIVE_LEGS; ++leg) {
+        const pm_leg_t wanted = pm_leg(legs, leg);
+        state[leg] = state_of(wanted);
+        driven[leg] = wanted != PM_LEG_OFF && hal->armed;
+    }
+    plant_drive_legs(hal->plant, driven, state);
+}
+
 void hal_bridge_write(hal_t *hal, const drive_out_t *out)
 {
     plant_pwm_t pwm = {0};
@@ -37,6 +61,8 @@ void hal_bridge_write(hal_t *hal, const drive_out_t *out)
     for (int n = 0; n < PM_SAMPLES; ++n) {
         hal->sample_at[1][n] = out->instants.sample_at[n];
     }
+    hal->commutate_at[1] = out->instants.commutate_at;
+    hal->then[1] = out->instants.then;
     if (out->trip != 0U) {
         hal_bridge_off(hal);
     }

@@ -5,14 +5,14 @@
 
 #define MID_SCALE 0x8000
 
-/* Of the sensors that the plant has. Not yet: commutation within the period. */
+/* Of the sensors that the plant has. */
 uint32_t hal_channels(const hal_t *hal)
 {
     const plant_sensor_t *sensor = plant_sensor(hal->plant);
     const bool terminals = sensor->v_leg_full_scale_V > 0.0;
     const bool neutral = terminals || sensor->v_zero_full_scale_V > 0.0;
     const uint32_t all = NEEDS_SECOND_SAMPLE | NEEDS_CURRENT_MASK | NEEDS_HALVES | NEEDS_HELD |
-                         NEEDS_ONE_SWITCH | (terminals ? NEEDS_TERMINALS : 0U) |
+                         NEEDS_ONE_SWITCH | NEEDS_COMMUTATE | (terminals ? NEEDS_TERMINALS : 0U) |
                          (neutral ? NEEDS_NEUTRAL : 0U) |
                          (sensor->i_dc_full_scale_A > 0.0 ? NEEDS_DC_CURRENT : 0U) |
                          (sensor->capture_s > 0.0 ? NEEDS_CAPTURES : 0U);
@@ -25,18 +25,34 @@ static double count_s(const hal_t *hal)
     return 1.0 / (double)hal->timer_Hz;
 }
 
+/* In order of time: before a sample at that instant, or in what is left of the period. */
+static void commutate_before(hal_t *hal, uint32_t instant)
+{
+    const uint16_t at = hal->commutate_at[0];
+    if (at != 0U && at < instant) {
+        plant_move(hal->plant, at * count_s(hal));
+        sim_commutate(hal, hal->then[0]);
+        hal->commutate_at[0] = 0;
+    }
+}
+
 void sim_run_period(hal_t *hal)
 {
     hal->sampled = 0;
     for (uint32_t n = 0; n < PM_SAMPLES; n++) {
         const uint16_t at = hal->sample_at[0][n];
         if (at != 0U) {
+            commutate_before(hal, at);
             plant_sample_at(hal->plant, at * count_s(hal), &hal->sample[n]);
             hal->sampled = (uint16_t)(hal->sampled | (1U << n));
         }
         hal->sample_at[0][n] = hal->sample_at[1][n];
         hal->sample_at[1][n] = 0;
     }
+    commutate_before(hal, UINT32_MAX);
+    hal->commutate_at[0] = hal->commutate_at[1];
+    hal->then[0] = hal->then[1];
+    hal->commutate_at[1] = 0;
     plant_run_period(hal->plant);
     double after_s;
     if (plant_broke(hal->plant, &after_s)) {

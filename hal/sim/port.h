@@ -32,6 +32,7 @@ struct hal {
     bool broke;                        /* a break that is not reported yet */
     uint16_t timer_counts;             /* of half a period */
     uint16_t sample_at[2][PM_SAMPLES]; /* asked for: for this period, for the next */
+    uint16_t commutate_at[2], then[2]; /* the same */
     plant_adc_t sample[PM_SAMPLES];    /* taken in the last period ... */
     uint16_t sampled;                  /* ... bit n: so it was */
     uint32_t without;                  /* channels that are taken from what the plant has: NEEDS_... */
@@ -53,6 +54,9 @@ struct hal {
 
 /* The plant's period, with the samples that were asked for. Once a period after app_control(). */
 void sim_run_period(hal_t *hal);
+
+/* The legs change now, at the plant's present instant, until the next period. */
+void sim_commutate(hal_t *hal, uint16_t legs);
 
 /* A break of an instant, by the break input. */
 void sim_break(hal_t *hal);

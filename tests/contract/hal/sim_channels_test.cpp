@@ -226,6 +226,46 @@ TEST(SimChannels, LinkCurrentOfAHeldPair)
     EXPECT_EQ(port.in.more.i_dc, 32768);
 }
 
+// Asked for at k, done in [k+1, k+2): a twin whose legs are changed at that instant goes the same way, and one whose legs
+// change a count later does not.
+TEST(SimChannels, CommutatesAtItsInstant)
+{
+    const uint16_t at = 5000, then = pm_legs_of(PM_LEG_HIGH, PM_LEG_OFF, PM_LEG_LOW);
+    Port port(machine()), twin(machine()), late(machine());
+    for (Port *p : {&port, &twin, &late}) {
+        EXPECT_NE(hal_channels(&p->hal) & NEEDS_COMMUTATE, 0U);
+        ASSERT_TRUE(hal_bridge_arm(&p->hal));
+        p->out.legs = pm_legs_of(PM_LEG_HIGH, PM_LEG_LOW, PM_LEG_OFF);
+        for (int k = 0; k < 5; ++k) {
+            p->step();
+        }
+    }
+    port.out.instants.commutate_at = at;
+    port.out.instants.then = then;
+    port.step(); // k
+    port.out.instants.commutate_at = 0;
+    for (Port *p : {&twin, &late}) {
+        p->step();
+        plant_move(p->plant.get(), (at + (p == &late ? 1 : 0)) * kPeriod_s / (2 * kCounts));
+        sim_commutate(&p->hal, then);
+    }
+    const auto currents = [](const Port &p) {
+        plant_truth_t truth;
+        plant_truth(p.plant.get(), &truth);
+        return std::vector<double>{truth.i_A[0], truth.i_A[1], truth.i_A[2]};
+    };
+    for (Port *p : {&port, &twin, &late}) {
+        p->step(); // [k+1, k+2)
+    }
+    EXPECT_EQ(currents(port), currents(twin));
+    EXPECT_NE(currents(port), currents(late));
+    EXPECT_LT(currents(port)[2], -1e-3); // c has taken over
+    for (Port *p : {&port, &twin}) {
+        p->step(); // as the period before said: b again
+    }
+    EXPECT_EQ(currents(port), currents(twin));
+}
+
 // Leg a chopped against b, c off, rotor locked, at a duty d: from the upper rail d v_dc/(2 R) flows, to it
 // (1 - d) v_dc/(2 R); a leg whose switch leads to the rail of b's carries nothing, which both switches would
 // change.
