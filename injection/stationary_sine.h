@@ -15,7 +15,8 @@
  * Whatever the estimate is, the carrier is the same. eps is exact for small errors and 1/2 sin 2e beyond; it is 0 in the
  * first N + 2 steps after a reset and held in those after a change of the axis. misfit: |y| against I_n, relative.
  * Bandwidths: sine.h. Each period 180 instructions; I_p, delta and the turn at 1 kHz. Functions as injection.h says.
- * Tests: tests/unit/injection/stationary_sine_test.cpp, tests/scenario/stationary_sine.yaml. */
+ * Tests: tests/unit/injection/stationary_test.cpp, stationary_sine_test.cpp,
+ * tests/scenario/stationary_sine.yaml. */
 #ifndef INJECTION_STATIONARY_SINE_H
 #define INJECTION_STATIONARY_SINE_H
 

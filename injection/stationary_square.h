@@ -14,7 +14,8 @@
  * first four steps after a reset and held in those after a change of the axis. misfit: mean |y| against I_n, relative. The
  * fundamental current is the mean of two samples. Each period 110 instructions; I_p and the turn at 1 kHz. Functions as
  * injection.h says.
- * Tests: tests/unit/injection/stationary_square_test.cpp, tests/scenario/stationary_square.yaml. */
+ * Tests: tests/unit/injection/stationary_test.cpp, stationary_square_test.cpp,
+ * tests/scenario/stationary_square.yaml. */
 #ifndef INJECTION_STATIONARY_SQUARE_H
 #define INJECTION_STATIONARY_SQUARE_H
 

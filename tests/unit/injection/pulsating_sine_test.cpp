@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "tests/unit/injection/sine_rig.h"
+#include "tests/unit/injection/rig.h"
 
 namespace
 {
@@ -129,7 +129,7 @@ TEST(PulsatingSine, VoltageSwingsAlongD)
     run.error = -0.3;
     run.after(100);
     for (int k = 0; k < 100; ++k) {
-        const Complex v = bench::complex(run.given[static_cast<size_t>(k)]) * rig::kBase.v_V;
+        const Complex v = bench::complex(run.given[static_cast<size_t>(k)].v) * rig::kBase.v_V;
         const Complex expected = 35 * std::cos(2 * bench::kPi * k / 20) * std::polar(1.0, 0.4 + 0.3);
         EXPECT_LT(std::abs(v - expected), 1e-4) << k;
     }

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "tests/unit/injection/sine_rig.h"
+#include "tests/unit/injection/rig.h"
 
 namespace
 {

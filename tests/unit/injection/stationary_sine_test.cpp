@@ -1,8 +1,9 @@
+// What stationary_sine.h has beside stationary_test.cpp.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "tests/unit/injection/sine_rig.h"
+#include "tests/unit/injection/rig.h"
 
 namespace
 {
@@ -11,9 +12,6 @@ using bench::Complex;
 using bench::kDegree;
 using bench::Machine;
 
-// I_p - 3.7 times I_n - and the gain belong to a machine without resistance: (R / omega_h L)^2, 2e-3 of I_p.
-constexpr double kEps = 0.006;
-constexpr double kZero_deg = 0.3;
 // Detection on both axes and ten time constants of the stator.
 constexpr int kSettled = 1500;
 constexpr double kF = 35e-4 / (2 * 0.15643446504); // V_h T_s / (2 sin(pi / 20))
@@ -36,43 +34,6 @@ rig::Answer settled(const injection_config_t &c, double theta, double error_rad,
     run.R_ohm = R_ohm;
     run.i_dq_A = i_dq_A;
     return run.after(kSettled);
-}
-
-TEST(StationarySine, ErrorSignalIsHalfTheSineOfTwiceTheError)
-{
-    for (const bool detected : {true, false}) {
-        const injection_config_t c = config(detected);
-        for (int a = -90; a <= 90; a += 15) {
-            EXPECT_NEAR(settled(c, 0.4, a * kDegree, 1e-3).eps, 0.5 * std::sin(2 * a * kDegree), kEps) << a;
-        }
-    }
-}
-
-TEST(StationarySine, TheAnswerIsThatOfTheSaliencyAtAnyPosition)
-{
-    for (const double theta : {0.0, 0.8, 2.0, -1.0}) {
-        const rig::Answer a = settled(config(), theta, 0);
-        EXPECT_NEAR(a.eps / kDegree, 0, kZero_deg) << theta;
-        EXPECT_NEAR(a.vector.real() / kI_n, 1, 0.02) << theta;
-        EXPECT_NEAR(a.misfit, 0, 0.02) << theta;
-    }
-}
-
-// METHODS.md 4.4.2.2 (e): I_p wrong by 0.1 I_n, sin 2 theta of 2.9 degrees.
-TEST(StationarySine, AWrongIpMovesThePositionBySinTwoTheta)
-{
-    for (const double theta : {0.2, 0.8, 1.2, -0.8}) {
-        injection_config_t c = config(false);
-        const double more = 0.1 * kI_n / kI_p;
-        c.stationary_sine.saliency.i_p_0 +=
-            static_cast<pm_q_t>(std::lround(more * c.stationary_sine.saliency.i_p_0));
-        const double expected = 0.05 / kDegree * std::sin(2 * theta);
-        const double without = settled(config(false), theta, 0, 1e-3).eps / kDegree;
-        EXPECT_NEAR(settled(c, theta, 0, 1e-3).eps / kDegree - without, expected, 0.05) << theta;
-        // detected: whatever the configuration has
-        c.stationary_sine.stationary.find = true;
-        EXPECT_NEAR(settled(c, theta, 0, 1e-3).eps / kDegree, 0, kZero_deg) << theta;
-    }
 }
 
 // A voltage in phase with the current: as a resistance. I_p cos^2 delta is in phase with a fixed reference, I_p cos
@@ -105,52 +66,10 @@ TEST(StationarySine, SpeedMovesNoAngle)
     }
 }
 
-// METHODS.md 4.4.2.3 (e): the carrier does not follow the estimate.
-TEST(StationarySine, LocksFromAnyErrorUpTo85Degrees)
-{
-    for (int a = -85; a <= 85; a += 17) {
-        rig::Run run(config());
-        run.after(400); // I_p is found
-        run.error = a * kDegree;
-        run.loop_Hz = 20;
-        EXPECT_LT(run.settling(2000, 5 * kDegree) * rig::kBase.period_s, 0.100) << a;
-    }
-}
-
 TEST(StationarySine, FundamentalCurrentIsFreeOfTheCarrier)
 {
     const rig::Answer a = settled(config(), 0.4, 0.1, 6, {0.5, 3});
     EXPECT_LT(std::abs(a.i_A - Complex(0.5, 3) * std::polar(1.0, 0.1)), 3e-3);
-}
-
-// On alpha, on beta, on alpha; its flux ends where it began.
-TEST(StationarySine, CarrierIsOnAlphaAndBetaAndStaysOnAlpha)
-{
-    rig::Run run(config()), elsewhere(config());
-    elsewhere.theta = 2;
-    elsewhere.error = 1;
-    run.after(1000);
-    elsewhere.after(1000);
-    int changes = 0;
-    double most = 0;
-    for (size_t k = 0; k < 1000; ++k) {
-        const Complex v = bench::complex(run.given[k]) * rig::kBase.v_V;
-        EXPECT_EQ(run.given[k].alpha, elsewhere.given[k].alpha) << k;
-        EXPECT_EQ(run.given[k].beta, elsewhere.given[k].beta) << k;
-        EXPECT_TRUE(run.given[k].alpha == 0 || run.given[k].beta == 0) << k;
-        most = std::max(most, std::abs(v));
-        changes += k > 0 && (run.given[k].beta != 0) != (run.given[k - 1].beta != 0) ? 1 : 0;
-        EXPECT_TRUE(k < 400 || run.given[k].beta == 0) << k;
-    }
-    EXPECT_NEAR(most, 35, 1e-4);
-    EXPECT_GE(changes, 2);
-}
-
-TEST(StationarySine, MisfitIsTheSaliencyThatIsMissing)
-{
-    injection_config_t c = config();
-    c.stationary_sine.saliency.gain_0 /= 2; // twice the saliency expected
-    EXPECT_NEAR(settled(c, 0.4, 0).misfit, -0.5, 0.02);
 }
 
 } // namespace

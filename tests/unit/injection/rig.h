@@ -48,7 +48,9 @@ class Run
     double omega = 0;              // electrical, 1/s
     Complex i_dq_A = 0;            // fundamental, kept by a steady voltage
     double loop_Hz = 0;            // of a position loop that moves `error`; 0: imposed
-    std::vector<pm_ab_t> given;    // the carrier
+    Complex disturbance_V = 0;     // in the stator, that nobody knows of
+    bool sampled = true;           // samples that are asked for are taken
+    std::vector<excitation_t> given;
 
     explicit Run(const injection_config_t &c) : config_(c)
     {
@@ -73,7 +75,11 @@ class Run
         }
         const obs_in_t now = seen(0);
         const double ahead = theta - error + 1.5 * omega * kBase.period_s;
+        pm_measure_t codes = {};
+        codes.sampled = sampled && given.size() > 1 && given[given.size() - 2].sample_at[0] != 0 ? 1 : 0;
+        const obs_more_t more = {&codes, {bench::ab(between_ / kBase.i_A), {0, 0}}};
         injection_in_t in = {};
+        in.more = &more;
         in.i = now.i;
         in.dir = now.dir;
         in.omega = now.omega;
@@ -89,8 +95,8 @@ class Run
         EXPECT_EQ(last.eps, out.eps);
         const Answer a = {real(out.eps), real(last.misfit), bench::complex(last.vector) * kBase.i_A,
                           bench::complex(out.i) * kBase.i_A};
-        given.push_back(out.carrier.v);
-        run(given.size() > 1 ? bench::complex(given[given.size() - 2]) * kBase.v_V : 0);
+        given.push_back(out.carrier);
+        run(given.size() > 1 ? given[given.size() - 2] : excitation_t{});
         close(a.eps);
         return a;
     }
@@ -119,7 +125,8 @@ class Run
         return in;
     }
 
-    void run(Complex applied_V)
+    // A period with the excitation of the step before.
+    void run(const excitation_t &e)
     {
         const Machine &m = bench::kIpmLinear;
         const Complex steady =
@@ -128,7 +135,12 @@ class Run
         const int n = 50;
         const double t = kBase.period_s / n;
         for (int k = 0; k < n; ++k) {
-            const Complex v = steady + applied_V * std::polar(1.0, -theta - omega * t / 2);
+            if (2 * k == n) {
+                between_ = i_ * std::polar(1.0, theta);
+            }
+            const Complex added = bench::complex(e.v) + (2 * k < n ? 1.0 : -1.0) * bench::complex(e.split);
+            const Complex v =
+                steady + (added * kBase.v_V + disturbance_V) * std::polar(1.0, -theta - omega * t / 2);
             const Complex psi = {m.L_d0_H * i_.real() + m.psi_m_Wb, m.L_q0_H * i_.imag()};
             const Complex dpsi = v - R_ohm * i_ - kJ * omega * psi;
             i_ += t * Complex(dpsi.real() / m.L_d0_H, dpsi.imag() / m.L_q0_H);
@@ -146,7 +158,7 @@ class Run
 
     injection_config_t config_;
     injection_t self_ = {};
-    Complex i_ = 0;
+    Complex i_ = 0, between_ = 0;
     double speed_ = 0;
 };
 
