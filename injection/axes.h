@@ -1,24 +1,26 @@
-/* Test voltages along the three axes of the stator in turn, each with its opposite, and the saliency that their
- * answers show together (METHODS.md 4.6): the common part of inform.h and pwm_excitation.h.
+/* Test voltages along the three axes of the stator in turn, each with its opposite, and the saliency that
+ * their answers show together (METHODS.md 4.6): the common part of inform.h and pwm_excitation.h.
  *
  * In period p the voltage points along u_p, a unit vector. With a = e^{j 120}, twelve make a round:
  *   u = 1, -1, a, -a, a^2, -a^2,  -1, 1, -a, a, -a^2, a^2
  * The change of current that it makes, of flux F, with the rotor at theta:
  *   c_p = F [L_sa u_p + K e^{j (2 theta + theta_m)} u_p*] / D
- * and what EMF, resistance and fundamental voltage add, the same for a vector and its opposite. A window of a round
- * (window.h) leaves of all that
+ * and what EMF, resistance and fundamental voltage add, the same for a vector and its opposite. A window of a
+ * round (window.h) leaves of all that
  *   y   = mean(c_p u_p)  = I_n e^{j (2 theta + theta_m)},  I_n = F K / D
  *   I_p = mean(c_p u_p*) = F L_sa / D
- * each free of the other, of the fundamental and of an offset. The samples of y are 6 periods old in the mean:
+ * each free of the other, of the fundamental and of an offset. The samples of y are 6 periods old in the
+ * mean:
  *   eps = gain(i_q) Im[y e^{-j 2 theta^} e^{j (12 omega T_s - theta_m)}],  gain = 1 / (2 I_n)
  * eps is exact for small errors and 1/2 sin 2e beyond. misfit: the measured I_p against I_p(i_q), relative.
  *
- * The second half of the round begins each pair with the other sign: were it always the same, the current would lie
- * aside of its fundamental in one direction of each axis, and saturation and inverter would show it. Measured on
- * IPM-1000 without load with INFORM of 70 V: mean error 0.6 degrees instead of 0.2 (docs/methods_notes.md).
+ * The second half of the round begins each pair with the other sign: were it always the same, the current
+ * would lie aside of its fundamental in one direction of each axis, and saturation and inverter would show
+ * it. Measured on IPM-1000 without load with INFORM of 70 V: mean error 0.6 degrees instead of 0.2
+ * (docs/methods_notes.md).
  *
- * The axes do not follow the estimate: whatever it is, the carrier is the same. The first fourteen steps after a reset
- * give eps = 0. 75 instructions a period, of which 44 are the window; turn and gain at 1 kHz. */
+ * The axes do not follow the estimate: whatever it is, the carrier is the same. The first fourteen steps
+ * after a reset give eps = 0. 75 instructions a period, of which 44 are the window; turn and gain at 1 kHz. */
 #ifndef INJECTION_AXES_H
 #define INJECTION_AXES_H
 
@@ -56,7 +58,8 @@ void axes_reset(axes_t *self, const axes_config_t *config);
 /* One period: `change` is c, the answer to the u of two calls ago. Returns the u of the coming period. */
 pm_dir_t axes_step(axes_t *self, const axes_config_t *config, pm_dir_t dir, pm_ab_t change);
 
-/* The period that has just been answered was the second of a pair: the current is where it was before the pair. */
+/* The period that has just been answered was the second of a pair: the current is where it was before the
+ * pair. */
 static inline bool axes_pair_done(const axes_t *self)
 {
     return (self->phase.at & 1U) == 0U;

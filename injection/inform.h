@@ -2,12 +2,12 @@
  *
  * In each period V_h is added along the axis u of axes.h. The change of current over that period is read:
  *   c = i(k) - i(k-1),  F = V_h T_s
- * A test voltage and its opposite follow each other, so that after each pair the current is without carrier: that
- * sample is the fundamental current, held for the period that follows.
+ * A test voltage and its opposite follow each other, so that after each pair the current is without carrier:
+ * that sample is the fundamental current, held for the period that follows.
  *
- * No sample beside the usual ones, so any board can do it; the change over a single period is small, and what is read
- * follows the edges of the bridge: noise and leg capacitance count as with the square wave. eps, misfit: axes.h. 80
- * instructions a period. Functions as injection.h says.
+ * No sample beside the usual ones, so any board can do it; the change over a single period is small, and what
+ * is read follows the edges of the bridge: noise and leg capacitance count as with the square wave. eps,
+ * misfit: axes.h. 80 instructions a period. Functions as injection.h says.
  * Tests: tests/unit/injection/inform_test.cpp, tests/scenario/inform.yaml. */
 #ifndef INJECTION_INFORM_H
 #define INJECTION_INFORM_H

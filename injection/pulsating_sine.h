@@ -1,21 +1,22 @@
-/* Pulsating sine injection in the estimated frame (METHODS.md 4.3.1, row 37) with indirect cross-coupling compensation
- * (5.2.2.2, row 51).
+/* Pulsating sine injection in the estimated frame (METHODS.md 4.3.1, row 37) with indirect cross-coupling
+ * compensation (5.2.2.2, row 51).
  *
  * Added along d of the estimated frame (carrier.h), with phi, phi' and F of sine.h:
  *   v_d = V_h cos phi_k
  * The answer in that frame, e: position error:
  *   i_d = i_fd + h_d cos(phi' - delta)    h_d = F [L_sa + K cos(2 e + theta_m)] / D
  *   i_q = i_fq + h_q cos(phi' - delta)    h_q = F K sin(2 e + theta_m) / D
- * delta is what resistance, dead time and leg capacitance do to the phase. The answer along d shows it, as it is always
- * there. The window (window.h) gives the complex amplitudes of both axes and the fundamental current i_f:
+ * delta is what resistance, dead time and leg capacitance do to the phase. The answer along d shows it, as it
+ * is always there. The window (window.h) gives the complex amplitudes of both axes and the fundamental
+ * current i_f:
  *   I     = 2/N sum i e^{-j phi'},  delta = -arg I_d
  *   h     = Re[I e^{j delta}]:      the part of each axis that is in phase with the answer along d
  *   eps   = gain(i_q) (h_q + lambda(i_q) h_d)       zero at e = 0 whatever the load (saliency.h)
  * With a fixed delta = 0 what the inverter adds in quadrature counts too (docs/methods_notes.md).
  *
  * A frame that turns makes no error: the carrier's flux across d lags it by a quarter of a period.
- * eps is exact for small e and 1/2 sin 2e beyond. misfit: h_d against its value without load, relative. Bandwidths:
- * sine.h. Each period 135 instructions; delta at 1 kHz. Functions as injection.h says.
+ * eps is exact for small e and 1/2 sin 2e beyond. misfit: h_d against its value without load, relative.
+ * Bandwidths: sine.h. Each period 135 instructions; delta at 1 kHz. Functions as injection.h says.
  * Tests: tests/unit/injection/pulsating_sine_test.cpp, tests/scenario/pulsating_sine.yaml. */
 #ifndef INJECTION_PULSATING_SINE_H
 #define INJECTION_PULSATING_SINE_H

@@ -1,19 +1,19 @@
 /* PWM excitation: the edges of the normal pattern are moved so that the active vectors of the two halves of a
- * period differ, and the current is sampled between them (METHODS.md 4.6.2, of which the derivative within a zero
- * vector is not here).
+ * period differ, and the current is sampled between them (METHODS.md 4.6.2, of which the derivative within a
+ * zero vector is not here).
  *
- * Along the axis u of the period (axes.h) the first half has V_h more and the second V_h less, so that the mean
- * voltage is what control asked for and the current is without carrier at both ends. The sample at the all-high
- * vector between the halves shows
+ * Along the axis u of the period (axes.h) the first half has V_h more and the second V_h less, so that the
+ * mean voltage is what control asked for and the current is without carrier at both ends. The sample at the
+ * all-high vector between the halves shows
  *   c = i(k - 1/2) - (i(k-1) + i(k)) / 2 = (F [L_sa u + K e^{j (2 theta + theta_m)} u*]) / D,  F = V_h T_s / 2
- * This is active minus zero: in the first half u is active for t = V_h T_s / V_dc longer than in the second, where a
- * zero vector or -u takes its place; what both halves have in common - EMF, resistance, fundamental voltage, dead
- * time - is in both differences alike and cancels. All three samples lie in the middle of zero vectors, t/2 or more
- * after the last edge.
+ * This is active minus zero: in the first half u is active for t = V_h T_s / V_dc longer than in the second,
+ * where a zero vector or -u takes its place; what both halves have in common - EMF, resistance, fundamental
+ * voltage, dead time - is in both differences alike and cancels. All three samples lie in the middle of zero
+ * vectors, t/2 or more after the last edge.
  *
- * `v_injection` is V_h, the peak of the difference, which is largest at u: 3/2 V_h on the leg of the axis. t >= 20 us
- * at 10 kHz and 300 V needs 60 V. No fundamental current is lost: out->i is the current at k. It needs currents that
- * can be measured while all upper switches conduct: not low-side shunts.
+ * `v_injection` is V_h, the peak of the difference, which is largest at u: 3/2 V_h on the leg of the axis. t
+ * >= 20 us at 10 kHz and 300 V needs 60 V. No fundamental current is lost: out->i is the current at k. It
+ * needs currents that can be measured while all upper switches conduct: not low-side shunts.
  *
  * eps, misfit: axes.h. Each period about 150 instructions more than without,
  * the modulator's second half included. Functions as injection.h

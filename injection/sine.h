@@ -4,11 +4,11 @@
  *   f_h  = f_pwm / N,  a = 2 pi / N,  phi_k = k a: phase of the voltage for [k+1, k+2)
  *   F    = V_h T_s / (2 sin(a / 2)):  flux amplitude at the samples, of a voltage in steps
  *   phi' = phi_k - 1.5 a - pi / 2:    phase of the current at k, of a voltage that was commanded 1.5 periods ago
- * The window takes the current at the phase phi' over a period of the carrier (window.h). For so long after a reset, and
- * until the first answer, it holds other things too and is not to be read.
+ * The window takes the current at the phase phi' over a period of the carrier (window.h). For so long after a
+ * reset, and until the first answer, it holds other things too and is not to be read.
  *
- * The samples in it are (N - 1) / 2 periods old, and so is the mean of the current: current control is slowed while the
- * source leads, to a phase of 0.4 rad, and the position loop may have 0.3 rad. */
+ * The samples in it are (N - 1) / 2 periods old, and so is the mean of the current: current control is slowed
+ * while the source leads, to a phase of 0.4 rad, and the position loop may have 0.3 rad. */
 #ifndef INJECTION_SINE_H
 #define INJECTION_SINE_H
 
@@ -84,8 +84,8 @@ static inline pm_dq_t sine_in_phase(const sine_t *self, const sine_config_t *con
     return h;
 }
 
-/* e^{j delta} from the parts of an answer with the cosine and the sine of phi', 1 kHz: within 0.7 rad, so that a transient
- * of the current does not turn it further than an inverter could. */
+/* e^{j delta} from the parts of an answer with the cosine and the sine of phi', 1 kHz: within 0.7 rad, so
+ * that a transient of the current does not turn it further than an inverter could. */
 pm_dir_t sine_phase(pm_q_t cosine, pm_q_t sine);
 
 /* sine_config.c; make_sine() refuses a frequency that does not fit. */
@@ -93,7 +93,8 @@ void make_sine(maker_t *m, sine_config_t *c);
 injection_limits_t sine_limits(const maker_t *m);
 pm_num_t sine_flux(const maker_t *m);  /* F, Wb */
 pm_num_t sine_omega(const maker_t *m); /* omega_h, 1/s */
-/* An amplitude of the current at a sample, as x_answer() wants it: the window leaves sqrt(2 / N) of the noise. */
+/* An amplitude of the current at a sample, as x_answer() wants it: the window leaves sqrt(2 / N) of the
+ * noise. */
 pm_num_t sine_answer(const maker_t *m, pm_num_t amplitude);
 
 #ifdef __cplusplus

@@ -1,13 +1,16 @@
-/* A carrier along a fixed axis of the stator, and the part I_p of its answer that is the same for all positions: the common
- * part of stationary_sine.h and stationary_square.h (METHODS.md 4.4.2.2, 4.4.3.2, row 41).
+/* A carrier along a fixed axis of the stator, and the part I_p of its answer that is the same for all
+ * positions: the common part of stationary_sine.h and stationary_square.h (METHODS.md 4.4.2.2, 4.4.3.2, row
+ * 41).
  *
- * The answer to a carrier of flux F along the axis g, alpha (0) or beta (90 degrees), in the stationary frame:
+ * The answer to a carrier of flux F along the axis g, alpha (0) or beta (90 degrees), in the stationary
+ * frame:
  *   c   = I_p e^{j g} + I_n e^{j (2 theta + theta_m - g)},  I_p = F L_sa / D,  I_n = F K / D
- * Only I_n shows the position; an error of I_p moves it by (dI_p / 2 I_n) sin 2 theta. So I_p is detected first, on
- * alpha and then on beta, eight values at 1 kHz each; I_n cancels, but for what the rotor turns by in the time t between:
+ * Only I_n shows the position; an error of I_p moves it by (dI_p / 2 I_n) sin 2 theta. So I_p is detected
+ * first, on alpha and then on beta, eight values at 1 kHz each; I_n cancels, but for what the rotor turns by
+ * in the time t between:
  *   found = mean of (c along g - I_n omega t sin 2 theta^) / I_p(i_q)
- * Not I_n cos 2 theta^ of each: the estimate moves with the error that I_p makes, and would hide all of it at 45 degrees.
- * Then the carrier stays on alpha, and I_p follows the load as the saliency map does:
+ * Not I_n cos 2 theta^ of each: the estimate moves with the error that I_p makes, and would hide all of it at
+ * 45 degrees. Then the carrier stays on alpha, and I_p follows the load as the saliency map does:
  *   I_p = found I_p(i_q)                                (saliency.h)
  * After any reset it is detected anew. It is not, when the configuration says so: found = 1. */
 #ifndef INJECTION_STATIONARY_H
@@ -34,7 +37,8 @@ typedef struct {
 
 void stationary_reset(stationary_t *self, const stationary_config_t *config);
 
-/* 1 kHz, while finding: the answer along the axis, position and speed, and I_p(i_q). True when the axis changes with it. */
+/* 1 kHz, while finding: the answer along the axis, position and speed, and I_p(i_q). True when the axis
+ * changes with it. */
 bool stationary_find(stationary_t *self, const stationary_config_t *config, pm_q_t along, const obs_in_t *in,
                      pm_q_t i_p);
 
@@ -88,7 +92,8 @@ static inline pm_dq_t stationary_turned(const stationary_t *self, pm_dq_t x, pm_
     return stationary_on_beta(self) ? on_beta : r;
 }
 
-/* stationary_config.c; slope: 2 I_n without load, A; settling: periods after a change of the axis without a value. */
+/* stationary_config.c; slope: 2 I_n without load, A; settling: periods after a change of the axis without a
+ * value. */
 void make_stationary(maker_t *m, stationary_config_t *c, pm_num_t slope, uint16_t settling);
 
 #ifdef __cplusplus

@@ -1,21 +1,22 @@
-/* Sine injection along alpha of the stator (METHODS.md 4.4.2, row 40), with the part of the answer that is the same for all
- * positions detected first and then taken away (4.4.2.2, row 41; stationary.h).
+/* Sine injection along alpha of the stator (METHODS.md 4.4.2, row 40), with the part of the answer that is
+ * the same for all positions detected first and then taken away (4.4.2.2, row 41; stationary.h).
  *
  * Added along the axis g of stationary.h, with phi, phi' and F of sine.h:
  *   v = V_h cos phi_k e^{j g}
- * I_p is removed from each sample of the stationary frame, before anything else. What is left goes into the window in the
- * estimated frame, where the fundamental current is a constant and drops out, and is read in phase with the answer:
+ * I_p is removed from each sample of the stationary frame, before anything else. What is left goes into the
+ * window in the estimated frame, where the fundamental current is a constant and drops out, and is read in
+ * phase with the answer:
  *   y   = 2/N sum (i - I_p' cos(phi' - delta) e^{j g}) e^{-j theta^} cos(phi' - delta)
  *   eps = gain(i_q) Im[y e^{-j theta^} e^{j g} e^{j (omega tau - theta_m)}],  gain = 1 / (2 I_n),  tau = (N - 1) / 2 T_s
- * delta, the phase of the whole answer along g, shows what dead time takes from it: the voltage that it adds is in phase
- * with the current, so
+ * delta, the phase of the whole answer along g, shows what dead time takes from it: the voltage that it adds
+ * is in phase with the current, so
  *   I_p' = I_p cos delta
  * By that the I_p that was detected without load, where dead time counts most, serves under load too.
  *
- * Whatever the estimate is, the carrier is the same. eps is exact for small errors and 1/2 sin 2e beyond; it is 0 in the
- * first N + 2 steps after a reset and held in those after a change of the axis. misfit: |y| against I_n, relative.
- * Bandwidths: sine.h. Each period 180 instructions; I_p, delta and the turn at 1 kHz. Functions as injection.h says.
- * Tests: tests/unit/injection/stationary_test.cpp, stationary_sine_test.cpp,
+ * Whatever the estimate is, the carrier is the same. eps is exact for small errors and 1/2 sin 2e beyond; it
+ * is 0 in the first N + 2 steps after a reset and held in those after a change of the axis. misfit: |y|
+ * against I_n, relative. Bandwidths: sine.h. Each period 180 instructions; I_p, delta and the turn at 1 kHz.
+ * Functions as injection.h says. Tests: tests/unit/injection/stationary_test.cpp, stationary_sine_test.cpp,
  * tests/scenario/stationary_sine.yaml. */
 #ifndef INJECTION_STATIONARY_SINE_H
 #define INJECTION_STATIONARY_SINE_H

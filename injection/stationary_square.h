@@ -1,19 +1,21 @@
-/* Square-wave injection along alpha of the stator (METHODS.md 4.4.3, row 42), with the part of the answer that is the same for
- * all positions detected first and then taken away (4.4.3.2, row 43; stationary.h).
+/* Square-wave injection along alpha of the stator (METHODS.md 4.4.3, row 42), with the part of the answer
+ * that is the same for all positions detected first and then taken away (4.4.3.2, row 43; stationary.h).
  *
- * The voltage alternates by +-V_h along the axis g each PWM period (f_h = f_pwm / 2). The change of current over a period, with
- * the slope of the fundamental removed by a second difference in the estimated frame, and with the sign s of the carrier:
+ * The voltage alternates by +-V_h along the axis g each PWM period (f_h = f_pwm / 2). The change of current
+ * over a period, with the slope of the fundamental removed by a second difference in the estimated frame, and
+ * with the sign s of the carrier:
  *   h   = s (delta_k - delta_k-1) / 2       F = V_h T_s,  I_p = F L_sa / D,  I_n = F K / D
  *       = [I_p e^{j g} + I_n e^{j (2 theta - 2 omega T_s + theta_m - g)}] e^{-j (theta^ - omega T_s / 2)}
- * A change belongs half a period back, and the mean of two is half a period older; the frame is that of the samples.
+ * A change belongs half a period back, and the mean of two is half a period older; the frame is that of the
+ * samples.
  *   y   = (h - I_p e^{j g} e^{-j (theta^ - omega T_s / 2)}) e^{-j theta^} e^{j g} = I_n e^{j (2 e - 1.5 omega T_s + theta_m)}
  *   eps = gain(i_q) Im[y e^{j (1.5 omega T_s - theta_m)}],  gain = 1 / (2 I_n)
  * I_p is detected from the mean of y over 16 periods.
  *
- * Whatever the estimate is, the carrier is the same. eps is exact for small errors and 1/2 sin 2e beyond; it is 0 in the
- * first four steps after a reset and held in those after a change of the axis. misfit: mean |y| against I_n, relative. The
- * fundamental current is the mean of two samples. Each period 110 instructions; I_p and the turn at 1 kHz. Functions as
- * injection.h says.
+ * Whatever the estimate is, the carrier is the same. eps is exact for small errors and 1/2 sin 2e beyond; it
+ * is 0 in the first four steps after a reset and held in those after a change of the axis. misfit: mean |y|
+ * against I_n, relative. The fundamental current is the mean of two samples. Each period 110 instructions;
+ * I_p and the turn at 1 kHz. Functions as injection.h says.
  * Tests: tests/unit/injection/stationary_test.cpp, stationary_square_test.cpp,
  * tests/scenario/stationary_square.yaml. */
 #ifndef INJECTION_STATIONARY_SQUARE_H
@@ -26,7 +28,8 @@
 extern "C" {
 #endif
 
-/* Periods from the first command to a second difference that is whole, and then four time constants of the mean. */
+/* Periods from the first command to a second difference that is whole, and then four time constants of the
+ * mean. */
 #define STATIONARY_SQUARE_ANSWER  4U
 #define STATIONARY_SQUARE_SETTLED 64U
 

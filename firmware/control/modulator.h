@@ -6,10 +6,11 @@
  * returned. Compensation adds to each leg the on-time that dead time and device drops take from it, with the
  * sign of the leg's current:
  *   +-(T_dt/T_s + V_drop/v_dc) f(|i|),   at most a quarter of the period
- * The capacitance C of a leg gives part of it back, since the current has to move the node: with I_1 = C v_dc / T_dt
+ * The capacitance C of a leg gives part of it back, since the current has to move the node: with I_1 = C v_dc
+ * / T_dt
  *   f = i / (2 I_1) up to I_1, 1 - I_1 / (2 i) beyond
- * f is made of two linear parts, 3/4 up to 1.7 I_1 and 1/4 up to 8 times that; error 0.07. Without capacitance, or
- * where `comp_zone` is larger than 1.7 I_1, there is one part, up to `comp_zone`.
+ * f is made of two linear parts, 3/4 up to 1.7 I_1 and 1/4 up to 8 times that; error 0.07. Without
+ * capacitance, or where `comp_zone` is larger than 1.7 I_1, there is one part, up to `comp_zone`.
  * The returned vector is the one without compensation, which is what the motor then receives. Legs are
  * shares of the period up to the last step, where one saturation keeps each within the timer's counts.
  *

@@ -1,9 +1,10 @@
-/* Resistance, the voltage lost in a leg and the capacitance of a leg (METHODS.md 5.6.1): current along phase A with the
- * rotor on it.
+/* Resistance, the voltage lost in a leg and the capacitance of a leg (METHODS.md 5.6.1): current along phase
+ * A with the rotor on it.
  *
  *   v = R i + 4/3 v_lost - K / i,  K = v_lost I_1
- * A leg whose current moves its capacitance within the dead time gives back v_lost I_1 / (2 i) (modulator.h); phase A
- * has i, the others half of it. Four currents of 100, 80, 60, 40 % of I give the three: with weights of
+ * A leg whose current moves its capacitance within the dead time gives back v_lost I_1 / (2 i) (modulator.h);
+ * phase A has i, the others half of it. Four currents of 100, 80, 60, 40 % of I give the three: with weights
+ * of
  *   (3, 1, -1, -3)   the slope,      in which K / I counts -59/12,
  *   (1, -1, -1, 1)   the curvature,  -7/12,
  *   (1, 1, 1, 1)     the mean,       -77/12. */
