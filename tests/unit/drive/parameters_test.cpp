@@ -21,7 +21,7 @@ TEST(Parameters, TableIsComplete)
         EXPECT_LT(p.min, p.max) << p.name;
         EXPECT_GE(p.def, p.min) << p.name;
         EXPECT_LE(p.def, p.max) << p.name;
-        EXPECT_GE(drive_param_exp10[id], -9) << p.name;
+        EXPECT_GE(drive_param_exp10[id], -12) << p.name;
         EXPECT_LE(drive_param_exp10[id], 0) << p.name;
         EXPECT_LT(p.max, INT32_MAX) << p.name; // so that "above" exists
         EXPECT_GT(p.min, INT32_MIN) << p.name;
