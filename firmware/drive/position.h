@@ -89,7 +89,7 @@ typedef struct {
 } position_in_t;
 
 /* One period. */
-void position_step(position_t *self, const position_config_t *config, const position_in_t *in,
+void position_step(position_t *self, const position_config_t *config, const position_in_t *at,
                    position_out_t *out);
 
 /* The configuration names another observer than before: it is seeded at the present position and speed, where

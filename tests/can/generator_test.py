@@ -104,7 +104,7 @@ class Refusals(unittest.TestCase):
         self.member("preset: 3", "preset: 51", "preset 51 is outside 1 to 50")
 
     def test_scaling_out_of_range(self):
-        self.member("exp10: 0", "exp10: -10", "exp10 must be")
+        self.member("exp10: 0", "exp10: -13", "exp10 must be")
 
     def test_parameter_without_unit(self):
         self.member('unit: "1", exp10: 0, ', "", "with unit, range and preset")

@@ -456,7 +456,7 @@ class Motion(Bench):
 
 
 class Identification(Bench):
-    FOUND = {"R_s": 5900000, "dead_voltage": 7100, "L_d": 42000000, "L_q": 74000000, "L_q_rated": 70000000,
+    FOUND = {"R_s": 5900000, "dead_voltage": 7100, "leg_capacitance": 480, "L_d": 42000000, "L_q": 74000000, "L_q_rated": 70000000,
              "L_dh_rated": 42000000, "L_qh_rated": 62000000, "L_dqh_rated": -4000000, "cross_half": -30000,
              "psi_m": 235000000, "J": 9000000, "friction": 1000000, "coulomb": 20000}
 
@@ -478,11 +478,13 @@ class Identification(Bench):
     def test_only_some(self):
         before = self.node["psi_m"]
         found = self.json("identify", "--only", "resistance,mechanics", "--yes")[:2]
-        self.assertEqual([sorted(x) for x in found], [["identification.R_s", "identification.dead_voltage"],
+        self.assertEqual([sorted(x) for x in found], [["identification.R_s", "identification.dead_voltage",
+                                                       "identification.leg_capacitance"],
                                                       ["identification.J", "identification.coulomb",
                                                        "identification.friction"]])
         self.assertEqual(self.node["identification.command"], 9)
         self.assertEqual((self.node["R_s"], self.node["J"], self.node["psi_m"]), (5900000, 9000000, before))
+        self.assertEqual(self.node["leg_capacitance"], 480)
         _, err = self.command("identify", "--only", "colour", "--yes", code=2)
         self.assertIn("resistance, inductance, flux, mechanics", err)
 
