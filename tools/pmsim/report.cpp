@@ -1,7 +1,9 @@
 #include "tools/pmsim/report.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 
 #include "tools/pmsim/text.h"
 
@@ -13,12 +15,33 @@ static std::string value_text(const Outcome &outcome)
     return outcome.value.text.empty() ? format(outcome.value.number, 4) : outcome.value.text;
 }
 
+// Of the seeds' worst runs, by how far they are from the bound.
+static void rank_seeds(Verdict &verdict, const std::map<std::string, Outcome> &worst_of_seed)
+{
+    std::vector<Outcome> ranked;
+    for (const auto &entry : worst_of_seed) {
+        ranked.push_back(entry.second);
+    }
+    std::stable_sort(ranked.begin(), ranked.end(),
+                     [](const Outcome &a, const Outcome &b) { return a.margin < b.margin; });
+    verdict.seeds = ranked.size();
+    verdict.median = ranked[ranked.size() / 2];
+    verdict.best = ranked.back();
+}
+
+static std::string json_value(const Outcome &outcome)
+{
+    return outcome.value.text.empty() ? json_number(outcome.value.number) : json_text(outcome.value.text);
+}
+
 std::vector<Verdict> verdicts(const ScenarioFile &file, const SweepResult &result)
 {
     std::vector<Verdict> list;
+    std::vector<std::map<std::string, Outcome>> worst_of_seed;
     for (size_t run = 0; run < result.runs.size(); ++run) {
         const std::vector<Expectation> expect = file.scenario(file.runs()[run]).expect;
         list.resize(expect.size());
+        worst_of_seed.resize(expect.size());
         for (size_t i = 0; i < expect.size(); ++i) {
             const Outcome &outcome = result.runs[run].outcomes[i];
             Verdict &verdict = list[i];
@@ -29,7 +52,17 @@ std::vector<Verdict> verdicts(const ScenarioFile &file, const SweepResult &resul
             }
             verdict.passed += outcome.pass ? 1 : 0;
             verdict.runs++;
+            const Variables &variables = file.runs()[run].variables;
+            const auto seed = variables.find("seed");
+            const auto [known, is_new] =
+                worst_of_seed[i].try_emplace(seed != variables.end() ? seed->second : "", outcome);
+            if (!is_new && outcome.margin < known->second.margin) {
+                known->second = outcome;
+            }
         }
+    }
+    for (size_t i = 0; i < list.size(); ++i) {
+        rank_seeds(list[i], worst_of_seed[i]);
     }
     return list;
 }
@@ -79,6 +112,9 @@ std::string verdict_lines(const ScenarioFile &file, const std::vector<Verdict> &
             text += "  " + std::to_string(verdict.passed) + " of " + std::to_string(verdict.runs) +
                     ", worst: " + file.runs()[verdict.worst_run].name;
         }
+        if (verdict.seeds > 1) {
+            text += "; median of " + std::to_string(verdict.seeds) + " seeds " + value_text(verdict.median);
+        }
         text += '\n';
     }
     return text;
@@ -95,19 +131,30 @@ std::string verdict_json(const ScenarioFile &file, const std::vector<Verdict> &l
     const char *separator = "\n";
     for (const Verdict &verdict : list) {
         const Expectation &e = verdict.expectation;
-        const std::string value = verdict.worst.value.text.empty() ? json_number(verdict.worst.value.number)
-                                                                   : json_text(verdict.worst.value.text);
         text += separator;
         text += "  {\"name\": " + json_text(e.label) + ", \"metric\": " + json_text(e.metric) +
                 ", \"pass\": " + (verdict.passed == verdict.runs ? "true" : "false") +
-                ", \"value\": " + value + ", \"bound\": " + json_text(bound_text(e)) +
-                ", \"unit\": " + json_text(e.unit) + ", \"book\": " + json_text(e.book) +
-                ", \"passed\": " + std::to_string(verdict.passed) +
+                ", \"value\": " + json_value(verdict.worst) + ", \"median\": " + json_value(verdict.median) +
+                ", \"best\": " + json_value(verdict.best) + ", \"seeds\": " + std::to_string(verdict.seeds) +
+                ", \"bound\": " + json_text(bound_text(e)) + ", \"unit\": " + json_text(e.unit) +
+                ", \"book\": " + json_text(e.book) + ", \"passed\": " + std::to_string(verdict.passed) +
                 ", \"of\": " + std::to_string(verdict.runs) +
                 ", \"worst_run\": " + json_text(file.runs()[verdict.worst_run].name) + "}";
         separator = ",\n";
     }
     return text + "\n]}\n";
+}
+
+static std::string csv_text(const std::string &text)
+{
+    if (text.find_first_of(",\"") == std::string::npos) {
+        return text;
+    }
+    std::string quoted = "\"";
+    for (const char c : text) {
+        quoted += c == '"' ? "\"\"" : std::string(1, c);
+    }
+    return quoted + '"';
 }
 
 std::string runs_csv(const ScenarioFile &file, const SweepResult &result)
@@ -124,7 +171,7 @@ std::string runs_csv(const ScenarioFile &file, const SweepResult &result)
     for (size_t run = 0; run < result.runs.size(); ++run) {
         text += std::to_string(run);
         for (const auto &entry : file.runs()[run].variables) {
-            text += "," + entry.second;
+            text += ',' + csv_text(entry.second);
         }
         for (const Outcome &outcome : result.runs[run].outcomes) {
             text += "," + value_text(outcome) + (outcome.pass ? ",1" : ",0");

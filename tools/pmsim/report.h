@@ -10,11 +10,12 @@
 namespace pmsim
 {
 
-// One expectation over all runs.
+// One expectation over all runs. With several seeds each has its own worst run: `worst` is that of the worst seed,
+// `median` and `best` those of the middle one and of the best.
 struct Verdict {
     Expectation expectation; // with the bound of the worst run
-    Outcome worst;
-    size_t worst_run = 0, passed = 0, runs = 0;
+    Outcome worst, median, best;
+    size_t worst_run = 0, passed = 0, runs = 0, seeds = 0;
 };
 
 std::vector<Verdict> verdicts(const ScenarioFile &file, const SweepResult &result);

@@ -20,7 +20,8 @@ namespace pmsim
 namespace
 {
 
-const char trace_name[] = "trace.csv", summary_name[] = "summary.txt", runs_name[] = "runs.csv";
+const char trace_name[] = "trace.csv", summary_name[] = "summary.txt", result_name[] = "result.json",
+           runs_name[] = "runs.csv";
 
 void write_file(const std::filesystem::path &path, const std::string &text)
 {
@@ -36,6 +37,7 @@ void check_out(const ScenarioFile &file, const std::filesystem::path &out)
 {
     refuse_input_as_output((out / trace_name).string());
     refuse_input_as_output((out / summary_name).string());
+    refuse_input_as_output((out / result_name).string());
     if (file.runs().size() > 1) {
         refuse_input_as_output((out / runs_name).string());
     }
@@ -66,19 +68,29 @@ void add_run_options(Command &command, RunOptions &options)
 {
     command.add_option("scenario", options.scenario, "scenario file (YAML)")->required();
     command.add_option("--set", options.settings, settings_help())->one_each();
-    command.add_option("--out", options.out,
-                       "folder for trace.csv, summary.txt and, with a sweep, runs.csv; the trace shows the "
-                       "worst run");
+    command.add_option(
+        "--out", options.out,
+        "folder for trace.csv, summary.txt, result.json and, with a sweep, runs.csv; the trace "
+        "shows the worst run");
     command.add_option("--decimate", options.decimate,
                        "one trace row every N periods (default: at most 20000 rows)");
     command.add_option("--jobs", options.jobs, "runs of a sweep at the same time")->show_default();
+    command
+        .add_option(
+            "--seeds", options.seeds,
+            "run everything with so many seeds, from the scenario's own on; a bound must hold for each")
+        ->positive()
+        ->show_default();
     command.add_flag("--quiet", options.quiet, "expectations only, no progress");
     command.add_flag("--json", options.json, "result as JSON on standard output");
 }
 
 int run_and_report(const RunOptions &options)
 {
-    const ScenarioFile file(options.scenario, parse_settings(options.settings));
+    ScenarioFile file(options.scenario, parse_settings(options.settings));
+    if (options.seeds > 1) {
+        file.repeat(options.seeds);
+    }
     print_notes(file.scenario(file.runs().front()).setup);
     const std::filesystem::path out = options.out;
     if (!options.out.empty()) {
@@ -102,6 +114,7 @@ int run_and_report(const RunOptions &options)
         const std::string traced = shown.name.empty() ? "" : "trace.csv: " + shown.name + "\n";
         write_file(out / summary_name,
                    file.title() + "\n" + lines + timing_line(file, simulated_s, 0.0) + traced);
+        write_file(out / result_name, verdict_json(file, list, simulated_s, wall_s));
         if (file.runs().size() > 1) {
             write_file(out / runs_name, runs_csv(file, result));
         }

@@ -15,7 +15,7 @@ struct RunOptions {
     std::string scenario, out;
     std::vector<std::string> settings;
     uint64_t decimate = 0;
-    int jobs = 2;
+    int jobs = 2, seeds = 1;
     bool quiet = false, json = false;
 };
 

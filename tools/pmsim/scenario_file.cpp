@@ -11,6 +11,7 @@ namespace
 {
 
 const double max_periods = 1e9;
+const char seed_key[] = "seed";
 
 std::vector<std::string> scenario_keys()
 {
@@ -106,6 +107,22 @@ const std::vector<Run> &ScenarioFile::runs() const
     return runs_;
 }
 
+void ScenarioFile::repeat(int seeds)
+{
+    std::vector<Run> repeated;
+    for (const Run &run : runs_) {
+        const uint64_t first = scenario(run).seed;
+        for (int i = 0; i < seeds; ++i) {
+            Run again = run;
+            again.seed = first + static_cast<uint64_t>(i);
+            again.variables[seed_key] = std::to_string(*again.seed);
+            again.name.append(run.name.empty() ? "" : " ").append("seed=" + again.variables[seed_key]);
+            repeated.push_back(std::move(again));
+        }
+    }
+    runs_ = std::move(repeated);
+}
+
 Scenario ScenarioFile::scenario(const Run &run) const
 {
     const Map map = open_scenario(document_.with(&run.variables));
@@ -117,7 +134,9 @@ Scenario ScenarioFile::scenario(const Run &run) const
     scenario.title = map.at("title").text();
     scenario.setup = read_layers(map, settings_);
     require_drive(scenario.setup);
-    if (const auto seed = value_of("seed")) {
+    if (run.seed) {
+        scenario.seed = *run.seed;
+    } else if (const auto seed = value_of(seed_key)) {
         scenario.seed = static_cast<uint64_t>(seed->integer(0, int64_t(1) << 53));
     }
     scenario.setup.plant.sensor.seed = scenario.seed;

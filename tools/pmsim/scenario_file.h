@@ -3,6 +3,8 @@
 #ifndef PMSIM_SCENARIO_FILE_H
 #define PMSIM_SCENARIO_FILE_H
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +17,7 @@ namespace pmsim
 struct Run {
     std::string name; // "angle=30 direction=-1"; empty when the file has a single run
     Variables variables;
+    std::optional<uint64_t> seed; // before the scenario's own
 };
 
 class ScenarioFile
@@ -25,6 +28,8 @@ class ScenarioFile
 
     std::string title() const;
     const std::vector<Run> &runs() const;
+    void
+    repeat(int seeds); // each run with so many seeds, from the scenario's own on: one more variable, `seed`
     Scenario scenario(const Run &run) const; // reads the whole document with the run's variables
 
   private:

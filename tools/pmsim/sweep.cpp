@@ -103,13 +103,14 @@ std::vector<std::string> variable_names(const Map &document)
 
 std::vector<Run> expand_runs(const Map &document, const Variables &fixed)
 {
-    std::vector<Run> runs = {{}};
+    std::vector<Run> runs(1);
     if (const auto cases = document.find("cases")) {
         runs.clear();
         for (const Case &one : read_cases(*cases)) {
             const auto only = fixed.find("case");
             if (only == fixed.end() || only->second == one.name) {
-                runs.push_back({one.name, one.variables});
+                runs.push_back({one.name, one.variables, {}});
+                runs.back().variables["case"] = one.name;
                 for (const auto &entry : fixed) {
                     if (one.variables.count(entry.first) != 0) {
                         runs.back().variables[entry.first] = entry.second;

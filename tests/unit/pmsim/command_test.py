@@ -1,5 +1,6 @@
 """pmsim as a user meets it: exit codes, what it prints, what it writes."""
 
+import csv
 import json
 import pathlib
 import subprocess
@@ -17,6 +18,7 @@ profile:
 expect:
   - {{metric: fault, equals: NONE, book: "1.1"}}
   - {{metric: current_peak_A, max: 8, book: "9.2"}}
+  - {{metric: angle_error_max_deg, max: 30, book: "5.9"}}
 """
 
 
@@ -60,6 +62,15 @@ def check_run(folder, scenario):
 
     one = json.loads(expect_exit(0, "run", scenario, "--json", "--set", "angle=45").stdout)
     assert one["pass"] is True and one["runs"] == 1 and one["expectations"][0]["value"] == "NONE"
+    seeds = json.loads(expect_exit(0, "run", scenario, "--json", "--seeds", 3).stdout)
+    assert seeds["runs"] == 6 and seeds["expectations"][2]["seeds"] == 3
+    shown = seeds["expectations"][2]
+    assert shown["best"] <= shown["median"] <= shown["value"] and shown["best"] < shown["value"], shown
+    expect_exit(0, "run", scenario, "--seeds", 2, "--set", "angle=30", "--out", folder / "seeds")
+    rows = list(csv.DictReader((folder / "seeds" / "runs.csv").open()))
+    assert [row["seed"] for row in rows] == ["1", "2"] and rows[0]["angle_error_max_deg"] != rows[1]["angle_error_max_deg"], rows
+    assert json.loads((folder / "seeds" / "result.json").read_text())["runs"] == 2
+    expect_exit(2, "run", scenario, "--seeds", 0)
     failed = expect_exit(1, "run", scenario, "--set", "sensor.offset_A=[1, 0, 0]")
     assert "FAIL  " in failed.stdout, failed.stdout
 

@@ -51,6 +51,28 @@ std::string trace_of(const std::string &text, const std::string &name)
     return content(file.path());
 }
 
+TEST(Runner, EachSeedHasItsWorstRunAndTheyAreRanked)
+{
+    ScenarioFile file = file_of(small_scenario() + "sweep: {unused: [0, 1]}\n");
+    file.repeat(3);
+    ASSERT_EQ(file.runs().size(), 6U);
+    EXPECT_EQ(file.runs()[1].name, "unused=0 seed=2");
+    EXPECT_EQ(file.scenario(file.runs()[1]).seed, 2U);
+    Expectation expectation;
+    expectation.max = 10;
+    SweepResult result;
+    for (const double value : {1.0, 2.0, 9.0, 3.0, 5.0, 4.0}) {
+        const size_t count = file.scenario(file.runs().front()).expect.size();
+        result.runs.push_back({std::vector<Outcome>(count, judge(expectation, {value, ""})), 0.0});
+    }
+    const Verdict seen = verdicts(file, result).front();
+    EXPECT_EQ(seen.seeds, 3U);
+    EXPECT_EQ(seen.worst.value.number, 9);  // of seed 3
+    EXPECT_EQ(seen.median.value.number, 5); // of seed 2
+    EXPECT_EQ(seen.best.value.number, 3);   // of seed 1
+    EXPECT_EQ(seen.worst_run, 2U);
+}
+
 TEST(Runner, SameSeedSameTraceOtherSeedOtherTrace)
 {
     const std::string one = trace_of(small_scenario() + "seed: 3\n", "pmsim_a.csv");
