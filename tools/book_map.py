@@ -6,12 +6,14 @@ usage: book_map.py [--check] [--root DIR]
 Rows and sections are those of tools/pmsim/methods.def, with the proofs of what belongs to no list; a method of a list says
 in `book` of its own x.yaml which rows it implements, and tools/pmsim/methods_of_lists.def is made from these. A source belongs to the rows that its comments name
 ("row 14", "rows 21 to 23"). Refused are orphans: a row that is there without a source or whose proof is missing, and
-a source that names a row which is not there. --check writes nothing and fails also when the page is not up to date.
+a source that names a row which is not there; also a proof that does not have the bound asked of its row (acceptance.py). --check writes nothing and fails also when the page is not up to date.
 """
 import argparse
 import re
 import sys
 from pathlib import Path
+
+import acceptance
 
 METHOD = re.compile(r'^PM_METHOD\((\d+), "(.*?)", "(.*?)", (\w+), "(.*?)", "(.*?)"\)', re.MULTILINE)
 CLAIM = re.compile(r'- \{row: (\d+), parameter: (?:""|(\w+)), proof: ([\w/]+)\}')
@@ -138,7 +140,7 @@ def main():
         methods, files = read(options.root), sources(options.root)
     except Refused as refused:
         sys.exit(str(refused))
-    found = list(orphans(options.root, methods, files))
+    found = list(orphans(options.root, methods, files)) + list(acceptance.faults(methods, options.root))
     for name, text in ("docs/book.md", page(methods, files)), (CLAIMED, claimed_rows(options.root)):
         path = options.root / name
         if not options.check:

@@ -10,11 +10,28 @@ METHODS = """PM_METHOD(12, "2.2.1", "Flux linkage", IMPLEMENTED, "observer", "sp
 PM_METHOD(13, "2.2.2", "Active flux", IMPLEMENTED, "", "observers/active")
 PM_METHOD(14, "2.3.1", "Back-EMF", NOT_YET, "", "")
 """
+SCENARIO = """duration_s: 4
+cases:
+- {name: slow, most: 2}
+- {name: "twin: off", most: 9}
+expect:
+- {metric: angle_error_max_deg, window_s: [2, 3], max: $most, book: "2.2.1"}
+- {metric: fault, equals: NONE, book: "2.2.1"}
+"""
+ASKED = """12:
+- {asks: largest, metric: angle_error_max_deg, max: 2, scenario: spm, not: twin}
+- {asks: no fault, metric: fault, equals: NONE, scenario: spm}
+13:
+- {asks: largest, measured: active_, max: 2, test: observers/active}
+- {asks: all, bound: 3 deg, test: observers/active, is: Active.IsRight}
+"""
 WHOLE = {
     "tools/pmsim/methods.def": METHODS,
     "observers/flux.h": "/* Flux (METHODS.md 2.2, rows 12 and\n * 13). */\n",
-    "tests/scenario/spm.yaml": "",
-    "tests/unit/observers/active_test.cpp": "",
+    "tests/scenario/spm.yaml": SCENARIO,
+    "tests/unit/observers/active_test.cpp": 'TEST(Active, IsRight) { measured("active_error", 1, 2, "deg", "2.2.2"); }',
+    "tests/acceptance.yaml": ASKED,
+    "docs/methods_notes.md": "# Notes\n\n## Why three\n",
 }
 
 
@@ -24,7 +41,6 @@ def plant(folder, changes):
             path = Path(folder) / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
-    (Path(folder) / "docs").mkdir()
 
 
 def run_only(changes):
@@ -58,11 +74,15 @@ class BookMap(unittest.TestCase):
 
     def test_a_method_of_a_list_claims_its_rows(self):
         claim = {"observers/x.yaml": "# X.\nbook:\n- {row: 14, parameter: \"\", proof: spm}\nknows: R\n",
-                 "observers/x.h": "/* row 14 */"}
+                 "observers/x.h": "/* row 14 */",
+                 "tests/acceptance.yaml": ASKED + "14:\n- {asks: x, metric: fault, equals: NONE, scenario: spm, also: [2.2.1]}\n"}
         code, message, page = run(claim)
         self.assertEqual((code, message), (0, ""))
         self.assertIn("| 2.3.1 | 14 | Back-EMF | [x.h](../observers/x.h) | always | [spm.yaml]", page)
         self.assertIn("3 of 3 rows.", page)
+        code, message, _ = run({**claim, "tests/acceptance.yaml": ASKED})
+        self.assertEqual(code, 1)
+        self.assertIn("row 14 is implemented, but tests/acceptance.yaml asks nothing of it", message)
 
     def test_a_claim_that_cannot_be_meant_is_refused_with_its_line(self):
         for text, reason in (("- {row: 14}", "observers/x.yaml:2: not {row: N"),
@@ -93,6 +113,29 @@ class BookMap(unittest.TestCase):
         code, message, _ = run({"observers/emf.h": "/* back-EMF, row 14 */"})
         self.assertEqual(code, 1)
         self.assertIn("observers/emf.h: row 14 is not implemented", message)
+
+    def test_a_proof_that_does_not_have_what_is_asked_is_refused(self):
+        for old, new, reason in (
+                ("max: 2, scenario", "max: 1, scenario", "the bound of angle_error_max_deg is looser than asked"),
+                (", not: twin", "", "is looser than asked"),
+                ("not: twin", "case: fast", "spm.yaml has no such case"),
+                ("metric: angle_error_max_deg", "metric: angle_error_mean_deg", "spm.yaml expects no angle_error_mean_deg for 2.2.1"),
+                ("max: 2, scenario: spm,", "max: 2, scenario: spm, window_s: 2,", "expects no angle_error_max_deg for 2.2.1"),
+                ("equals: NONE", "equals: STALL", "the bound of fault is looser than asked"),
+                ("scenario: spm}", "scenario: none}", "tests/scenario/none.yaml is missing"),
+                ("measured: active_", "measured: passive_", "observers/active measures no passive_"),
+                ("Active.IsRight", "Active.IsWrong", "observers/active has no test Active.IsWrong"),
+                ("asks: largest, metric", "asked: largest, metric", "unknown asked"),
+                ("13:\n", "14:\n", "row 14 is not implemented"),
+                ("max: 2, scenario", "max: 1, looser: {to: 2, why: Why four}, scenario", 'no heading "Why four"')):
+            self.assertIn(old, ASKED)
+            code, message, _ = run({"tests/acceptance.yaml": ASKED.replace(old, new, 1)})
+            self.assertEqual(code, 1, old)
+            self.assertIn(reason, message)
+
+    def test_a_looser_bound_may_stand_with_its_reason(self):
+        asked = ASKED.replace("max: 2, scenario", "max: 1, looser: {to: 2, why: Why three}, scenario")
+        self.assertEqual(run({"tests/acceptance.yaml": asked})[:2], (0, ""))
 
     def test_a_page_that_is_not_up_to_date_is_refused(self):
         code, message, _ = run({}, check_again="/* rows 12, 13: here */")
