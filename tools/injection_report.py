@@ -2,7 +2,7 @@
 """Writes docs/results/injection.md: one set of scenarios over all low-speed position sources of injection/injections.def,
 with the settings that the file of each says under `compare`; a plot beside it.
 
-usage: injection_report.py [--machines N] [--only NAME...] [--out DIR]
+usage: injection_report.py [--machines N] [--only NAME...] [--out DIR] | --check
 """
 import argparse
 import csv
@@ -304,15 +304,27 @@ def page(rows, results, plot_name, values, bytes_of):
     return "\n".join(text)
 
 
+def probe_page(names, path):
+    """Half load at slow speed, forwards, every source."""
+    common.check(path, [("free rotor under speed control", "50 %", f"`{name}`, forwards",
+                         lambda n=n, name=name: slow().run(n, [*(f"{key}={value}" for key, value in settings(name).items()),
+                                                               "case=0.5 1"]))
+                        for n, name in enumerate(names)])
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--machines", type=int, default=20)
     parser.add_argument("--only", nargs="*")
     parser.add_argument("--out", type=Path, default=ROOT / "docs/results")
+    parser.add_argument("--check", action="store_true", help="write nothing; fail when the page is not up to date")
     options = parser.parse_args()
     rows = methods(LIST)
     names = [row[0] for row in rows]
     chosen = options.only or names
+    if options.check:
+        probe_page(names, options.out / "injection.md")
+        return
     if unknown := set(chosen) - set(names):
         fail(f"{LIST} has no {', '.join(sorted(unknown))}")
     if options.machines < 1:

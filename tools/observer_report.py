@@ -2,7 +2,8 @@
 """Writes docs/results/observers.md: one set of scenarios over all observers of observers/observers.def, 100 machines
 each, what they cost and what they need to know; plots beside it.
 
-usage: observer_report.py [--machines N] [--only NAME...] [--out DIR]
+usage: observer_report.py [--machines N] [--only NAME...] [--out DIR] | --check
+--check writes nothing: it measures a few cells of the page again, and fails when they are not what stands there.
 """
 import argparse
 import csv
@@ -80,6 +81,14 @@ class Study:
             lines.append(f"  - {{metric: {metric}, window_s: [{start_s}, {end_s}], max: 1000, book: \"2.3.3\"}}")
         self.text = "\n".join(lines) + "\n"
 
+    @staticmethod
+    def rows(folder):
+        """What runs.csv says of several runs, of a single one too."""
+        if (folder / "runs.csv").exists():
+            return list(csv.reader((folder / "runs.csv").open()))
+        one = json.loads((folder / "result.json").read_text())["expectations"]
+        return [[item["name"] for item in one], [item["value"] for item in one]]
+
     def run(self, method, settings=()):
         """Per case (lost, mean, rms, largest), or None where the drive refuses the method. settings: name=value."""
         chosen = [word for setting in (f"{self.parameter}={method}", *settings) for word in ("--set", setting)]
@@ -90,9 +99,9 @@ class Study:
                                  capture_output=True, text=True, check=False)
             if f"refuses parameter {self.parameter}" in run.stderr:
                 return None
-            if run.returncode > 1 or not (Path(folder) / "runs.csv").exists():
+            if run.returncode > 1:
                 fail(run.stderr or run.stdout)
-            rows = list(csv.reader((Path(folder) / "runs.csv").open()))
+            rows = self.rows(Path(folder))
         columns = [next(k for k, name in enumerate(rows[0]) if name.startswith(metric)) for metric in SEEN]
         result = []
         for row in rows[1:]:
@@ -100,6 +109,39 @@ class Study:
             lost = row[columns[0]] != "NONE" or not largest < 60
             result.append((lost, mean, rms, largest))
         return result
+
+
+def cells(path, heading, column):
+    """First cell of a row -> its cell in the named column, of the first table after a line of a page."""
+    lines = path.read_text(encoding="utf-8").split(heading, 1)[-1].splitlines()
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    start = next(k for k, line in enumerate(lines) if line.startswith("|"))
+    place = rows[start].index(column)
+    end = next((k for k in range(start, len(lines)) if not lines[k].startswith("|")), len(lines))
+    return {row[0]: row[place] for row in rows[start + 2:end]}
+
+
+def differs(shown, result):
+    """Is "mean, rms, largest" of a page another than what is measured now, beyond what a seed of noise makes?"""
+    if "lost" in shown or result[0]:
+        return ("lost" in shown) != result[0]
+    recorded = [float(word) for word in shown.split(",")]
+    room = 0.1 + 0.25 * recorded[2]
+    return any(abs(was - now) > room for was, now in zip(recorded, result[1:]))
+
+
+def check(path, probes):
+    """probes: (heading, column, first cell, () -> result). Fails with all cells that are not what is measured now."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        jobs = [(probe, pool.submit(probe[3])) for probe in probes]
+    stale = []
+    for (heading, column, first, _), job in jobs:
+        shown, result = cells(path, heading, column).get(first, "nothing"), job.result()[0]
+        if shown == "nothing" or differs(shown, result):
+            now = ", ".join(degrees(x) for x in result[1:])
+            stale.append(f"{path.relative_to(ROOT)}: {first}, {column}: {shown}; now {'lost' if result[0] else now}")
+    if stale:
+        fail("\n".join(["not up to date:", *stale]))
 
 
 def speed_limits(machine, speed):
@@ -356,14 +398,30 @@ def page(all_results, names, plots, counted, sizes, help_of, count):
     return "\n".join(text)
 
 
+def probe_page(ids, path):
+    """Rated load at half speed, every observer that has a row."""
+    probes = []
+    for machine in MACHINES:
+        heading = f"## {machine}"
+        for first in cells(path, heading, "50 %"):
+            number = ids.get(first.strip("`"), 0)
+            probes.append((heading, "50 %", first,
+                           lambda study=steady(machine), number=number: study.run(number, ["case=0.5 1"])))
+    check(path, probes)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--machines", type=int, default=100)
     parser.add_argument("--only", nargs="*")
     parser.add_argument("--out", type=Path, default=ROOT / "docs/results")
+    parser.add_argument("--check", action="store_true", help="write nothing; fail when the page is not up to date")
     options = parser.parse_args()
     found = observers()
     ids = {name: n for n, (name, _) in enumerate(found)}
+    if options.check:
+        probe_page(ids, options.out / "observers.md")
+        return
     chosen = [name for name, _ in found if not options.only or name in options.only]
     counted, sizes = cost()
     options.out.mkdir(parents=True, exist_ok=True)

@@ -2,7 +2,8 @@
 """Fills docs/performance.md, between `<!-- measured -->` and `<!-- end -->`, with what is measured now.
 
 The builds must be there: tools/performance_report makes them first. --keep-speed leaves the speed of the emulation as it
-stands: on a machine that is not quiet.
+stands: on a machine that is not quiet. --check writes nothing: it fails when instructions of a control period or bytes of an image
+are not those of the page.
 """
 import json
 import re
@@ -107,7 +108,20 @@ def observer_rows(folder):
                f"{run['control.worst_percent']:.1f} %", f"{run['load_percent']:.1f} %"]
 
 
+def check():
+    with tempfile.TemporaryDirectory(prefix="pm_performance") as name:
+        steps = [(image, count_step(Path(name), image)) for image in IMAGES]
+    page = PAGE.read_text()
+    lines = ["| " + " | ".join(row) + " |" for row in (*step_rows(steps), *size_rows())]
+    stale = [line for line in lines if line not in page]
+    if stale:
+        sys.exit("\n".join([f"{PAGE.relative_to(ROOT)} is not up to date; now:", *stale, "tools/performance_report --keep-speed"]))
+
+
 def main():
+    if "--check" in sys.argv[1:]:
+        check()
+        return
     with tempfile.TemporaryDirectory(prefix="pm_performance") as name:
         folder = Path(name)
         steps = [(image, count_step(folder, image)) for image in IMAGES]

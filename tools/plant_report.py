@@ -151,6 +151,27 @@ def speed():
     return "\n".join(lines)
 
 
+def figures(table):
+    """What a table says: check, bound and unit -> worst value."""
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines() if line.startswith("| ")]
+    return {(row[0], row[2], row[3]): float(row[1].replace("**FAIL**", "")) for row in rows[1:] if len(row) == 6}
+
+
+def check(measured):
+    """Is the page's table what tests have written? A figure may move by half, or by a twentieth of its bound."""
+    page = PAGE.read_text(encoding="utf-8")
+    shown = figures(re.search(r"<!-- measured -->\n(.*?)<!-- end -->", page, re.DOTALL)[1])
+    now = figures(measured_table(measured))
+    stale = [f"{what}, bound {bound} {unit}: {'there' if key in now else 'no test measures it'}, "
+             f"{'' if key in shown else 'not in the page'}"
+             for key in sorted(shown.keys() ^ now.keys()) for what, bound, unit in [key]]
+    for key in sorted(shown.keys() & now.keys()):
+        if abs(now[key] - shown[key]) > max(0.5 * shown[key], 0.05 * float(key[1])):
+            stale.append(f"{key[0]}: {now[key]:.1e}, in the page {shown[key]:.1e}")
+    if stale:
+        sys.exit("\n".join(["docs/plant.md is not up to date:", *stale, "tools/plant_report"]))
+
+
 def motulator(folder):
     script = [sys.executable, ROOT / "tests/optional/motulator_test.py", PMSIM, BUILD / "motulator"]
     path, code = run_measured(script, folder, "motulator.csv")
@@ -174,6 +195,9 @@ def fill(page, name, text):
 
 
 def main():
+    if sys.argv[1:2] == ["--check"]:
+        check(sys.argv[2])
+        return
     page = PAGE.read_text(encoding="utf-8")
     page = fill(page, "speed", speed())  # first, while the machine is quiet
     with tempfile.TemporaryDirectory() as name:
