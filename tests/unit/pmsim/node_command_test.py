@@ -72,18 +72,21 @@ def lateness_is_reported():
     assert lost_s > 0.5 and latest_s > 0.5
 
 
-def a_short_pause_is_caught_up():
-    """Simulated time is that of the wall again, whatever else the computer had to do."""
+def is_caught_up():
     node = Node(PMSIM, "slcan:")
     node.time_of("off$")
-    began = time.monotonic()
     node.process.send_signal(signal.SIGSTOP)
     time.sleep(0.12)
     node.process.send_signal(signal.SIGCONT)
     time.sleep(0.5)
     simulated_s, latest_s, lost_s = stop(node)
     assert latest_s > 0.1
-    assert simulated_s + lost_s > 0.55 or time.monotonic() - began > 2.0, (simulated_s, lost_s)
+    return simulated_s + lost_s > 0.55
+
+
+def a_short_pause_is_caught_up():
+    """Simulated time is that of the wall again, unless another program takes the processor just then: not three times."""
+    assert any(is_caught_up() for _ in range(3))
 
 
 def duration_ends_it():
