@@ -10,7 +10,7 @@ import asammdf
 from matplotlib import image
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "pmdrive"))
-from pmdrive import names, trace  # noqa: E402
+from pmdrive import names, trace, watch  # noqa: E402
 
 COUNT, PERIOD_S, BEFORE = 500, 50e-6, 50
 
@@ -45,6 +45,21 @@ class Recording(unittest.TestCase):
         colours = {tuple(pixel) for row in pixels[::2, ::2, :3] for pixel in row.tolist()}
         self.assertGreater(len(colours), 10)  # axes, text and curves
         self.assertGreater((pixels[:, :, 2] > pixels[:, :, 0] + 0.3).sum(), 500, "no blue curve")
+
+    def test_picture_of_what_was_watched(self):
+        history = watch.History(self.recording.entries)
+        for n in range(50):
+            history.time_s.append(0.1 * n)
+            for entry, column in zip(history.entries, self.columns):
+                history.values[entry].append(column[10 * n])
+        path = str(Path(self.folder.name) / "watched.png")
+        watch.picture(history, path)
+        self.assertGreater((image.imread(path)[:, :, 2] > image.imread(path)[:, :, 0] + 0.3).sum(), 300, "no blue curve")
+        terminal = watch.Terminal()
+        terminal.plot.show = lambda: None
+        terminal.plot.clear_terminal = lambda: None
+        terminal.draw(history)
+        self.assertIn("i_q", terminal.plot.build())
 
     def test_table(self):
         with open(self.written("a.csv"), encoding="ascii") as file:

@@ -192,6 +192,36 @@ class Values(Bench):
         found = self.json("set", "i_max=9.5", code=1)[0]
         self.assertEqual((found["abort"], found["index"], found["sub"]), (0x06040043, 0x2200, 1))
 
+    def test_version(self):
+        out = io.StringIO()
+        with contextlib.redirect_stdout(out), self.assertRaises(SystemExit):
+            cli.main(["--version"])
+        self.assertRegex(out.getvalue(), r"pmdrive [\d.]+, object dictionary revision [\d.]+")
+
+    def test_a_node_with_another_dictionary_is_named(self):
+        self.assertEqual(self.command("get", "i_q")[1], "")
+        with mock.patch.object(dictionary, "REVISION", 0x00020003):
+            _, err = self.command("get", "i_q")
+            self.assertIn("revision 1.0 of the object dictionary, this tool 2.3", err)
+            self.assertEqual(self.command("stop")[1], "")  # which loses no time
+        with mock.patch.object(dictionary, "PRODUCT_CODE", 0x1234):
+            self.assertIn("no pmdrive", self.command("get", "i_q")[1])
+
+    def test_another_node_id(self):
+        out, _ = self.command("bus", "--node-id", "9")
+        self.assertIn("node 9 answers", out)
+        self.assertEqual(self.json("scan")[0]["nodes"], [9])
+        self.command("bus", "--bit-rate", "250kbit/s", node=9)
+        self.assertEqual(self.node.kept[(0x2080, 2)], 250)
+        self.assertIn("neither", self.command("bus", code=2)[1])
+        self.assertIn("above the most", self.command("bus", "--node-id", "128", code=1)[1])
+
+    def test_a_node_that_nobody_knows(self):
+        """By LSS, alone on the bus."""
+        out, _ = self.command("bus", "--lss", "--node-id", "12", node=77)
+        self.assertIn("node 12 answers", out)
+        self.assertEqual(self.json("scan")[0]["nodes"], [12])
+
     def test_info(self):
         self.assertEqual(self.json("info")[0]["identity.product_code"]["value"], dictionary.PRODUCT_CODE)
         self.assertIn("0.0001 ohm to 100 ohm", self.command("info", "R_s")[0])
@@ -251,7 +281,7 @@ class Sets(Bench):
         self.assertEqual(len(files.read(path)), len(names.stored()))
         self.command("set", "R_s=6", "psi_m=0.236")
         self.assertEqual({x["name"] for x in self.json("diff", path)[0]}, {"R_s", "psi_m"})
-        self.json("load", path)
+        self.json("load", path, "--yes")
         self.assertEqual(self.json("diff", path), [[]])
         self.assertEqual((self.node["R_s"], self.node["psi_m"]), (6500000, 200000000))
 
@@ -391,6 +421,40 @@ class Motion(Bench):
             self.wait(lambda: self.node["velocity_actual"] == 0)
             self.assertEqual(self.node.fault, 0)
 
+    def test_interrupted_once_more_it_is_off_at_once(self):
+        """Stopping takes its time; who interrupts that too does not leave a motor that runs."""
+        with self.connect() as drive:
+            words = []
+            def heard(motion_, controlword, original=motion.Motion._send):
+                words.append(controlword)
+                original(motion_, controlword)
+            with mock.patch.object(motion.Motion, "_send", heard), self.assertRaises(KeyboardInterrupt):
+                with motion.Motion(drive, "speed", speed=20000):
+                    self.wait(lambda: drive.read("velocity_actual") == 20000)
+                    drive.state = mock.Mock(side_effect=KeyboardInterrupt)  # the second, while it slows down
+                    raise KeyboardInterrupt
+            self.assertEqual(words[-2:], [motion.SWITCH_ON, 0])
+            self.wait(lambda: not self.node.lib.cia402_on(self.node.profile))
+
+    def test_backwards_without_dashes(self):
+        seen = self.json("run", "speed", "-200rpm", "--for", "1.5")
+        self.assertLess(seen[-1]["velocity_actual"]["value"], -10)
+
+    def test_what_limits_the_motor_is_said(self):
+        self.node["drive_limits"] = 9
+        out, _ = self.command("run", "speed", "200rpm", "--for", "0.3")
+        self.assertIn("limited by: DC-link voltage, current", out)
+        self.node["drive_limits"] = 0
+        self.assertNotIn("limited by", self.command("run", "speed", "200rpm", "--for", "0.3")[0])
+
+    def test_watch(self):
+        rows = self.json("watch", "i_q", "--for", "0.3", "--interval", "0.05")
+        self.assertGreater(len(rows), 3)
+        self.assertEqual(rows[0]["i_q"]["unit"], "A")
+        self.assertIn("velocity_actual", self.command("watch", "--for", "0.1")[0])
+        _, err = self.command("watch", "--out", "x.txt", code=2)
+        self.assertIn(".png", err)
+
     def test_commands_cease(self):
         """The program is killed: the drive's own timer switches the torque off."""
         with self.connect() as drive:
@@ -487,6 +551,14 @@ class Identification(Bench):
         self.assertEqual(self.node["leg_capacitance"], 480)
         _, err = self.command("identify", "--only", "colour", "--yes", code=2)
         self.assertIn("resistance, inductance, flux, mechanics", err)
+
+    def test_json_does_not_answer_for_the_user(self):
+        for words in ["identify"], ["tune", "--bandwidth", "300"]:
+            with mock.patch.object(sys, "stdin", io.StringIO()):
+                answer = self.json(*words, code=2)[-1]
+            self.assertEqual(answer["do"], "--yes")
+        self.assertIsNone(self.node.enabled_at)
+        self.assertNotEqual(self.node["current_bandwidth"], 300000)
 
     def test_asks_before_the_motor_turns(self):
         with mock.patch.object(sys, "stdin", io.StringIO()):

@@ -12,5 +12,7 @@ from .bus import connect, scan
 from .drive import Drive
 from .errors import (BusError, FaultError, NoAnswer, NotDone, PmdriveError, Refused, UsageError, ValueRefused)
 
+VERSION = "1.0"
+
 __all__ = ["connect", "scan", "Drive", "PmdriveError", "BusError", "FaultError", "NoAnswer", "NotDone", "Refused",
            "UsageError", "ValueRefused"]

@@ -10,9 +10,11 @@ HELD_S = 0.7  # keyboards repeat a held key after half a second
 
 
 def confirm(question):
+    """Asks at the terminal; standard output belongs to the answer of the command."""
     if not sys.stdin.isatty():
         raise UsageError(f"{question} There is no terminal to ask at", "--yes")
-    return input(f"{question} [y/N] ").strip().lower() in ("y", "yes")
+    print(f"{question} [y/N] ", end="", file=sys.stderr, flush=True)
+    return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
 class Timed:

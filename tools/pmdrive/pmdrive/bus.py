@@ -5,7 +5,7 @@ import can
 import canopen
 
 from .drive import Drive
-from .errors import BusError, UsageError
+from .errors import BusError, NotDone, UsageError
 
 KINDS = "can0, vcan0 (SocketCAN); socketcand:HOST:PORT[:CHANNEL]; slcan:DEVICE; or INTERFACE:CHANNEL of python-can"
 
@@ -45,6 +45,31 @@ def connect(spec, node=1, bitrate=500000):
     if not 1 <= node <= 127:
         raise UsageError(f"node id {node} is not 1 to 127")
     return Drive(open_network(spec, bitrate), node)
+
+
+BIT_TIMINGS = {1000: 0, 500: 2, 250: 3, 125: 4}  # CiA 305, table 0: kbit/s
+
+
+def configure_alone(spec, bitrate, wanted):
+    """Node id and bit rate of the only device on the bus by LSS (CiA 305), kept; the device then restarts with them."""
+    network = open_network(spec, bitrate)
+    try:
+        lss = network.lss
+        lss.send_switch_state_global(lss.CONFIGURATION_STATE)
+        if "can_node_id" in wanted:
+            lss.configure_node_id(wanted["can_node_id"])
+        if "can_bit_rate" in wanted:
+            lss.configure_bit_timing(BIT_TIMINGS[wanted["can_bit_rate"]])
+        lss.store_configuration()
+        lss.send_switch_state_global(lss.WAITING_STATE)
+        network.send_message(0, bytes([129, 0]))
+    except canopen.lss.LssError as error:
+        raise NotDone(f"the device does not take it: {error}", "one drive alone on the bus, its bridge off? cable, bit rate and power"
+                      ) from None
+    except can.CanError as error:
+        raise BusError(f"cannot send on {spec}: {error}", "nobody acknowledges: check cable, bit rate and power") from None
+    finally:
+        network.disconnect()
 
 
 def scan(spec, bitrate=500000, seconds=1.0, progress=None):

@@ -3,9 +3,11 @@ import argparse
 import json
 import logging
 import os
+import re
 import sys
 
-from . import bus, command_device, command_machine, command_motor, command_sets, command_values
+from . import VERSION as TOOL
+from . import bus, command_device, command_machine, command_motor, command_sets, command_values, dictionary
 from .errors import PmdriveError, UsageError
 from .output import Output
 
@@ -17,6 +19,7 @@ examples:
   pmdrive dump >motor.yaml; pmdrive diff motor.yaml; pmdrive load motor.yaml
   pmdrive identify; pmdrive tune; pmdrive save  from a new motor to one that runs
   pmdrive run speed 300rpm --for 5              never longer than someone attends
+  pmdrive watch velocity_actual i_q             curves in the terminal
   pmdrive trace i_d i_q theta --trigger i_q --level 2A --out start.csv
   pmdrive --can can0 flash pmdrive.elf          writes the firmware, then looks on the bus whether it runs
 
@@ -24,9 +27,14 @@ CAN interface and node id may also stand in PMDRIVE_CAN and PMDRIVE_NODE. A CAN 
   """ + bus.KINDS
 
 
+NEGATIVE = re.compile(r"-\.?\d")  # a number, as in `run speed -300rpm`; argparse takes it for an option unless a space comes first
+VERSION = f"pmdrive {TOOL}, object dictionary revision {dictionary.REVISION >> 16}.{dictionary.REVISION & 0xFFFF}"
+
+
 def parser():
     top = argparse.ArgumentParser(prog="pmdrive", description="Tunes the sensorless motor drive over CAN.",
                                   epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter)
+    top.add_argument("--version", action="version", version=VERSION)
     top.add_argument("--can", default=os.environ.get("PMDRIVE_CAN"), help="CAN interface (PMDRIVE_CAN, else can0)")
     top.add_argument("--node", type=int, default=int(os.environ.get("PMDRIVE_NODE", "1")), help="node id (%(default)s)")
     top.add_argument("--bitrate", type=int, default=500000, help="bit/s, where the adapter takes it (%(default)s)")
@@ -48,6 +56,9 @@ def parser():
     return top
 
 
+SILENT = "stop", "flash"  # what must not wait, or is there to mend it
+
+
 def shell(arguments, drive, _):
     from .shell import Shell
 
@@ -64,6 +75,10 @@ def helped(top, kinds, command):
     (kinds.choices[command] if command else top).print_help()
 
 
+def parse(words):
+    return parser().parse_args([" " + word if NEGATIVE.match(word) else word for word in words])
+
+
 def run(arguments, drive=None, out=None):
     """Carries out parsed arguments; over a drive that is connected already, if one is given."""
     out = out or Output(arguments.json)
@@ -74,6 +89,8 @@ def run(arguments, drive=None, out=None):
         arguments.function(arguments, drive, out)
         return
     with bus.connect(arguments.can, arguments.node, arguments.bitrate) as drive:
+        if arguments.command not in SILENT:
+            out.warn(drive.foreign())
         arguments.function(arguments, drive, out)
 
 
@@ -82,7 +99,7 @@ def main(words=None):
     for library in ("can", "canopen"):  # what they complain of, our own errors say
         logging.getLogger(library).setLevel(logging.CRITICAL)
     try:
-        arguments = parser().parse_args(words or ["help"])
+        arguments = parse(words or ["help"])
     except ValueError:
         print("pmdrive: PMDRIVE_NODE is not a node id", file=sys.stderr)
         return 2

@@ -10,8 +10,43 @@ from .output import show, write_text
 def add(command):
     sub = command("flash", "write an image, or a page of parameters, through the debug port", flash_board, connects="given")
     flash.add_options(sub)
+    sub = command("bus", "give the drive another node id or bit rate, kept over a reset", set_bus, connects=False)
+    sub.add_argument("--node-id", help="1 to 127")
+    sub.add_argument("--bit-rate", help="125, 250 or 500 kbit/s, 1 Mbit/s: 250, 250kbit/s")
+    sub.add_argument("--lss", action="store_true",
+                     help="by layer setting services, whatever id it has or if it has none: one drive alone on the bus")
     sub = command("eds", "the data sheet that the drive holds", eds)
     sub.add_argument("--out", help="file (standard output)")
+
+
+def set_bus(arguments, _, out):
+    given = {"can_node_id": arguments.node_id, "can_bit_rate": arguments.bit_rate}
+    wanted = {}
+    for name, text in given.items():
+        if text is not None:
+            entry = names.find(name)
+            wanted[entry] = entry.parse(text)
+            entry.check(wanted[entry])
+    if not wanted:
+        raise UsageError("neither a node id nor a bit rate is given", "--node-id N, --bit-rate N")
+    found = {entry.name: raw for entry, raw in wanted.items()}
+    node = found.get("can_node_id", arguments.node)
+    if arguments.lss:
+        bus.configure_alone(arguments.can or "can0", arguments.bitrate, found)
+    else:
+        with bus.connect(arguments.can or "can0", arguments.node, arguments.bitrate) as drive:
+            for entry, raw in wanted.items():
+                drive.write(entry, raw)
+            drive.save("communication")
+            drive.send(0, bytes([129, arguments.node]))
+    out.data({"node": node, "changed": found})
+    out.line(", ".join(f"{entry.name} {entry.text(raw)}" for entry, raw in wanted.items()))
+    if "can_bit_rate" in found:
+        out.line(f"set the interface and the other nodes to this bit rate too: --bitrate {1000 * found['can_bit_rate']}")
+        return
+    with bus.connect(arguments.can or "can0", node, arguments.bitrate) as drive:
+        drive.await_answer()
+    out.line(f"node {node} answers")
 
 
 def scan(arguments, _, out):

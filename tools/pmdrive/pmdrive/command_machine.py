@@ -27,7 +27,7 @@ def _take(arguments, drive, out, values, what):
     if not changes:
         out.line(f"{what}: nothing to change")
         return False
-    if not (arguments.yes or out.as_json) and not attend.confirm(f"write these {len(changes)} values?"):
+    if not arguments.yes and not attend.confirm(f"write these {len(changes)} values?"):
         raise NotDone("nothing was written")
     drive.load(values)
     out.line(f"{len(changes)} values written and read back")
@@ -59,7 +59,7 @@ def identify_machine(arguments, drive, out):
     current = _entry_or_zero("target_current", arguments.current)
     speed = _entry_or_zero("target_velocity", arguments.speed)
     turning = "turns" if {"flux", "mechanics"} & set(wanted) else "moves"
-    if not (arguments.yes or out.as_json) and not attend.confirm(
+    if not arguments.yes and not attend.confirm(
             f"THE MOTOR {turning.upper()} for some 15 s, with its rated current. Is it free to?"):
         raise NotDone("nothing was done")
     _name_plate(arguments, drive, out)

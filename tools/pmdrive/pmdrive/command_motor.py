@@ -1,8 +1,10 @@
 """The motor: running it, looking at it, what went wrong."""
+import sys
 import time
 
 from . import attend, motion, names
 from . import trace as scope
+from . import watch as live
 from .drive import error_text
 from .output import as_json, show, shown
 
@@ -18,6 +20,11 @@ def add(command):
     sub.add_argument("names", nargs="*", help="objects or records")
     sub.add_argument("--interval", type=float, default=0.2, help="seconds (%(default)s)")
     sub.add_argument("--count", type=int, default=0, help="end after so many (0: at Ctrl-C)")
+    sub = command("watch", "live values, drawn in the terminal, and as a picture at the end", watch)
+    sub.add_argument("names", nargs="*", help="objects or records (velocity_actual i_q dc_link_voltage)")
+    sub.add_argument("--interval", type=float, default=0.1, help="seconds (%(default)s)")
+    sub.add_argument("--for", dest="seconds", type=float, help="seconds (until Ctrl-C)")
+    sub.add_argument("--out", help="picture: .png, .svg or .pdf")
     sub = command("trace", "record signals as an oscilloscope does", trace)
     sub.add_argument("signals", nargs="+", help="objects marked t in docs/object-dictionary.md")
     sub.add_argument("--divider", type=int, default=1, help="control periods per sample (%(default)s)")
@@ -43,14 +50,17 @@ def run(arguments, drive, out):
     attention = attend.attention(arguments.seconds)
     with attention, motion.Motion(drive, arguments.mode, **numbers) as running:
         entries = [names.find(name) for name in ("velocity_actual", "i_d", "i_q", "drive_limits")]
-        last = ""
+        last, limits, met = "", entries[-1], set()
         while attention.lasts():
             running.check_fault()
             values = {e: drive.read(e) for e in entries}
+            met.update(limits.flags(values[limits]))
             last = "  ".join(f"{e.name} {shown(e, raw)}" for e, raw in values.items())
             out.data(as_json(values))
             out.progress(last)
     out.line(last)
+    if met:
+        out.line(f"the motor did not always follow, it was limited by: {', '.join(sorted(met))}")
     out.line(f"stopped: {drive.state()}")
 
 
@@ -101,6 +111,31 @@ def monitor(arguments, drive, out):
         if count == arguments.count:
             return
         time.sleep(arguments.interval)
+
+
+WATCHED = ("velocity_actual", "i_q", "dc_link_voltage")
+
+
+def watch(arguments, drive, out):
+    """In a terminal as curves, else as lines."""
+    live.check_path(arguments.out)
+    history = live.History(names.select(arguments.names or WATCHED))
+    terminal = live.Terminal() if sys.stdout.isatty() and not out.as_json else None
+    end = time.monotonic() + (arguments.seconds if arguments.seconds is not None else float("inf"))
+    try:
+        while time.monotonic() < end:
+            values = history.read(drive)
+            out.data(as_json(values))
+            if terminal:
+                terminal.draw(history)
+            else:
+                out.line("  ".join(f"{entry.name} {shown(entry, raw)}" for entry, raw in values.items()))
+            time.sleep(arguments.interval)
+    except KeyboardInterrupt:
+        pass  # that is how it ends
+    if arguments.out and history.time_s:
+        live.picture(history, arguments.out)
+        out.line(f"wrote {arguments.out}")
 
 
 def faults(arguments, drive, out):

@@ -54,7 +54,7 @@ def load(arguments, drive, out):
         return
     if arguments.dry_run:
         return
-    if not (arguments.yes or out.as_json) and not attend.confirm(f"write these {len(changes)} values?"):
+    if not arguments.yes and not attend.confirm(f"write these {len(changes)} values?"):
         raise NotDone("nothing was written")
     drive.load(values, progress=out.progress)
     out.line(f"{len(changes)} values written and read back; `pmdrive save` keeps them over a reset")

@@ -224,6 +224,19 @@ class Drive:
                   "drive_state", "drive_fault", "dc_link_voltage", "temperature")
         return {name: self.read(name) for name in wanted}
 
+    def foreign(self):
+        """Why the node's dictionary may be another than this tool's; "" if it is the same, or nobody answers."""
+        try:
+            product, revision = self.read("identity.product_code"), self.read("identity.revision")
+        except (NoAnswer, Refused):
+            return ""
+        if product != dictionary.PRODUCT_CODE:
+            return f"node {self.node_id} is no pmdrive: its product code is {product:08X}h"
+        if revision != dictionary.REVISION:
+            return (f"node {self.node_id} has revision {revision >> 16}.{revision & 0xFFFF} of the object dictionary, this tool "
+                    f"{dictionary.REVISION >> 16}.{dictionary.REVISION & 0xFFFF}: names may mean something else")
+        return ""
+
     def state(self):
         return state_of(self.read("statusword"))
 

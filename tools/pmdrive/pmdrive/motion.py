@@ -99,7 +99,7 @@ class Motion:
         self._send(QUICK_STOP)
 
     def stop(self, seconds=30.0):
-        """Slows down, then off; the commands go on until it is off."""
+        """Slows down, then off; the commands go on until it is off. Who interrupts that wants the bridge off at once."""
         if self.task is None:
             return
         try:
@@ -109,6 +109,9 @@ class Motion:
                 time.sleep(0.02)
             self._send(0)
             time.sleep(2 * PERIOD_S)
+        except KeyboardInterrupt:
+            self._send(0)
+            raise
         finally:
             self.task.stop()
             self.task = None

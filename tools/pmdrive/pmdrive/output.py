@@ -21,6 +21,11 @@ class Output:
         if self.as_json:
             print(json.dumps(data), file=self.stream, flush=True)
 
+    @staticmethod
+    def warn(text):
+        if text:
+            print(f"pmdrive: {text}", file=sys.stderr)
+
     def progress(self, *what):
         if not self.as_json and sys.stderr.isatty():
             text = f"{what[0]}/{what[1]}" if len(what) == 2 else str(what[0])

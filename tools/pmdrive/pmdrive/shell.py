@@ -24,7 +24,7 @@ class Shell(cmd.Cmd):
             return True
         try:
             words = ["--json"] if self.arguments.json else []
-            arguments = cli.parser().parse_args([*words, *shlex.split(line)])
+            arguments = cli.parse([*words, *shlex.split(line)])
             if arguments.command != "shell":
                 cli.run(arguments, self.drive)
         except PmdriveError as error:
