@@ -37,7 +37,7 @@ KEPT = "name", "metric", "pass", "value", "median", "best", "seeds", "bound", "u
 HEAD = """# Results
 
 What the closed loop does, measured on the switching-level plant by the scenarios of `tests/scenario`. Made by `tools/results`
-from {seeds} seeds of noise each; a bound that does not hold fails `tools/check`, which runs one seed and compares it with these.
+with several seeds of noise each; a bound that does not hold fails `tools/check`, which runs one seed and compares it with these.
 Position errors are electrical degrees, truth minus estimate. A value is that of the worst run of a sweep: with the worst seed,
 and with the median of the seeds.
 
@@ -140,11 +140,15 @@ def table(result):
     return "\n".join(lines)
 
 
+def seeds_of(result):
+    return result["expectations"][0]["seeds"]
+
+
 def page(record):
-    seeds = max((item["seeds"] for result in record.values() for item in result["expectations"]), default=0)
-    parts = [HEAD.format(seeds=seeds), acceptance.page(record, read_figures()), "\n# All scenarios\n"]
+    parts = [HEAD, acceptance.page(record, read_figures()), "\n# All scenarios\n"]
     for name, result in sorted(record.items()):
-        parts.append(f"\n## {result['title']}\n\n`{name}.yaml`, {result['simulated_s']:.1f} s simulated\n\n{table(result)}\n")
+        parts.append(f"\n## {result['title']}\n\n`{name}.yaml`, {seeds_of(result)} seeds, {result['simulated_s']:.1f} s "
+                     f"simulated\n\n{table(result)}\n")
     return "".join(parts)
 
 
@@ -163,7 +167,6 @@ def readme(record):
     """The table of the README, from the records."""
     starts, steady, effects = "ipm_start_grid", "ipm_steady_grid", "ipm_all_effects"
     count = record[starts]["runs"]
-    seeds = record[starts]["expectations"][0]["seeds"]
     wrong = [item for item in record[starts]["expectations"] if not item["pass"]]
     steps = re.findall(r"\| (?:active flux, high speed|square-wave injection) \| (\d+) ", (ROOT / PERFORMANCE).read_text())[:2]
 
@@ -173,7 +176,7 @@ def readme(record):
     return f"""
 | | |
 |---|---|
-| {count} starts: 72 angles, both directions, without load and with 50 %, {seeds} seeds | {'NOT all' if wrong else 'all'} in the right direction, \
+| {count} starts: 72 angles, both directions, without load and with 50 %, {seeds_of(record[starts])} seeds | {'NOT all' if wrong else 'all'} in the right direction, \
 backward movement below {up(worst(record, [starts], 'backward_movement_deg_mech'))}° |
 | 0 to 100 % speed, 0 to 100 % load | {mean_and_largest(steady)} |
 | Load step 0 to 100 % at 2 % and 50 % speed; reversal through zero at 50 % load | \
