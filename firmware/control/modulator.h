@@ -3,7 +3,8 @@
  *
  * Min-max zero sequence: linear up to v_dc/sqrt(3) in every direction, to the hexagon in its corners. Beyond
  * the hexagon the vector is shortened along its own direction, so the angle is kept; the realised vector is
- * returned. Compensation adds to each leg the on-time that dead time and device drops take from it, with the
+ * returned. Largest fundamental of a vector that turns evenly: 1.049 v_dc/sqrt(3); how far current control
+ * goes is `voltage_limit`. Compensation adds to each leg the on-time that dead time and device drops take from it, with the
  * sign of the leg's current:
  *   +-(T_dt/T_s + V_drop/v_dc) f(|i|),   at most a quarter of the period
  * The capacitance C of a leg gives part of it back, since the current has to move the node: with I_1 = C v_dc
@@ -16,7 +17,8 @@
  *
  * modulator_step() once per period; the output holds over the next one, so i is the current expected there.
  * One division. modulator_slow() at 1 kHz with the link voltage, and once before the first step. Range:
- * |v| < 4, v_dc >= 1/16, timer_counts < 2^15. Tests: tests/unit/control/modulator_test.cpp. */
+ * |v| < 4, v_dc >= 1/16, timer_counts < 2^15. Tests: tests/unit/control/modulator_test.cpp,
+ * tests/scenario/overmodulation.yaml. */
 #ifndef CONTROL_MODULATOR_H
 #define CONTROL_MODULATOR_H
 

@@ -119,8 +119,8 @@ static void make_limits(maker_t *m, drive_config_t *config)
     config->i_max = per_unit(m, DRIVE_PARAM_i_max, m->base.i);
     config->i_d_light = per_unit(m, DRIVE_PARAM_i_d_light, m->base.i);
     config->omega_max = speed(m, DRIVE_PARAM_speed_max);
-    config->v_linear = fixed(m, pm_num_mul(pm_num_ratio(98, 100), pm_num_sqrt(pm_num_ratio(1, 3))), UNIT_BITS,
-                             DRIVE_PARAM_v_full_scale);
+    config->v_share = fixed(m, pm_num_mul(si(m, DRIVE_PARAM_voltage_limit), pm_num_sqrt(pm_num_ratio(1, 3))),
+                            UNIT_BITS, DRIVE_PARAM_voltage_limit);
     config->machine.R_s = per_unit(m, DRIVE_PARAM_R_s, m->impedance);
     config->machine.L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
     config->machine.L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);

@@ -64,7 +64,7 @@ typedef struct {
     pm_q_t i_max;
     pm_q_t i_d_light;
     pm_q_t omega_max;
-    pm_unit_t v_linear; /* share of v_dc that the voltage vector may reach */
+    pm_unit_t v_share; /* share of v_dc that the voltage vector may reach */
     pm_machine_t machine;
 } drive_config_t;
 

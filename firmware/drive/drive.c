@@ -363,10 +363,10 @@ PM_RARE void drive_prepare(drive_t *drive)
     drive->usual = drive->stage == STAGE_VECTOR && drive->config.regulator.id == REGULATOR_INLINE;
     drive->ahead = pm_dir((pm_angle_t)turn + (pm_angle_t)pm_half(turn));
     drive->carrier = drive->stage == STAGE_VECTOR && drive->position.inject;
-    drive->v_share = c->v_linear;
+    drive->v_share = c->v_share;
     if (drive->carrier) { /* a sagging link must not leave nothing to control with */
         const pm_unit_t reserved = pm_ratio(pm_min(c->position.injection.reserve, v_dc), v_dc);
-        drive->v_share = pm_max(c->v_linear - reserved, c->v_linear / 4);
+        drive->v_share = pm_max(c->v_share - reserved, c->v_share / 4);
     }
     prepare_current_control(drive);
     modulator_slow(&drive->modulator, &c->modulator, pm_max(v_dc, V_DC_LEAST));

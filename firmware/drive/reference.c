@@ -43,7 +43,7 @@ static pm_q_t current_for(const drive_t *drive, pm_q_t torque)
 static pm_q_t flux_current(drive_t *drive, pm_q_t i_q)
 {
     const drive_config_t *c = &drive->config;
-    const pm_q_t v_top = pm_unit(drive->status.v_dc, c->v_linear);
+    const pm_q_t v_top = pm_unit(drive->status.v_dc, c->v_share);
     const pm_q_t weak = field_weakening_step(
         &drive->field_weakening, &c->field_weakening,
         pm_hypot(pm_narrow(drive->voltage.v.d), pm_narrow(drive->voltage.v.q)), v_top - v_top / 20);

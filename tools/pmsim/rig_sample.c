@@ -102,8 +102,8 @@ void rig_fill_sample(rig_scale_t *scale, const drive_t *drive, const drive_out_t
     sample->i_q_hat_A = scale->i_A * status->i.q;
     sample->i_d_ref_A = scale->i_A * status->i_ref.d;
     sample->i_q_ref_A = scale->i_A * status->i_ref.q;
-    sample->v_alpha_V = scale->v_V * status->v.alpha;
-    sample->v_beta_V = scale->v_V * status->v.beta;
+    sample->v_alpha_V = scale->v_V * drive->v_next.alpha; /* of every period; the status has that of 1 kHz */
+    sample->v_beta_V = scale->v_V * drive->v_next.beta;
     sample->v_dc_hat_V = scale->v_V * status->v_dc;
     sample->weight = (double)status->weight / PM_ONE;
     sample->quality = (double)status->quality / PM_ONE;

@@ -231,7 +231,7 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
         {"i_max", c.i_max, 28, 5 / I},
         {"i_d_light", c.i_d_light, 28, 0.2 / I},
         {"omega_max", c.omega_max, 28, 150 * P / W},
-        {"v_linear", c.v_linear, 31, 0.98 / std::sqrt(3.0)},
+        {"v_share", c.v_share, 31, 0.98 / std::sqrt(3.0)},
     };
 }
 

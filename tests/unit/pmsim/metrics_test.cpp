@@ -202,6 +202,35 @@ TEST(Metrics, CurrentsAndTorque)
     EXPECT_NEAR(gather("torque_span_Nm", constant).number, 1.0, exact);
 }
 
+// 20 periods in a turn: fundamental of 100 V of 300 V, a fifth harmonic that turns the other way.
+TEST(Metrics, FundamentalOfTheVoltageIsWithoutItsHarmonics)
+{
+    const auto turning = [](Sample &s, int k) {
+        const double theta = 2 * pi * k / 20.0;
+        s.rig.truth.theta_e_rad = theta;
+        s.rig.truth.v_dc_V = 300.0;
+        s.rig.truth.v_mean_alpha_V = 100.0 * std::cos(theta + 1.2) + 10.0 * std::cos(5 * theta);
+        s.rig.truth.v_mean_beta_V = 100.0 * std::sin(theta + 1.2) - 10.0 * std::sin(5 * theta);
+    };
+    EXPECT_NEAR(gather("voltage_fundamental_rel", turning).number, 100.0 / (300.0 / std::sqrt(3.0)), exact);
+}
+
+TEST(Metrics, AngleOfTheVoltageIsComparedWithTheCommandOfTwoSamplesBefore)
+{
+    const auto turned = [](double error_deg) {
+        return [error_deg](Sample &s, int k) {
+            const double theta = 2 * pi * k / 20.0;
+            s.rig.v_alpha_V = 50.0 * std::cos(theta);
+            s.rig.v_beta_V = 50.0 * std::sin(theta);
+            const double then = theta - 2 * 2 * pi / 20.0 + (k == 700 ? error_deg : 0.0) * pi / 180.0;
+            s.rig.truth.v_mean_alpha_V = 40.0 * std::cos(then);
+            s.rig.truth.v_mean_beta_V = 40.0 * std::sin(then);
+        };
+    };
+    EXPECT_NEAR(gather("voltage_angle_error_max_deg", turned(0.0)).number, 0.0, 1e-6);
+    EXPECT_NEAR(gather("voltage_angle_error_max_deg", turned(-3.0)).number, 3.0, 1e-6);
+}
+
 TEST(Metrics, EveryMetricOfTheTableCanBeMade)
 {
     const pmsim::Setup setup = test_setup();
