@@ -315,6 +315,83 @@ TEST(Drive, RunningAwayIsOverSpeed)
     EXPECT_NEAR(speed, 180, 4);
 }
 
+// The other way round as well.
+TEST(Drive, RunningAwayBackwardsIsOverSpeed)
+{
+    Closed x;
+    x.command(true, -140);
+    x.run_ms(1300);
+    ASSERT_EQ(x.state(), DRIVE_RUNNING);
+    double speed = x.truth().omega_mech_rad_s;
+    ASSERT_LT(speed, -100);
+    while (x.state() == DRIVE_RUNNING && speed > -200) {
+        speed -= 0.2;
+        plant_set_speed(x.plant(), speed);
+        x.run_ms(1);
+    }
+    EXPECT_EQ(drive_status(&x.loop.app.drive)->fault, DRIVE_FAULT_OVER_SPEED);
+    EXPECT_NEAR(speed, -180, 4);
+}
+
+// Without injection the observer hands back to the open loop when the speed falls below speed_low (21 rad/s), in both
+// directions, and the rotor follows the vector; above speed_high (40 rad/s) the observer leads again.
+TEST(Drive, ObserverFallsBackToOpenLoopAtLowSpeed)
+{
+    for (const double way : {1.0, -1.0}) {
+        Closed x(ipm(), direct::params(2));
+        const drive_t &d = x.loop.app.drive;
+        x.command(true, 60 * way);
+        x.run_ms(3000);
+        ASSERT_EQ(d.stage, STAGE_VECTOR);
+        EXPECT_NEAR(x.truth().omega_mech_rad_s, 60 * way, kSpeed * 60);
+        x.command(true, 24 * way); // above speed_low nothing changes
+        x.run_ms(1500);
+        ASSERT_EQ(d.stage, STAGE_VECTOR);
+        x.command(true, 12 * way);
+        double handed_back = 0;
+        double highest = 0;
+        for (int ms = 0; ms < 3000; ++ms) {
+            x.run_ms(1);
+            const double speed = way * x.truth().omega_mech_rad_s;
+            if (d.stage == STAGE_OPEN_LOOP && handed_back == 0) {
+                handed_back = speed;
+            }
+            highest = ms > 2000 ? std::max(highest, std::abs(speed - 12)) : 0;
+        }
+        EXPECT_EQ(d.stage, STAGE_OPEN_LOOP);
+        // the estimate lags the ramp of 200 rad/s2 by 2 a / w_n, w_n = 2 pi 25 Hz
+        EXPECT_NEAR(handed_back, 21 - 2 * 200 / (2 * bench::kPi * 25), 2);
+        EXPECT_LE(highest, 3); // damped, on the vector
+        EXPECT_NEAR(way * real(drive_status(&d)->omega_ref) * 540 / 3, 12, 0.01);
+        EXPECT_EQ(x.state(), DRIVE_RUNNING);
+        x.command(true, 60 * way);
+        x.run_ms(3000);
+        EXPECT_EQ(d.stage, STAGE_VECTOR);
+        EXPECT_NEAR(x.truth().omega_mech_rad_s, 60 * way, kSpeed * 60);
+        EXPECT_EQ(drive_status(&d)->fault, DRIVE_FAULT_NONE);
+    }
+}
+
+// A stop goes through the open loop, too, and ends with the bridge off and a rotor at rest.
+TEST(Drive, StopWithoutInjectionEndsInOpenLoop)
+{
+    Closed x(ipm(), direct::params(2));
+    const drive_t &d = x.loop.app.drive;
+    x.command(true, 60);
+    x.run_ms(3000);
+    ASSERT_EQ(d.stage, STAGE_VECTOR);
+    x.command(false, 60);
+    bool open = false;
+    for (int ms = 0; ms < 3000 && x.state() != DRIVE_OFF; ++ms) {
+        x.run_ms(1);
+        open = open || d.stage == STAGE_OPEN_LOOP;
+    }
+    EXPECT_TRUE(open);
+    EXPECT_EQ(x.state(), DRIVE_OFF);
+    EXPECT_NEAR(x.truth().omega_mech_rad_s, 0, 3);
+    EXPECT_EQ(drive_status(&d)->fault, DRIVE_FAULT_NONE);
+}
+
 // Standing still on an imposed angle, a stop must end: open_loop_slow() and stop() count in the same
 // still_ms.
 TEST(Drive, StopEndsOnAnImposedAngle)

@@ -221,4 +221,34 @@ TEST(OpenLoop, ResumeKeepsCurrentAndVoltage)
     }
 }
 
+// The observer falls back to the open loop only without injection, and when both reference and estimate are below
+// omega_low (0.117 of the base), whichever way they turn.
+TEST(OpenLoop, FallsBackWhenReferenceAndEstimateAreSlow)
+{
+    const struct {
+        double reference, estimate;
+        int start;
+        bool back;
+    } cases[] = {{0.11, 0.11, 2, true},  {-0.11, -0.11, 2, true}, {0.12, 0.11, 2, false},
+                 {0.11, 0.12, 2, false}, {-0.12, 0.11, 2, false}, {0.11, -0.12, 2, false},
+                 {0.11, 0.11, 1, false}};
+    for (const auto &at : cases) {
+        Drive x(direct::params(at.start));
+        x.command.enable = true;
+        x.command.mode = DRIVE_MODE_SPEED;
+        x.command.speed_mrad_s = static_cast<int32_t>(std::lround(at.reference * 540e3 / 3));
+        drive_command(&x.d, &x.command);
+        x.step(); // measures the DC link
+        x.d.state = DRIVE_RUNNING;
+        x.d.stage = STAGE_VECTOR;
+        x.d.sequence.procedure = PROCEDURE_NONE;
+        position_reset(&x.d.position, &x.d.config.position, 0, {0, 0}, true);
+        x.d.position.pll.omega = bench::fixed(at.estimate, 28);
+        x.d.speed.reference = bench::fixed(at.reference, 28);
+        drive_slow(&x.d, &x.slow);
+        EXPECT_EQ(x.d.stage == STAGE_OPEN_LOOP, at.back) << at.reference << " " << at.estimate;
+        EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    }
+}
+
 } // namespace
