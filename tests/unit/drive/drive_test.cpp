@@ -405,6 +405,36 @@ TEST(Drive, StopEndsOnAnImposedAngle)
     EXPECT_FALSE(x.driven());
 }
 
+// 20 ms of standstill end a stop: the call after them does.
+TEST(Drive, StopWaitsForTwentyMillisecondsOfStandstill)
+{
+    Drive x;
+    x.start_current_mode();
+    x.enable(false, DRIVE_MODE_CURRENT);
+    x.run_ms(1);
+    ASSERT_EQ(x.state(), DRIVE_STOPPING);
+    int ms = 0;
+    for (; x.state() == DRIVE_STOPPING && ms < 1000; ++ms) {
+        x.run_ms(1);
+    }
+    EXPECT_EQ(ms, 21);
+}
+
+// The flag is that of the last millisecond, from the regulator or from the modulator.
+TEST(Drive, VoltageLimitIsSaidOnce)
+{
+    for (const int source : {0, 1, 2, 3}) {
+        Drive x;
+        x.start_current_mode();
+        x.d.voltage.limited = source == 1;
+        x.d.modulator.limited = source == 2 ? 1 : source == 3 ? -1 : 0;
+        drive_slow(&x.d, &x.slow);
+        EXPECT_EQ((drive_status(&x.d)->limits & DRIVE_LIMIT_VOLTAGE) != 0, source != 0) << source;
+        drive_slow(&x.d, &x.slow);
+        EXPECT_EQ(drive_status(&x.d)->limits & DRIVE_LIMIT_VOLTAGE, 0U) << source;
+    }
+}
+
 // Without a fault there is nothing to clear, and a machine that is being stopped must go on being stopped.
 TEST(Drive, ClearWithoutAFaultChangesNothing)
 {

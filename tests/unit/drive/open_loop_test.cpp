@@ -43,6 +43,16 @@ void slow(Drive &x, int ms)
     }
 }
 
+// What current control gives next while the current is what it should be, in its frame.
+Complex next_voltage(const drive_t &d, pm_dq_t i, pm_q_t omega)
+{
+    regulator_t regulator = d.regulator;
+    const regulator_in_t in = {i, i, omega, PM_ONE, {1 << 30, 0}, PM_ONE};
+    regulator_out_t out = {};
+    regulator_step(&regulator, &d.config.regulator, &in, &out);
+    return {real(out.v.d, PM_WIDE_BITS), real(out.v.q, PM_WIDE_BITS)};
+}
+
 TEST(OpenLoop, AlignSweepsAQuarterTurnIntoPlace)
 {
     Drive x = started();
@@ -57,6 +67,26 @@ TEST(OpenLoop, AlignSweepsAQuarterTurnIntoPlace)
         EXPECT_EQ(x.d.omega_ramp, 0);
     }
     EXPECT_NEAR(bench::rad(x.d.theta_open), 0, kAngle_deg * kDegree); // and stays
+}
+
+// Whatever ran before: without current, voltage and speed.
+TEST(OpenLoop, BeginsWithNothing)
+{
+    Drive x(direct::params(2));
+    x.d.omega_ramp = x.d.omega_open = x.d.emf_open = x.d.i_open = PM_Q(0.3);
+    x.d.agree_ms = 7;
+    x.d.position.quality = 0;
+    regulator_reset(&x.d.regulator, &x.d.config.regulator, {PM_Q(0.2), PM_Q(-0.3)}, {PM_Q(0.1), 0},
+                    PM_Q(0.5));
+    open_loop_start(&x.d);
+    EXPECT_EQ(x.d.stage, STAGE_OPEN_LOOP);
+    EXPECT_EQ(x.d.theta_open, PM_TURN(0.75));
+    for (const pm_q_t begins : {x.d.omega_ramp, x.d.omega_open, x.d.emf_open, x.d.i_open}) {
+        EXPECT_EQ(begins, 0);
+    }
+    EXPECT_EQ(x.d.agree_ms, 0);
+    EXPECT_EQ(x.d.position.quality, PM_ONE);
+    EXPECT_NEAR(std::abs(next_voltage(x.d, {0, 0}, 0)), 0, kVector);
 }
 
 TEST(OpenLoop, CurrentRampsToItsValue)
@@ -127,16 +157,6 @@ Complex current_vector(const Drive &x)
     const bool open = x.d.stage == STAGE_OPEN_LOOP;
     return bench::complex(x.d.i_ref) *
            std::polar(1.0, bench::rad(open ? x.d.theta_open : x.d.position.pll.theta));
-}
-
-// What current control gives next while the current is what it should be, in its frame.
-Complex next_voltage(const drive_t &d, pm_dq_t i, pm_q_t omega)
-{
-    regulator_t regulator = d.regulator;
-    const regulator_in_t in = {i, i, omega, PM_ONE, {1 << 30, 0}, PM_ONE};
-    regulator_out_t out = {};
-    regulator_step(&regulator, &d.config.regulator, &in, &out);
-    return {real(out.v.d, PM_WIDE_BITS), real(out.v.q, PM_WIDE_BITS)};
 }
 
 // The observer agrees, the rotor lags the vector by a load angle: the vectors of current and voltage must not

@@ -288,6 +288,87 @@ TEST(Protection, CurrentIsDeratedByTemperatureAndVoltage)
     }
 }
 
+// What may last does so for its time and one call; what is just at its limit never trips.
+TEST(Protection, LimitsThemselvesAreAllowed)
+{
+    const auto calls = [](Drive &x, int most) {
+        int n = 0;
+        while (x.d.fault == DRIVE_FAULT_NONE && n < most) {
+            protection_slow(&x.d);
+            ++n;
+        }
+        return n;
+    };
+    const auto turning = [] {
+        Drive x;
+        x.step();
+        x.d.state = DRIVE_RUNNING;
+        x.d.stage = STAGE_VECTOR;
+        x.d.command.mode = DRIVE_MODE_SPEED;
+        x.d.position.quality = PM_ONE;
+        x.d.i_abc = {0, 0, 0}; // the offsets are not known yet
+        return x;
+    };
+    const protection_config_t c = turning().d.config.protection;
+    for (const int sign : {1, -1}) {
+        for (const int beyond : {0, 1}) {
+            Drive x = turning();
+            x.d.i_abc = {sign * c.i_sum, 0, sign * beyond};
+            EXPECT_EQ(calls(x, 100), beyond ? 3 : 100);
+            EXPECT_EQ(x.d.fault, beyond ? DRIVE_FAULT_SENSOR_SUM : DRIVE_FAULT_NONE);
+
+            x = turning();
+            x.d.pll.omega = sign * (PM_ONE + beyond);
+            EXPECT_EQ(calls(x, 100), beyond ? 1 : 100);
+            EXPECT_EQ(x.d.fault, beyond ? DRIVE_FAULT_OVER_SPEED : DRIVE_FAULT_NONE);
+
+            // a stall: the current is limited, the rotor below a speed that its reference is above
+            x = turning();
+            x.d.status.limits = DRIVE_LIMIT_CURRENT;
+            x.d.speed.reference = sign * 2 * c.omega_stall;
+            x.d.pll.omega = sign * (c.omega_stall - beyond);
+            EXPECT_EQ(calls(x, 10000), beyond ? c.stall_ms + 1 : 10000);
+            EXPECT_EQ(x.d.fault, beyond ? DRIVE_FAULT_STALL : DRIVE_FAULT_NONE);
+            x = turning();
+            x.d.status.limits = DRIVE_LIMIT_CURRENT;
+            x.d.speed.reference = sign * (c.omega_stall + beyond);
+            EXPECT_EQ(calls(x, 10000), beyond ? c.stall_ms + 1 : 10000);
+        }
+    }
+    for (const int quality : {0, 1}) {
+        Drive x = turning();
+        x.d.position.quality = quality;
+        EXPECT_EQ(calls(x, 10000), quality == 0 ? c.lost_ms + 1 : 10000);
+        EXPECT_EQ(x.d.fault, quality == 0 ? DRIVE_FAULT_POSITION_LOST : DRIVE_FAULT_NONE);
+    }
+    for (const int32_t dC : {c.temp_trip_dC - 1, c.temp_trip_dC}) {
+        Drive x = turning();
+        x.d.temperature_dC = static_cast<int16_t>(dC);
+        calls(x, 10);
+        EXPECT_EQ(x.d.fault == DRIVE_FAULT_OVER_TEMPERATURE, dC == c.temp_trip_dC);
+    }
+}
+
+// A stall is one of speed control with the current at its limit; each condition by itself.
+TEST(Protection, WhatIsNoStall)
+{
+    for (int missing = 0; missing < 5; ++missing) {
+        Drive x;
+        x.step();
+        x.d.state = missing == 1 ? DRIVE_STOPPING : DRIVE_RUNNING;
+        x.d.stage = missing == 2 ? STAGE_OPEN_LOOP : STAGE_VECTOR;
+        x.d.command.mode = missing == 3 ? DRIVE_MODE_TORQUE : DRIVE_MODE_SPEED;
+        x.d.i_abc = {0, 0, 0};
+        x.d.status.limits = missing == 4 ? uint32_t(DRIVE_LIMIT_VOLTAGE) : uint32_t(DRIVE_LIMIT_CURRENT);
+        x.d.position.quality = PM_ONE;
+        x.d.speed.reference = PM_Q(0.5);
+        for (int ms = 0; ms < 3000; ++ms) {
+            protection_slow(&x.d);
+        }
+        EXPECT_EQ(x.d.fault, missing == 0 ? DRIVE_FAULT_STALL : DRIVE_FAULT_NONE) << missing;
+    }
+}
+
 TEST(Protection, EveryFaultHasAText)
 {
     for (int f = 0; f < DRIVE_FAULT_COUNT; ++f) {
