@@ -374,6 +374,28 @@ TEST(Config, BandwidthOfDeadbeatIsThatOfItsPeriod)
     EXPECT_NEAR(deadbeat / slow, 500 / (10e3 / (2 * kPi)), 1e-4);
 }
 
+TEST(Config, SlidingGainIsOfTheNominalLink)
+{
+    for (const double gain : {0.02, 0.05, 0.3}) {
+        const drive_params_t p =
+            changed({{DRIVE_PARAM_observer, OBSERVER_sliding_mode}, {DRIVE_PARAM_sliding_gain, gain}});
+        EXPECT_NEAR(real(configure(p).position.observer.sliding_mode.k_base),
+                    gain * p.v_dc_nominal * 1e-3 / 450, kRelative);
+    }
+}
+
+// What a configuration was before does not matter: with other parameters in the same memory.
+TEST(Config, NothingIsLeftOfTheOneBefore)
+{
+    const drive_params_t plain = changed({{DRIVE_PARAM_saturation_comp, 0}, {DRIVE_PARAM_mtpa, 0}});
+    drive_config_t c = configure(defaults());
+    ASSERT_NE(c.position.observer.active_flux.model.L_q2, 0);
+    ASSERT_NE(c.mtpa.h, 0);
+    ASSERT_TRUE(drive_configure(&c, &plain, PM_CHANNELS).ok);
+    EXPECT_EQ(c.position.observer.active_flux.model.L_q2, 0);
+    EXPECT_EQ(c.mtpa.h, 0);
+}
+
 // Without dead time there is nothing that the capacitance of a leg could give back.
 TEST(Config, CapacitanceOfALegNeedsADeadTime)
 {

@@ -392,6 +392,80 @@ TEST(Drive, StopWithoutInjectionEndsInOpenLoop)
     EXPECT_EQ(drive_status(&d)->fault, DRIVE_FAULT_NONE);
 }
 
+// While the motor turns, a set may be exchanged for one in the same units and with the same methods alone: each difference
+// by itself, mantissa and exponent.
+TEST(Drive, SameFrameLooksAtEachBaseAndMethod)
+{
+    const Drive x;
+    const drive_config_t &c = x.d.config;
+    EXPECT_TRUE(drive_same_frame(&c, &c));
+    using Change = void (*)(drive_config_t &);
+    const Change changes[] = {
+        [](drive_config_t &o) { o.base.v.m++; },
+        [](drive_config_t &o) { o.base.v.e++; },
+        [](drive_config_t &o) { o.base.i.m++; },
+        [](drive_config_t &o) { o.base.i.e++; },
+        [](drive_config_t &o) { o.base.omega.m++; },
+        [](drive_config_t &o) { o.base.omega.e++; },
+        [](drive_config_t &o) { o.base.t_s.m++; },
+        [](drive_config_t &o) { o.base.t_s.e++; },
+        [](drive_config_t &o) { o.pole_pairs.m++; },
+        [](drive_config_t &o) { o.pole_pairs.e++; },
+        [](drive_config_t &o) { o.modulator.counts++; },
+        [](drive_config_t &o) { o.injection = !o.injection; },
+        [](drive_config_t &o) { o.regulator.id = static_cast<regulator_id_t>(o.regulator.id + 1); },
+        [](drive_config_t &o) {
+            o.position.injection.id = static_cast<injection_id_t>(o.position.injection.id + 1);
+        },
+        [](drive_config_t &o) { o.start++; },
+    };
+    for (const Change change : changes) {
+        drive_config_t other = c;
+        change(other);
+        EXPECT_FALSE(drive_same_frame(&c, &other));
+        EXPECT_FALSE(drive_same_frame(&other, &c));
+    }
+}
+
+// Coasting opens the bridge at once, in any state, but only when nothing is commanded.
+TEST(Drive, CoastOpensTheBridgeWhenDisabled)
+{
+    Drive x;
+    x.start_current_mode();
+    x.command.coast = true;
+    x.enable(true, DRIVE_MODE_CURRENT);
+    x.run_ms(2);
+    EXPECT_EQ(x.state(), DRIVE_RUNNING);
+    EXPECT_TRUE(x.driven());
+    x.enable(false, DRIVE_MODE_CURRENT);
+    x.run_ms(1);
+    EXPECT_EQ(x.state(), DRIVE_OFF);
+    x.step();
+    EXPECT_FALSE(x.driven());
+}
+
+// A parameter set that was refused is mended while the drive is in its fault.
+TEST(Drive, GoodParametersEndTheirFault)
+{
+    drive_params_t p = direct::params();
+    p.i_max = p.i_trip + 1;
+    Drive x(p);
+    ASSERT_EQ(x.d.fault, DRIVE_FAULT_PARAMETERS);
+    const drive_params_t good = direct::params();
+    drive_config_t config = {};
+    ASSERT_TRUE(drive_configure(&config, &good, PM_CHANNELS).ok);
+    drive_reconfigure(&x.d, &config);
+    x.run_ms(1);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    EXPECT_EQ(x.state(), DRIVE_OFF);
+    // another fault stays
+    x.in.hw_fault = true;
+    x.run_ms(1);
+    ASSERT_EQ(x.fault(), DRIVE_FAULT_HARDWARE);
+    drive_reconfigure(&x.d, &config);
+    EXPECT_EQ(x.d.fault, DRIVE_FAULT_HARDWARE);
+}
+
 // Standing still on an imposed angle, a stop must end: open_loop_slow() and stop() count in the same
 // still_ms.
 TEST(Drive, StopEndsOnAnImposedAngle)

@@ -113,6 +113,31 @@ TEST(OpenLoop, SpeedRampsAfterTheAlign)
     }
 }
 
+// In torque mode the open loop only serves to reach the speed at which the observer takes over, a quarter above speed_high
+// (40 rad/s), in the direction of the torque.
+TEST(OpenLoop, TorqueModeGoesBeyondSpeedHigh)
+{
+    for (const double torque : {0.1, -0.1}) {
+        Drive x = started();
+        x.d.command.mode = DRIVE_MODE_TORQUE;
+        x.d.torque_target = bench::fixed(torque, 28);
+        slow(x, kAlign_ms + 2000);
+        EXPECT_NEAR(real(x.d.omega_ramp), std::copysign(1.25 * 40 * 3 / 540, torque), 1e-5);
+    }
+}
+
+// Nothing is commanded beyond speed_max (150 rad/s).
+TEST(OpenLoop, SpeedIsLimited)
+{
+    for (const double way : {1.0, -1.0}) {
+        Drive x = started();
+        x.d.config.position.omega_high = PM_Q(2.0); // no hand-over
+        x.d.omega_target = bench::fixed(way * 1.5, 28);
+        slow(x, kAlign_ms + 8000);
+        EXPECT_NEAR(real(x.d.omega_ramp), way * 150 * 3 / 540, 1e-5);
+    }
+}
+
 // The voltage across the vector shows the speed of a rotor that swings: the vector yields, and more so at the
 // quarter period than for a speed that stays, which is no swinging.
 TEST(OpenLoop, VectorYieldsToASwingingRotor)

@@ -341,12 +341,40 @@ TEST(Protection, LimitsThemselvesAreAllowed)
         EXPECT_EQ(calls(x, 10000), quality == 0 ? c.lost_ms + 1 : 10000);
         EXPECT_EQ(x.d.fault, quality == 0 ? DRIVE_FAULT_POSITION_LOST : DRIVE_FAULT_NONE);
     }
+    for (const int32_t dC : {c.temp_trip_dC + 100, c.temp_derate_dC - 1, c.temp_derate_dC}) {
+        Drive x = turning();
+        x.d.temperature_dC = static_cast<int16_t>(dC);
+        pm_q_t i_min, i_max;
+        protection_current_limits(&x.d, &i_min, &i_max);
+        EXPECT_EQ(i_max, dC > c.temp_trip_dC ? 0 : x.d.config.i_max);
+        EXPECT_EQ(i_min, -i_max);
+    }
     for (const int32_t dC : {c.temp_trip_dC - 1, c.temp_trip_dC}) {
         Drive x = turning();
         x.d.temperature_dC = static_cast<int16_t>(dC);
         calls(x, 10);
         EXPECT_EQ(x.d.fault == DRIVE_FAULT_OVER_TEMPERATURE, dC == c.temp_trip_dC);
     }
+}
+
+// A millisecond counter stops at its end, and a position is not judged where there is none.
+TEST(Protection, CountersDoNotWrap)
+{
+    Drive x;
+    x.step();
+    x.d.state = DRIVE_RUNNING;
+    x.d.stage = STAGE_VECTOR;
+    x.d.i_abc = {0, 0, 0};
+    x.d.position.quality = 0;
+    x.d.lost_ms = UINT16_MAX;
+    x.d.config.protection.lost_ms = UINT16_MAX; // never
+    x.d.command.mode = DRIVE_MODE_SPEED;
+    protection_slow(&x.d);
+    EXPECT_EQ(x.d.lost_ms, UINT16_MAX);
+    EXPECT_EQ(x.d.fault, DRIVE_FAULT_NONE);
+    x.d.command.mode = DRIVE_MODE_CURRENT;
+    protection_slow(&x.d);
+    EXPECT_EQ(x.d.lost_ms, 0);
 }
 
 // A stall is one of speed control with the current at its limit; each condition by itself.

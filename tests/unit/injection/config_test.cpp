@@ -44,6 +44,32 @@ TEST(InjectionConfig, SquareWavesSlowCurrentControl)
     }
 }
 
+// Sines: half a window and 1.5 periods are a phase of 0.4 rad at the bandwidth of current control and of 0.3 rad at that of
+// the position loop.
+TEST(InjectionConfig, SinesSlowCurrentControlByTheirWindow)
+{
+    for (const int32_t id : {INJECTION_pulsating_sine, INJECTION_rotating_sine, INJECTION_stationary_sine}) {
+        for (const int n : {10, 20}) {
+            drive_params_t p = with(id);
+            p.f_injection = static_cast<int32_t>(
+                std::lround(kF_pwm / n * std::pow(10, -drive_param_exp10[DRIVE_PARAM_f_injection])));
+            const double delay = (n + 2) / 2.0 / kF_pwm;
+            p.current_bandwidth = 500000;
+            p.injection_bandwidth = 1000;
+            EXPECT_NEAR(real(configure(p).position.current_low, 31),
+                        std::min(1.0, 0.4 / (2 * bench::kPi * delay) / 500), 1e-6)
+                << id << ' ' << n;
+            const double most_Hz = 0.3 / (2 * bench::kPi * delay);
+            for (const double share : {0.99, 1.01}) {
+                p.injection_bandwidth = static_cast<int32_t>(std::lround(share * most_Hz * 1e3));
+                drive_config_t c = {};
+                const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
+                EXPECT_EQ(!r.ok && r.param == DRIVE_PARAM_injection_bandwidth, share > 1) << id << ' ' << n;
+            }
+        }
+    }
+}
+
 // By half a period the mean of two samples is late.
 TEST(InjectionConfig, SquareWavesTurnByHalfAPeriod)
 {
