@@ -346,6 +346,16 @@ TEST(Emcy, HistoryKeepsTheNewestEightAndCanBeCleared)
     EXPECT_EQ(x.value(0x1003, 0), 0U);
 }
 
+// A frame that waits for the bus makes the node busy.
+TEST(Bus, BusyWhileAFrameWaits)
+{
+    Bench x;
+    x.run_ms(1);
+    EXPECT_FALSE(node_busy(&x.node));
+    x.node.ring_count = 1;
+    EXPECT_TRUE(node_busy(&x.node));
+}
+
 TEST(Emcy, InhibitTimeSpacesMessages)
 {
     Bench x;

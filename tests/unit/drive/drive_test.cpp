@@ -31,7 +31,8 @@ class Closed
 {
   public:
     explicit Closed(const plant_config_t &config = ipm(), const drive_params_t &p = direct::params())
-        : plant_(plant_create(&config, 1.0, &error_), &plant_destroy)
+        : periods_per_ms_(static_cast<int>(std::lround(config.inverter.f_pwm_Hz * 1e-3))),
+          plant_(plant_create(&config, 1.0, &error_), &plant_destroy)
     {
         sim_loop_init(&loop, plant_.get(), &p);
     }
@@ -47,7 +48,7 @@ class Closed
 
     void run_ms(int ms)
     {
-        for (int k = 0; k < 10 * ms; ++k) {
+        for (int k = 0; k < periods_per_ms_ * ms; ++k) {
             sim_loop_step(&loop);
             const bool driven = loop.app.out.legs != PM_LEGS_OFF;
             const drive_state_t s = state();
@@ -83,6 +84,7 @@ class Closed
     int driven_while_off = 0;
 
   private:
+    int periods_per_ms_;
     const char *error_ = nullptr;
     std::unique_ptr<plant_t, void (*)(plant_t *)> plant_;
 };
@@ -392,6 +394,34 @@ TEST(Drive, StopWithoutInjectionEndsInOpenLoop)
     EXPECT_EQ(drive_status(&d)->fault, DRIVE_FAULT_NONE);
 }
 
+// Whichever regulator, and with the optional stages between source and loop: the plant turns as commanded.
+TEST(Drive, EveryRegulatorTurnsTheMotor)
+{
+    for (int32_t id = 0; id < REGULATOR_COUNT; ++id) {
+        for (const int32_t second_harmonic : {0, 1}) {
+            drive_params_t p = direct::params(2);
+            p.regulator = id;
+            p.second_harmonic = second_harmonic;
+            p.f_pwm *= 2; // the finite set has one state per period: 20 kHz
+            p.timer_counts = 4250;
+            plant_config_t c = ipm();
+            c.inverter.f_pwm_Hz = 20e3;
+            c.inverter.timer_counts = 4250;
+            Closed x(c, p);
+            x.command(true, -60);
+            x.run_ms(2500);
+            double mean = 0;
+            for (int ms = 0; ms < 100; ++ms) {
+                x.run_ms(1);
+                mean += x.truth().omega_mech_rad_s / 100;
+            }
+            EXPECT_NEAR(mean, -60, kSpeed * 60) << id;
+            EXPECT_EQ(x.loop.app.drive.stage, STAGE_VECTOR) << id;
+            EXPECT_EQ(drive_status(&x.loop.app.drive)->fault, DRIVE_FAULT_NONE) << id;
+        }
+    }
+}
+
 // While the motor turns, a set may be exchanged for one in the same units and with the same methods alone: each difference
 // by itself, mantissa and exponent.
 TEST(Drive, SameFrameLooksAtEachBaseAndMethod)
@@ -492,6 +522,16 @@ TEST(Drive, StopWaitsForTwentyMillisecondsOfStandstill)
         x.run_ms(1);
     }
     EXPECT_EQ(ms, 21);
+}
+
+// A time that goes on for longer than its counter stays at the end, and does not begin anew.
+TEST(Drive, TheTimeInAStateDoesNotWrap)
+{
+    Drive x;
+    x.start_current_mode();
+    x.d.state_ms = UINT16_MAX;
+    x.run_ms(2);
+    EXPECT_EQ(x.d.state_ms, UINT16_MAX);
 }
 
 // The flag is that of the last millisecond, from the regulator or from the modulator.

@@ -356,6 +356,56 @@ template <class Functions, unsigned N, class Config> double least_eigenvalue(Con
     return least;
 }
 
+// A variance that has grown beyond a half is brought below it in the next step, with its covariances, so that the matrix
+// stays positive definite.
+template <class Functions, int N, class Config> void expect_held(const Config &config, unsigned state_of)
+{
+    typename Functions::State state;
+    obs_in_t in = {};
+    in.dir = bench::direction(0);
+    Functions::reset(&state, &config, &in);
+    state.P[PM_KALMAN_AT(state_of, state_of)] = 0x20001000; // a half, and what a step may add
+    obs_out_t out;
+    Functions::step(&state, &config, &in, &out);
+    EXPECT_LT(pm_kalman_at(state.P, state_of, state_of), 0x20000000);
+    EXPECT_GT(pm_kalman_at(state.P, state_of, state_of), 0x08000000);
+    Eigen::Matrix<double, N, N> P;
+    for (unsigned r = 0; r < N; ++r) {
+        for (unsigned c = 0; c < N; ++c) {
+            P(r, c) = pm_kalman_at(state.P, r, c);
+        }
+    }
+    EXPECT_GT(P.template selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), 0);
+}
+
+TEST(Ekf, AVarianceThatHasGrownIsHeld)
+{
+    const Machine m = bench::kIpmLinear;
+    const Base b = bench::kIpmBase;
+    expect_held<FullFunctions, 4>(bench::ekf_full_config(m, b), EKF_OMEGA);
+    expect_held<FullFunctions, 4>(bench::ekf_full_config(m, b), EKF_DELTA);
+    expect_held<ReducedFunctions, 2>(bench::ekf_reduced_config(m, b), EKF_REDUCED_OMEGA);
+    expect_held<ReducedFunctions, 2>(bench::ekf_reduced_config(m, b), EKF_REDUCED_DELTA);
+}
+
+// The misfit of the reduced filter is how far its speed is from the loop's.
+TEST(Ekf, MisfitOfTheReducedFilterIsItsSpeedError)
+{
+    const ekf_reduced_config_t config = bench::ekf_reduced_config(bench::kIpmLinear, bench::kIpmBase);
+    ekf_reduced_t self;
+    obs_in_t in = {};
+    in.dir = bench::direction(0);
+    in.omega = bench::fixed(0.3, 28);
+    ekf_reduced_reset(&self, &config, &in);
+    for (const double omega : {0.3, 0.35, 0.1, -0.2}) {
+        const obs_out_t out = ekf_reduced_last(&self);
+        in.omega = bench::fixed(omega, 28);
+        self.omega = bench::fixed(0.3, 28);
+        ekf_reduced_slow(&self, &config, &in, &out, PM_ONE);
+        EXPECT_NEAR(bench::real(ekf_reduced_last(&self).misfit), std::abs(0.3 - omega), 1e-7);
+    }
+}
+
 TEST(Ekf, TheCovarianceStaysPositive)
 {
     const Machine m = bench::kIpmLinear;
