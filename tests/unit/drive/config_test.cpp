@@ -384,6 +384,17 @@ TEST(Config, SlidingGainIsOfTheNominalLink)
     }
 }
 
+// second_harmonic.h takes the loop's gains: 2 zeta w_n with a damping of 0.9, and w_n^2, per unit.
+TEST(Config, SecondHarmonicHasTheGainsOfTheLoop)
+{
+    const drive_params_t p = changed({{DRIVE_PARAM_second_harmonic, 1}, {DRIVE_PARAM_flux_bandwidth, 30}});
+    const second_harmonic_config_t c = configure(p).position.second_harmonic;
+    const double w_n = 2 * kPi * 30 / 540;
+    EXPECT_NEAR(real(c.k_p), 2 * 0.9 * w_n, kRelative);
+    EXPECT_NEAR(real(c.k_i), w_n * w_n, kRelative);
+    EXPECT_EQ(c.k_1, 0);
+}
+
 // What a configuration was before does not matter: with other parameters in the same memory.
 TEST(Config, NothingIsLeftOfTheOneBefore)
 {

@@ -394,6 +394,33 @@ TEST(Drive, StopWithoutInjectionEndsInOpenLoop)
     EXPECT_EQ(drive_status(&d)->fault, DRIVE_FAULT_NONE);
 }
 
+// Between the pulses and running injection settles for 30 ms: without torque, and with its slow part at work.
+TEST(Drive, InjectionSettlesForThirtyMilliseconds)
+{
+    Drive x(direct::params(1));
+    x.step();
+    x.d.command.enable = true;
+    x.d.command.mode = DRIVE_MODE_SPEED;
+    x.d.state = DRIVE_FINDING;
+    x.d.stage = STAGE_VECTOR;
+    x.d.state_ms = 0;
+    x.d.sequence.procedure = PROCEDURE_NONE;
+    x.d.i_abc = {0, 0, 0};
+    x.d.i_ref = {PM_Q(0.1), PM_Q(0.1)};
+    position_reset(&x.d.position, &x.d.config.position, 0, {0, 0}, true);
+    x.d.position.pll.omega = PM_Q(0.05);
+    for (int ms = 1; ms < 30; ++ms) {
+        drive_slow(&x.d, &x.slow);
+        ASSERT_EQ(x.d.state, DRIVE_FINDING) << ms;
+        EXPECT_EQ(x.d.i_ref.d, 0);
+        EXPECT_EQ(x.d.i_ref.q, 0);
+    }
+    EXPECT_NEAR(real(x.d.position.omega_mean), 0.05, 1e-3); // its filter of 5 ms has followed
+    drive_slow(&x.d, &x.slow);
+    EXPECT_EQ(x.d.state, DRIVE_RUNNING);
+    EXPECT_EQ(x.d.speed.reference, PM_Q(0.05)); // from where the rotor is
+}
+
 // Whichever regulator, and with the optional stages between source and loop: the plant turns as commanded.
 TEST(Drive, EveryRegulatorTurnsTheMotor)
 {
