@@ -421,6 +421,19 @@ TEST(Drive, InjectionSettlesForThirtyMilliseconds)
     EXPECT_EQ(x.d.speed.reference, PM_Q(0.05)); // from where the rotor is
 }
 
+// An identification that another command replaces has failed, and says why; one that has ended keeps its report.
+TEST(Drive, AnAbandonedIdentificationIsReported)
+{
+    for (const int state : {COMMISSIONING_RUNNING, COMMISSIONING_DONE, COMMISSIONING_IDLE}) {
+        Drive x;
+        x.d.commissioning_report.state = static_cast<uint8_t>(state);
+        x.enable(true, DRIVE_MODE_SPEED);
+        const bool running = state == COMMISSIONING_RUNNING;
+        EXPECT_EQ(x.d.commissioning_report.state, running ? COMMISSIONING_FAILED : state);
+        EXPECT_EQ(x.d.commissioning_report.reason, running ? COMMISSIONING_ABORTED : COMMISSIONING_NO_REASON);
+    }
+}
+
 // Whichever regulator, and with the optional stages between source and loop: the plant turns as commanded.
 TEST(Drive, EveryRegulatorTurnsTheMotor)
 {

@@ -377,6 +377,32 @@ TEST(Protection, CountersDoNotWrap)
     EXPECT_EQ(x.d.lost_ms, 0);
 }
 
+// One by one, where the control period has seen that something is beyond its limit.
+TEST(Protection, StepNamesTheCause)
+{
+    const struct {
+        pm_q_t i, v_dc;
+        bool hw_fault;
+        drive_fault_t fault;
+    } cases[] = {{0, bench::fixed(300.0 / 450, 28), false, DRIVE_FAULT_NONE},
+                 {PM_Q(0.95), bench::fixed(300.0 / 450, 28), false, DRIVE_FAULT_OVER_CURRENT},
+                 {0, bench::fixed(401.0 / 450, 28), false, DRIVE_FAULT_OVER_VOLTAGE},
+                 {0, bench::fixed(59.0 / 450, 28), false, DRIVE_FAULT_UNDER_VOLTAGE},
+                 {0, bench::fixed(300.0 / 450, 28), true, DRIVE_FAULT_HARDWARE}};
+    for (const auto &at : cases) {
+        for (const bool live : {true, false}) {
+            Drive x;
+            x.d.stage = live ? STAGE_VECTOR : STAGE_OFF;
+            x.d.state = live ? DRIVE_RUNNING : DRIVE_OFF;
+            x.d.i_abc = {at.i, -at.i, 0};
+            x.d.status.v_dc = at.v_dc;
+            x.d.hw_fault = at.hw_fault;
+            protection_step(&x.d);
+            EXPECT_EQ(x.d.fault, live || at.hw_fault ? at.fault : DRIVE_FAULT_NONE) << at.fault;
+        }
+    }
+}
+
 // A stall is one of speed control with the current at its limit; each condition by itself.
 TEST(Protection, WhatIsNoStall)
 {
