@@ -13,6 +13,10 @@ function(pm_library name)
     if(sources)
         add_library(${name} STATIC ${sources})
         target_link_libraries(${name} PUBLIC ${ARG_LIBS})
+        if(PM_COVERAGE AND name MATCHES "^pm_") # not the plant, whose large functions take minutes
+            target_compile_options(${name} PRIVATE -O0 --coverage) # inlined saturations would count in each place
+            target_link_options(${name} PUBLIC --coverage)
+        endif()
     else()
         add_library(${name} INTERFACE)
         target_link_libraries(${name} INTERFACE ${ARG_LIBS})

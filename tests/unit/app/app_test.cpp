@@ -63,6 +63,27 @@ TEST(App, RefusesACarrierThatTheTimerDoesNotMake)
     EXPECT_FALSE(x.loop.hal.armed);
 }
 
+TEST(App, EveryLineOfTheConsoleEnds)
+{
+    Bench x;
+    const drive_params_t p = defaults();
+    x.boot(&p);
+    x.run_ms(20);
+    const std::string started = x.console();
+    ASSERT_GT(started.size(), 2U);
+    EXPECT_EQ(started.substr(started.size() - 2), "\r\n");
+    size_t ends = 0;
+    for (size_t at = started.find("\r\n"); at != std::string::npos; at = started.find("\r\n", at + 2)) {
+        ++ends;
+    }
+    EXPECT_GE(ends, 2U);
+    EXPECT_EQ(std::count(started.begin(), started.end(), '\n'), static_cast<long>(ends));
+    drive_trip(&x.loop.app.drive, DRIVE_FAULT_STALL);
+    x.run_ms(20);
+    const std::string line = std::string("fault: ") + drive_fault_text(DRIVE_FAULT_STALL) + "\r\n";
+    EXPECT_NE(x.console().find(line), std::string::npos);
+}
+
 TEST(App, StoresToThePageThatIsOlder)
 {
     Bench x;

@@ -197,6 +197,21 @@ TEST(Cia402, CurrentModeGivesCurrentAndTurns)
     EXPECT_EQ(x.out.velocity, 20000);
 }
 
+TEST(Cia402, CurrentIsGivenToTheModesOfOurOwnAlone)
+{
+    for (const int mode : {CIA402_MODE_IDENTIFY, CIA402_MODE_CURRENT, CIA402_MODE_NONE, CIA402_MODE_VELOCITY,
+                           CIA402_MODE_TORQUE}) {
+        Profile x;
+        x.self.state = CIA402_OPERATION_ENABLED;
+        x.self.active_mode = int16_t(mode);
+        x.put(OD_LIVE_TARGET_CURRENT, 1500);
+        x.put(OD_LIVE_CONTROLWORD, ENABLE);
+        x.in.off = false;
+        x.step();
+        EXPECT_EQ(x.out.current, mode < 0 ? 1500 : 0) << mode;
+    }
+}
+
 TEST(Cia402, HowItIsSwitchedOffFollowsTheOptions)
 {
     const struct {

@@ -57,6 +57,18 @@ TEST(Nmt, ResetOfCommunicationTakesWhatIsStored)
     EXPECT_EQ(x.resets, 0);
 }
 
+// What waited to be told belongs to the communication that ended.
+TEST(Nmt, ResetOfCommunicationForgetsEmergenciesThatWait)
+{
+    Bench x(7);
+    x.nmt(2);
+    node_error(&x.node, NODE_ERROR_APPLICATION, 0x2310, 0);
+    x.nmt(130);
+    x.run_ms(100);
+    EXPECT_EQ(node_nmt(&x.node), NODE_PRE_OPERATIONAL);
+    EXPECT_TRUE(x.take(0x87).empty());
+}
+
 TEST(Nmt, ResetOfTheNodeIsTheApplications)
 {
     Bench x;
@@ -97,6 +109,19 @@ TEST(Nmt, LosingTheMasterWhileOnIsAnAlarm)
     EXPECT_TRUE(x.alarms.empty());
     x.nmt(2);
     EXPECT_EQ(x.alarms.size(), 1U);
+}
+
+// Counted from the boot-up, whatever the clock shows then.
+TEST(Heartbeat, TheFirstComesAPeriodAfterTheBootUp)
+{
+    for (const uint32_t start_us : {0U, 5000000U, 0xFFFF0000U}) {
+        Bench x(3, start_us);
+        x.sent.clear();
+        x.run_ms(499);
+        EXPECT_TRUE(x.take(0x703).empty()) << start_us;
+        x.run_ms(2);
+        EXPECT_EQ(x.take(0x703).size(), 1U) << start_us;
+    }
 }
 
 TEST(Heartbeat, IsProduced)
@@ -319,6 +344,16 @@ TEST(Emcy, HistoryKeepsTheNewestEightAndCanBeCleared)
     EXPECT_EQ(x.set(0x1003, 0, 1), 0x06090030U);
     EXPECT_EQ(x.set(0x1003, 0, 0), 0U);
     EXPECT_EQ(x.value(0x1003, 0), 0U);
+}
+
+// A frame that waits for the bus makes the node busy.
+TEST(Bus, BusyWhileAFrameWaits)
+{
+    Bench x;
+    x.run_ms(1);
+    EXPECT_FALSE(node_busy(&x.node));
+    x.node.ring_count = 1;
+    EXPECT_TRUE(node_busy(&x.node));
 }
 
 TEST(Emcy, InhibitTimeSpacesMessages)

@@ -286,6 +286,34 @@ TEST(Tpdo, ChangeIsSentAtOnceButNotWithinTheInhibitTime)
     EXPECT_TRUE(x.take(0x181).empty());
 }
 
+// An object that the mapping holds beyond its count is neither sent nor watched.
+TEST(Tpdo, WhatIsBeyondTheCountDoesNotMatter)
+{
+    Bench x;
+    configure(x, 0x1800, 254, 0, 0);
+    const uint32_t cob = x.value(0x1800, 1);
+    ASSERT_EQ(x.set(0x1800, 1, cob | 0x80000000U), 0U);
+    ASSERT_EQ(x.set(0x1A00, 0, 0), 0U);
+    ASSERT_EQ(x.set(0x1A00, 1, 0x60410010), 0U);
+    ASSERT_EQ(x.set(0x1A00, 2, 0x60780010), 0U);
+    ASSERT_EQ(x.set(0x1A00, 0, 1), 0U);
+    ASSERT_EQ(x.set(0x1800, 1, cob), 0U);
+    x.operational();
+    x.run_ms(100);
+    auto frames = x.take(0x181);
+    ASSERT_EQ(frames.size(), 1U); // the first
+    EXPECT_EQ(frames[0].length, 2);
+    x.live[entry(0x6078)->slot] = 5;
+    x.run_ms(100);
+    EXPECT_TRUE(x.take(0x181).empty());
+    x.live[entry(0x6041)->slot] = 6;
+    x.run_ms(10);
+    frames = x.take(0x181);
+    ASSERT_EQ(frames.size(), 1U);
+    EXPECT_EQ(frames[0].data[0], 6);
+    EXPECT_EQ(frames[0].data[2], 0);
+}
+
 TEST(Tpdo, EverySoManySyncs)
 {
     for (const uint32_t type : {1U, 3U, 240U}) {

@@ -160,6 +160,35 @@ TEST(Trace, TriggersOnLevelAndEdge)
     }
 }
 
+TEST(Trace, SettingsReadBack)
+{
+    Scope x;
+    x.choose(1);
+    const struct {
+        uint16_t slot;
+        int32_t value;
+    } settings[] = {{OD_LIVE_TRACE_DIVIDER, 7},
+                    {OD_LIVE_TRACE_PRETRIGGER, 250},
+                    {OD_LIVE_TRACE_TRIGGER, 1},
+                    {OD_LIVE_TRACE_EDGE, 2},
+                    {OD_LIVE_TRACE_LEVEL, -55}};
+    for (const auto &at : settings) {
+        EXPECT_EQ(x.put(at.slot, at.value), 0U) << at.slot;
+    }
+    for (const auto &at : settings) {
+        int32_t value = 12345;
+        EXPECT_TRUE(trace_get(&x.t, at.slot, &value)) << at.slot;
+        EXPECT_EQ(value, at.value) << at.slot;
+    }
+    for (const uint16_t slot : {OD_LIVE_TRACE_COMMAND, OD_LIVE_TRACE_STATE, OD_LIVE_TRACE_AT}) {
+        int32_t value = 12345;
+        EXPECT_TRUE(trace_get(&x.t, slot, &value)) << slot;
+        EXPECT_EQ(value, 0) << slot;
+    }
+    int32_t value = 0;
+    EXPECT_FALSE(trace_get(&x.t, OD_LIVE_I_Q, &value));
+}
+
 TEST(Trace, WaitsForTheTriggerOrItsCommand)
 {
     Scope x;

@@ -158,6 +158,37 @@ TEST(FiniteSet, RippleIsThatOfTheTable)
     EXPECT_GE(ripple_A(config(2)), 1.5 * right);
 }
 
+// Limited: one axis of what is wanted exceeds the link voltage.
+TEST(FiniteSet, SaysWhenTheLinkDoesNotSuffice)
+{
+    const regulator_config_t c = config();
+    int limited = 0;
+    samples::Random random;
+    for (int n = 0; n < 2000; ++n) {
+        regulator_t self = {};
+        regulator_reset(&self, &c, {0, 0}, {0, 0}, 0);
+        const regulator_in_t in = {{0, 0},
+                                   bench::dq(Complex{random.within(-0.1, 0.1), random.within(-0.05, 0.05)}),
+                                   0,
+                                   PM_ONE,
+                                   {1 << 30, 0},
+                                   fixed(kLink, 28)};
+        deadbeat_t model = {};
+        regulator_out_t wanted = {}, out = {};
+        regulator_in_t wide = in;
+        wide.v_max = PM_Q(7.9);
+        deadbeat_step(&model, &c.finite_set.deadbeat, &wide, &wanted);
+        regulator_step(&self, &c, &in, &out);
+        const double d = std::abs(real(wanted.v.d, 22)), q = std::abs(real(wanted.v.q, 22));
+        if (std::abs(std::max(d, q) - kLink) > 1e-5) {
+            ASSERT_EQ(out.limited, std::max(d, q) > kLink) << d << ' ' << q;
+        }
+        limited += out.limited ? 1 : 0;
+    }
+    EXPECT_GT(limited, 200);
+    EXPECT_LT(limited, 1800);
+}
+
 TEST(FiniteSet, IsRefusedWithInjection)
 {
     drive_params_t p = bench::parameters(kMachine, kBase);

@@ -391,6 +391,33 @@ TEST(Modulator, NothingToSplitChangesNothing)
     }
 }
 
+// Along either axis alone as well.
+TEST(Modulator, SplitAlongOneAxis)
+{
+    constexpr double kCount_pu = 3 * kLink / kCounts;
+    for (const Complex more : {Complex{0.1, 0}, Complex{-0.1, 0}, Complex{0, 0.1}, Complex{0, -0.1}}) {
+        const Split s = split(std::polar(0.1, 0.4), more, kLink);
+        EXPECT_LT(std::abs(of_half(s.compare, 0, kLink) - of_half(s.compare, 1, kLink) - 2.0 * more),
+                  2 * kCount_pu);
+        EXPECT_FALSE(s.limited);
+    }
+}
+
+// A loss of more than a quarter of the period is compensated as a quarter, and does not wrap.
+TEST(Modulator, CompensationSaturatesAtAQuarterOfThePeriod)
+{
+    for (const double lost : {0.2, 0.24, 0.3, 0.6, 1.5}) {
+        modulator_config_t c = plain();
+        c.compensate = true;
+        c.dead = fixed(lost, PM_SHARE_BITS);
+        c.drop = 0;
+        c.far = 0;
+        modulator_t self = {};
+        modulator_slow(&self, &c, fixed(kLink, 28));
+        EXPECT_NEAR(real(self.near, PM_SHARE_BITS + PM_HEIGHT_BITS), std::min(lost, 0.25), 1e-5) << lost;
+    }
+}
+
 TEST(Modulator, ASplitThatDoesNotFitIsFlagged)
 {
     for (int b = 0; b < 360; b += 11) {

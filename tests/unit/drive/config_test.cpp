@@ -337,6 +337,87 @@ TEST(Config, SwitchesSwitch)
     EXPECT_EQ(configure(changed({{DRIVE_PARAM_i_fw_max, 0}})).field_weakening.i_max, 0);
 }
 
+// MTPA is left out below a saliency of 1 % of L_q.
+TEST(Config, NegligibleSaliencyIsNone)
+{
+    for (const double share : {0.008, 0.009, 0.011, 0.02}) {
+        const double L_q_H = 0.2;
+        drive_params_t p = defaults();
+        p.start_method = 2;
+        p.L_q = p.L_q_rated = static_cast<int32_t>(std::lround(L_q_H * 1e9));
+        p.L_d = static_cast<int32_t>(std::lround((1 - share) * L_q_H * 1e9));
+        const mtpa_config_t c = configure(p).mtpa;
+        const double h = p.psi_m * 1e-9 / (2 * share * L_q_H) / 10;
+        if (share > 0.01) {
+            EXPECT_NEAR(real(c.h), h, 1e-4 * h) << share;
+        } else {
+            EXPECT_LT(h, 8) << "the test needs a case that the format could hold";
+            EXPECT_EQ(c.h, 0) << share;
+        }
+    }
+}
+
+// Deadbeat responds like a first-order lag of one period: f_pwm / 2 pi. While a source needs current control to be slow, the
+// share of the bandwidth that it is given is in proportion.
+TEST(Config, BandwidthOfDeadbeatIsThatOfItsPeriod)
+{
+    const auto share = [](double regulator) {
+        return real(configure(changed({{DRIVE_PARAM_injection, INJECTION_pulsating_sine},
+                                       {DRIVE_PARAM_regulator, regulator},
+                                       {DRIVE_PARAM_current_bandwidth, 500},
+                                       {DRIVE_PARAM_start_method, 1}}))
+                        .position.current_low,
+                    31);
+    };
+    const double slow = share(REGULATOR_synchronous_pi), deadbeat = share(REGULATOR_deadbeat);
+    ASSERT_LT(slow, 0.999);
+    EXPECT_NEAR(deadbeat / slow, 500 / (10e3 / (2 * kPi)), 1e-4);
+}
+
+TEST(Config, SlidingGainIsOfTheNominalLink)
+{
+    for (const double gain : {0.02, 0.05, 0.3}) {
+        const drive_params_t p =
+            changed({{DRIVE_PARAM_observer, OBSERVER_sliding_mode}, {DRIVE_PARAM_sliding_gain, gain}});
+        EXPECT_NEAR(real(configure(p).position.observer.sliding_mode.k_base),
+                    gain * p.v_dc_nominal * 1e-3 / 450, kRelative);
+    }
+}
+
+// second_harmonic.h takes the loop's gains: 2 zeta w_n with a damping of 0.9, and w_n^2, per unit.
+TEST(Config, SecondHarmonicHasTheGainsOfTheLoop)
+{
+    const drive_params_t p = changed({{DRIVE_PARAM_second_harmonic, 1}, {DRIVE_PARAM_flux_bandwidth, 30}});
+    const second_harmonic_config_t c = configure(p).position.second_harmonic;
+    const double w_n = 2 * kPi * 30 / 540;
+    EXPECT_NEAR(real(c.k_p), 2 * 0.9 * w_n, kRelative);
+    EXPECT_NEAR(real(c.k_i), w_n * w_n, kRelative);
+    EXPECT_EQ(c.k_1, 0);
+}
+
+// What a configuration was before does not matter: with other parameters in the same memory.
+TEST(Config, NothingIsLeftOfTheOneBefore)
+{
+    const drive_params_t plain = changed({{DRIVE_PARAM_saturation_comp, 0}, {DRIVE_PARAM_mtpa, 0}});
+    drive_config_t c = configure(defaults());
+    ASSERT_NE(c.position.observer.active_flux.model.L_q2, 0);
+    ASSERT_NE(c.mtpa.h, 0);
+    ASSERT_TRUE(drive_configure(&c, &plain, PM_CHANNELS).ok);
+    EXPECT_EQ(c.position.observer.active_flux.model.L_q2, 0);
+    EXPECT_EQ(c.mtpa.h, 0);
+}
+
+// Without dead time there is nothing that the capacitance of a leg could give back.
+TEST(Config, CapacitanceOfALegNeedsADeadTime)
+{
+    const auto far = [](double dead_time_s) {
+        return configure(changed({{DRIVE_PARAM_leg_capacitance, 2e-9}, {DRIVE_PARAM_dead_time, dead_time_s}}))
+            .modulator.far;
+    };
+    EXPECT_EQ(far(0), 0);
+    EXPECT_NE(far(2e-6), 0);
+}
+
 TEST(Config, StartFollowsTheMachine)
 {
     const auto start = [](const Changes &x) {

@@ -31,7 +31,8 @@ class Closed
 {
   public:
     explicit Closed(const plant_config_t &config = ipm(), const drive_params_t &p = direct::params())
-        : plant_(plant_create(&config, 1.0, &error_), &plant_destroy)
+        : periods_per_ms_(static_cast<int>(std::lround(config.inverter.f_pwm_Hz * 1e-3))),
+          plant_(plant_create(&config, 1.0, &error_), &plant_destroy)
     {
         sim_loop_init(&loop, plant_.get(), &p);
     }
@@ -47,7 +48,7 @@ class Closed
 
     void run_ms(int ms)
     {
-        for (int k = 0; k < 10 * ms; ++k) {
+        for (int k = 0; k < periods_per_ms_ * ms; ++k) {
             sim_loop_step(&loop);
             const bool driven = loop.app.out.legs != PM_LEGS_OFF;
             const drive_state_t s = state();
@@ -83,6 +84,7 @@ class Closed
     int driven_while_off = 0;
 
   private:
+    int periods_per_ms_;
     const char *error_ = nullptr;
     std::unique_ptr<plant_t, void (*)(plant_t *)> plant_;
 };
@@ -315,6 +317,225 @@ TEST(Drive, RunningAwayIsOverSpeed)
     EXPECT_NEAR(speed, 180, 4);
 }
 
+// The other way round as well.
+TEST(Drive, RunningAwayBackwardsIsOverSpeed)
+{
+    Closed x;
+    x.command(true, -140);
+    x.run_ms(1300);
+    ASSERT_EQ(x.state(), DRIVE_RUNNING);
+    double speed = x.truth().omega_mech_rad_s;
+    ASSERT_LT(speed, -100);
+    while (x.state() == DRIVE_RUNNING && speed > -200) {
+        speed -= 0.2;
+        plant_set_speed(x.plant(), speed);
+        x.run_ms(1);
+    }
+    EXPECT_EQ(drive_status(&x.loop.app.drive)->fault, DRIVE_FAULT_OVER_SPEED);
+    EXPECT_NEAR(speed, -180, 4);
+}
+
+// Without injection the observer hands back to the open loop when the speed falls below speed_low (21 rad/s), in both
+// directions, and the rotor follows the vector; above speed_high (40 rad/s) the observer leads again.
+TEST(Drive, ObserverFallsBackToOpenLoopAtLowSpeed)
+{
+    for (const double way : {1.0, -1.0}) {
+        Closed x(ipm(), direct::params(2));
+        const drive_t &d = x.loop.app.drive;
+        x.command(true, 60 * way);
+        x.run_ms(3000);
+        ASSERT_EQ(d.stage, STAGE_VECTOR);
+        EXPECT_NEAR(x.truth().omega_mech_rad_s, 60 * way, kSpeed * 60);
+        x.command(true, 24 * way); // above speed_low nothing changes
+        x.run_ms(1500);
+        ASSERT_EQ(d.stage, STAGE_VECTOR);
+        x.command(true, 12 * way);
+        double handed_back = 0;
+        double highest = 0;
+        for (int ms = 0; ms < 3000; ++ms) {
+            x.run_ms(1);
+            const double speed = way * x.truth().omega_mech_rad_s;
+            if (d.stage == STAGE_OPEN_LOOP && handed_back == 0) {
+                handed_back = speed;
+            }
+            highest = ms > 2000 ? std::max(highest, std::abs(speed - 12)) : 0;
+        }
+        EXPECT_EQ(d.stage, STAGE_OPEN_LOOP);
+        // the estimate lags the ramp of 200 rad/s2 by 2 a / w_n, w_n = 2 pi 25 Hz
+        EXPECT_NEAR(handed_back, 21 - 2 * 200 / (2 * bench::kPi * 25), 2);
+        EXPECT_LE(highest, 3); // damped, on the vector
+        EXPECT_NEAR(way * real(drive_status(&d)->omega_ref) * 540 / 3, 12, 0.01);
+        EXPECT_EQ(x.state(), DRIVE_RUNNING);
+        x.command(true, 60 * way);
+        x.run_ms(3000);
+        EXPECT_EQ(d.stage, STAGE_VECTOR);
+        EXPECT_NEAR(x.truth().omega_mech_rad_s, 60 * way, kSpeed * 60);
+        EXPECT_EQ(drive_status(&d)->fault, DRIVE_FAULT_NONE);
+    }
+}
+
+// A stop goes through the open loop, too, and ends with the bridge off and a rotor at rest.
+TEST(Drive, StopWithoutInjectionEndsInOpenLoop)
+{
+    Closed x(ipm(), direct::params(2));
+    const drive_t &d = x.loop.app.drive;
+    x.command(true, 60);
+    x.run_ms(3000);
+    ASSERT_EQ(d.stage, STAGE_VECTOR);
+    x.command(false, 60);
+    bool open = false;
+    for (int ms = 0; ms < 3000 && x.state() != DRIVE_OFF; ++ms) {
+        x.run_ms(1);
+        open = open || d.stage == STAGE_OPEN_LOOP;
+    }
+    EXPECT_TRUE(open);
+    EXPECT_EQ(x.state(), DRIVE_OFF);
+    EXPECT_NEAR(x.truth().omega_mech_rad_s, 0, 3);
+    EXPECT_EQ(drive_status(&d)->fault, DRIVE_FAULT_NONE);
+}
+
+// Between the pulses and running injection settles for 30 ms: without torque, and with its slow part at work.
+TEST(Drive, InjectionSettlesForThirtyMilliseconds)
+{
+    Drive x(direct::params(1));
+    x.step();
+    x.d.command.enable = true;
+    x.d.command.mode = DRIVE_MODE_SPEED;
+    x.d.state = DRIVE_FINDING;
+    x.d.stage = STAGE_VECTOR;
+    x.d.state_ms = 0;
+    x.d.sequence.procedure = PROCEDURE_NONE;
+    x.d.i_abc = {0, 0, 0};
+    x.d.i_ref = {PM_Q(0.1), PM_Q(0.1)};
+    position_reset(&x.d.position, &x.d.config.position, 0, {0, 0}, true);
+    x.d.position.pll.omega = PM_Q(0.05);
+    for (int ms = 1; ms < 30; ++ms) {
+        drive_slow(&x.d, &x.slow);
+        ASSERT_EQ(x.d.state, DRIVE_FINDING) << ms;
+        EXPECT_EQ(x.d.i_ref.d, 0);
+        EXPECT_EQ(x.d.i_ref.q, 0);
+    }
+    EXPECT_NEAR(real(x.d.position.omega_mean), 0.05, 1e-3); // its filter of 5 ms has followed
+    drive_slow(&x.d, &x.slow);
+    EXPECT_EQ(x.d.state, DRIVE_RUNNING);
+    EXPECT_EQ(x.d.speed.reference, PM_Q(0.05)); // from where the rotor is
+}
+
+// An identification that another command replaces has failed, and says why; one that has ended keeps its report.
+TEST(Drive, AnAbandonedIdentificationIsReported)
+{
+    for (const int state : {COMMISSIONING_RUNNING, COMMISSIONING_DONE, COMMISSIONING_IDLE}) {
+        Drive x;
+        x.d.commissioning_report.state = static_cast<uint8_t>(state);
+        x.enable(true, DRIVE_MODE_SPEED);
+        const bool running = state == COMMISSIONING_RUNNING;
+        EXPECT_EQ(x.d.commissioning_report.state, running ? COMMISSIONING_FAILED : state);
+        EXPECT_EQ(x.d.commissioning_report.reason, running ? COMMISSIONING_ABORTED : COMMISSIONING_NO_REASON);
+    }
+}
+
+// Whichever regulator, and with the optional stages between source and loop: the plant turns as commanded.
+TEST(Drive, EveryRegulatorTurnsTheMotor)
+{
+    for (int32_t id = 0; id < REGULATOR_COUNT; ++id) {
+        for (const int32_t second_harmonic : {0, 1}) {
+            drive_params_t p = direct::params(2);
+            p.regulator = id;
+            p.second_harmonic = second_harmonic;
+            p.f_pwm *= 2; // the finite set has one state per period: 20 kHz
+            p.timer_counts = 4250;
+            plant_config_t c = ipm();
+            c.inverter.f_pwm_Hz = 20e3;
+            c.inverter.timer_counts = 4250;
+            Closed x(c, p);
+            x.command(true, -60);
+            x.run_ms(2500);
+            double mean = 0;
+            for (int ms = 0; ms < 100; ++ms) {
+                x.run_ms(1);
+                mean += x.truth().omega_mech_rad_s / 100;
+            }
+            EXPECT_NEAR(mean, -60, kSpeed * 60) << id;
+            EXPECT_EQ(x.loop.app.drive.stage, STAGE_VECTOR) << id;
+            EXPECT_EQ(drive_status(&x.loop.app.drive)->fault, DRIVE_FAULT_NONE) << id;
+        }
+    }
+}
+
+// While the motor turns, a set may be exchanged for one in the same units and with the same methods alone: each difference
+// by itself, mantissa and exponent.
+TEST(Drive, SameFrameLooksAtEachBaseAndMethod)
+{
+    const Drive x;
+    const drive_config_t &c = x.d.config;
+    EXPECT_TRUE(drive_same_frame(&c, &c));
+    using Change = void (*)(drive_config_t &);
+    const Change changes[] = {
+        [](drive_config_t &o) { o.base.v.m++; },
+        [](drive_config_t &o) { o.base.v.e++; },
+        [](drive_config_t &o) { o.base.i.m++; },
+        [](drive_config_t &o) { o.base.i.e++; },
+        [](drive_config_t &o) { o.base.omega.m++; },
+        [](drive_config_t &o) { o.base.omega.e++; },
+        [](drive_config_t &o) { o.base.t_s.m++; },
+        [](drive_config_t &o) { o.base.t_s.e++; },
+        [](drive_config_t &o) { o.pole_pairs.m++; },
+        [](drive_config_t &o) { o.pole_pairs.e++; },
+        [](drive_config_t &o) { o.modulator.counts++; },
+        [](drive_config_t &o) { o.injection = !o.injection; },
+        [](drive_config_t &o) { o.regulator.id = static_cast<regulator_id_t>(o.regulator.id + 1); },
+        [](drive_config_t &o) {
+            o.position.injection.id = static_cast<injection_id_t>(o.position.injection.id + 1);
+        },
+        [](drive_config_t &o) { o.start++; },
+    };
+    for (const Change change : changes) {
+        drive_config_t other = c;
+        change(other);
+        EXPECT_FALSE(drive_same_frame(&c, &other));
+        EXPECT_FALSE(drive_same_frame(&other, &c));
+    }
+}
+
+// Coasting opens the bridge at once, in any state, but only when nothing is commanded.
+TEST(Drive, CoastOpensTheBridgeWhenDisabled)
+{
+    Drive x;
+    x.start_current_mode();
+    x.command.coast = true;
+    x.enable(true, DRIVE_MODE_CURRENT);
+    x.run_ms(2);
+    EXPECT_EQ(x.state(), DRIVE_RUNNING);
+    EXPECT_TRUE(x.driven());
+    x.enable(false, DRIVE_MODE_CURRENT);
+    x.run_ms(1);
+    EXPECT_EQ(x.state(), DRIVE_OFF);
+    x.step();
+    EXPECT_FALSE(x.driven());
+}
+
+// A parameter set that was refused is mended while the drive is in its fault.
+TEST(Drive, GoodParametersEndTheirFault)
+{
+    drive_params_t p = direct::params();
+    p.i_max = p.i_trip + 1;
+    Drive x(p);
+    ASSERT_EQ(x.d.fault, DRIVE_FAULT_PARAMETERS);
+    const drive_params_t good = direct::params();
+    drive_config_t config = {};
+    ASSERT_TRUE(drive_configure(&config, &good, PM_CHANNELS).ok);
+    drive_reconfigure(&x.d, &config);
+    x.run_ms(1);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    EXPECT_EQ(x.state(), DRIVE_OFF);
+    // another fault stays
+    x.in.hw_fault = true;
+    x.run_ms(1);
+    ASSERT_EQ(x.fault(), DRIVE_FAULT_HARDWARE);
+    drive_reconfigure(&x.d, &config);
+    EXPECT_EQ(x.d.fault, DRIVE_FAULT_HARDWARE);
+}
+
 // Standing still on an imposed angle, a stop must end: open_loop_slow() and stop() count in the same
 // still_ms.
 TEST(Drive, StopEndsOnAnImposedAngle)
@@ -326,6 +547,46 @@ TEST(Drive, StopEndsOnAnImposedAngle)
     x.run_ms(200);
     EXPECT_EQ(x.state(), DRIVE_OFF);
     EXPECT_FALSE(x.driven());
+}
+
+// 20 ms of standstill end a stop: the call after them does.
+TEST(Drive, StopWaitsForTwentyMillisecondsOfStandstill)
+{
+    Drive x;
+    x.start_current_mode();
+    x.enable(false, DRIVE_MODE_CURRENT);
+    x.run_ms(1);
+    ASSERT_EQ(x.state(), DRIVE_STOPPING);
+    int ms = 0;
+    for (; x.state() == DRIVE_STOPPING && ms < 1000; ++ms) {
+        x.run_ms(1);
+    }
+    EXPECT_EQ(ms, 21);
+}
+
+// A time that goes on for longer than its counter stays at the end, and does not begin anew.
+TEST(Drive, TheTimeInAStateDoesNotWrap)
+{
+    Drive x;
+    x.start_current_mode();
+    x.d.state_ms = UINT16_MAX;
+    x.run_ms(2);
+    EXPECT_EQ(x.d.state_ms, UINT16_MAX);
+}
+
+// The flag is that of the last millisecond, from the regulator or from the modulator.
+TEST(Drive, VoltageLimitIsSaidOnce)
+{
+    for (const int source : {0, 1, 2, 3}) {
+        Drive x;
+        x.start_current_mode();
+        x.d.voltage.limited = source == 1;
+        x.d.modulator.limited = source == 2 ? 1 : source == 3 ? -1 : 0;
+        drive_slow(&x.d, &x.slow);
+        EXPECT_EQ((drive_status(&x.d)->limits & DRIVE_LIMIT_VOLTAGE) != 0, source != 0) << source;
+        drive_slow(&x.d, &x.slow);
+        EXPECT_EQ(drive_status(&x.d)->limits & DRIVE_LIMIT_VOLTAGE, 0U) << source;
+    }
 }
 
 // Without a fault there is nothing to clear, and a machine that is being stopped must go on being stopped.

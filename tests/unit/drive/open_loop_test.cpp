@@ -43,6 +43,16 @@ void slow(Drive &x, int ms)
     }
 }
 
+// What current control gives next while the current is what it should be, in its frame.
+Complex next_voltage(const drive_t &d, pm_dq_t i, pm_q_t omega)
+{
+    regulator_t regulator = d.regulator;
+    const regulator_in_t in = {i, i, omega, PM_ONE, {1 << 30, 0}, PM_ONE};
+    regulator_out_t out = {};
+    regulator_step(&regulator, &d.config.regulator, &in, &out);
+    return {real(out.v.d, PM_WIDE_BITS), real(out.v.q, PM_WIDE_BITS)};
+}
+
 TEST(OpenLoop, AlignSweepsAQuarterTurnIntoPlace)
 {
     Drive x = started();
@@ -57,6 +67,26 @@ TEST(OpenLoop, AlignSweepsAQuarterTurnIntoPlace)
         EXPECT_EQ(x.d.omega_ramp, 0);
     }
     EXPECT_NEAR(bench::rad(x.d.theta_open), 0, kAngle_deg * kDegree); // and stays
+}
+
+// Whatever ran before: without current, voltage and speed.
+TEST(OpenLoop, BeginsWithNothing)
+{
+    Drive x(direct::params(2));
+    x.d.omega_ramp = x.d.omega_open = x.d.emf_open = x.d.i_open = PM_Q(0.3);
+    x.d.agree_ms = 7;
+    x.d.position.quality = 0;
+    regulator_reset(&x.d.regulator, &x.d.config.regulator, {PM_Q(0.2), PM_Q(-0.3)}, {PM_Q(0.1), 0},
+                    PM_Q(0.5));
+    open_loop_start(&x.d);
+    EXPECT_EQ(x.d.stage, STAGE_OPEN_LOOP);
+    EXPECT_EQ(x.d.theta_open, PM_TURN(0.75));
+    for (const pm_q_t begins : {x.d.omega_ramp, x.d.omega_open, x.d.emf_open, x.d.i_open}) {
+        EXPECT_EQ(begins, 0);
+    }
+    EXPECT_EQ(x.d.agree_ms, 0);
+    EXPECT_EQ(x.d.position.quality, PM_ONE);
+    EXPECT_NEAR(std::abs(next_voltage(x.d, {0, 0}, 0)), 0, kVector);
 }
 
 TEST(OpenLoop, CurrentRampsToItsValue)
@@ -80,6 +110,31 @@ TEST(OpenLoop, SpeedRampsAfterTheAlign)
             slow(x, 1);
             ASSERT_NEAR(real(x.d.omega_ramp), std::copysign(std::min(ms * kSlope, 0.3), target), 1e-5) << ms;
         }
+    }
+}
+
+// In torque mode the open loop only serves to reach the speed at which the observer takes over, a quarter above speed_high
+// (40 rad/s), in the direction of the torque.
+TEST(OpenLoop, TorqueModeGoesBeyondSpeedHigh)
+{
+    for (const double torque : {0.1, -0.1}) {
+        Drive x = started();
+        x.d.command.mode = DRIVE_MODE_TORQUE;
+        x.d.torque_target = bench::fixed(torque, 28);
+        slow(x, kAlign_ms + 2000);
+        EXPECT_NEAR(real(x.d.omega_ramp), std::copysign(1.25 * 40 * 3 / 540, torque), 1e-5);
+    }
+}
+
+// Nothing is commanded beyond speed_max (150 rad/s).
+TEST(OpenLoop, SpeedIsLimited)
+{
+    for (const double way : {1.0, -1.0}) {
+        Drive x = started();
+        x.d.config.position.omega_high = PM_Q(2.0); // no hand-over
+        x.d.omega_target = bench::fixed(way * 1.5, 28);
+        slow(x, kAlign_ms + 8000);
+        EXPECT_NEAR(real(x.d.omega_ramp), way * 150 * 3 / 540, 1e-5);
     }
 }
 
@@ -127,16 +182,6 @@ Complex current_vector(const Drive &x)
     const bool open = x.d.stage == STAGE_OPEN_LOOP;
     return bench::complex(x.d.i_ref) *
            std::polar(1.0, bench::rad(open ? x.d.theta_open : x.d.position.pll.theta));
-}
-
-// What current control gives next while the current is what it should be, in its frame.
-Complex next_voltage(const drive_t &d, pm_dq_t i, pm_q_t omega)
-{
-    regulator_t regulator = d.regulator;
-    const regulator_in_t in = {i, i, omega, PM_ONE, {1 << 30, 0}, PM_ONE};
-    regulator_out_t out = {};
-    regulator_step(&regulator, &d.config.regulator, &in, &out);
-    return {real(out.v.d, PM_WIDE_BITS), real(out.v.q, PM_WIDE_BITS)};
 }
 
 // The observer agrees, the rotor lags the vector by a load angle: the vectors of current and voltage must not
@@ -218,6 +263,36 @@ TEST(OpenLoop, ResumeKeepsCurrentAndVoltage)
         const Complex u = Complex{-0.03, 0.08};
         const Complex next = next_voltage(x.d, {x.d.i_open, 0}, x.d.omega_ramp);
         EXPECT_NEAR(std::abs(next * std::polar(1.0, frame) - u * std::polar(1.0, rotor)), 0, kVector);
+    }
+}
+
+// The observer falls back to the open loop only without injection, and when both reference and estimate are below
+// omega_low (0.117 of the base), whichever way they turn.
+TEST(OpenLoop, FallsBackWhenReferenceAndEstimateAreSlow)
+{
+    const struct {
+        double reference, estimate;
+        int start;
+        bool back;
+    } cases[] = {{0.11, 0.11, 2, true},  {-0.11, -0.11, 2, true}, {0.12, 0.11, 2, false},
+                 {0.11, 0.12, 2, false}, {-0.12, 0.11, 2, false}, {0.11, -0.12, 2, false},
+                 {0.11, 0.11, 1, false}};
+    for (const auto &at : cases) {
+        Drive x(direct::params(at.start));
+        x.command.enable = true;
+        x.command.mode = DRIVE_MODE_SPEED;
+        x.command.speed_mrad_s = static_cast<int32_t>(std::lround(at.reference * 540e3 / 3));
+        drive_command(&x.d, &x.command);
+        x.step(); // measures the DC link
+        x.d.state = DRIVE_RUNNING;
+        x.d.stage = STAGE_VECTOR;
+        x.d.sequence.procedure = PROCEDURE_NONE;
+        position_reset(&x.d.position, &x.d.config.position, 0, {0, 0}, true);
+        x.d.position.pll.omega = bench::fixed(at.estimate, 28);
+        x.d.speed.reference = bench::fixed(at.reference, 28);
+        drive_slow(&x.d, &x.slow);
+        EXPECT_EQ(x.d.stage == STAGE_OPEN_LOOP, at.back) << at.reference << " " << at.estimate;
+        EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
     }
 }
 

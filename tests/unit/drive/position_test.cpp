@@ -120,6 +120,18 @@ TEST(Position, WithoutInjectionTheFluxLeadsAlways)
     }
 }
 
+// Also one that had another weight before.
+TEST(Position, WithoutACarrierTheWeightIsOne)
+{
+    const position_config_t c = config(false);
+    position_t self = started(c);
+    self.weight = PM_Q(0.3);
+    hold(self, c, 0.01, 1);
+    EXPECT_EQ(self.weight, PM_ONE);
+    EXPECT_NEAR(self.gains.kp_turn, c.pll_high.kp_turn, 16); // a product in Q28
+    EXPECT_NEAR(self.gains.ki, c.pll_high.ki, 16);
+}
+
 TEST(Position, ResetStartsAtTheGivenAngle)
 {
     const position_config_t c = config();

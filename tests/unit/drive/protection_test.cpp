@@ -288,6 +288,141 @@ TEST(Protection, CurrentIsDeratedByTemperatureAndVoltage)
     }
 }
 
+// What may last does so for its time and one call; what is just at its limit never trips.
+TEST(Protection, LimitsThemselvesAreAllowed)
+{
+    const auto calls = [](Drive &x, int most) {
+        int n = 0;
+        while (x.d.fault == DRIVE_FAULT_NONE && n < most) {
+            protection_slow(&x.d);
+            ++n;
+        }
+        return n;
+    };
+    const auto turning = [] {
+        Drive x;
+        x.step();
+        x.d.state = DRIVE_RUNNING;
+        x.d.stage = STAGE_VECTOR;
+        x.d.command.mode = DRIVE_MODE_SPEED;
+        x.d.position.quality = PM_ONE;
+        x.d.i_abc = {0, 0, 0}; // the offsets are not known yet
+        return x;
+    };
+    const protection_config_t c = turning().d.config.protection;
+    for (const int sign : {1, -1}) {
+        for (const int beyond : {0, 1}) {
+            Drive x = turning();
+            x.d.i_abc = {sign * c.i_sum, 0, sign * beyond};
+            EXPECT_EQ(calls(x, 100), beyond ? 3 : 100);
+            EXPECT_EQ(x.d.fault, beyond ? DRIVE_FAULT_SENSOR_SUM : DRIVE_FAULT_NONE);
+
+            x = turning();
+            x.d.pll.omega = sign * (PM_ONE + beyond);
+            EXPECT_EQ(calls(x, 100), beyond ? 1 : 100);
+            EXPECT_EQ(x.d.fault, beyond ? DRIVE_FAULT_OVER_SPEED : DRIVE_FAULT_NONE);
+
+            // a stall: the current is limited, the rotor below a speed that its reference is above
+            x = turning();
+            x.d.status.limits = DRIVE_LIMIT_CURRENT;
+            x.d.speed.reference = sign * 2 * c.omega_stall;
+            x.d.pll.omega = sign * (c.omega_stall - beyond);
+            EXPECT_EQ(calls(x, 10000), beyond ? c.stall_ms + 1 : 10000);
+            EXPECT_EQ(x.d.fault, beyond ? DRIVE_FAULT_STALL : DRIVE_FAULT_NONE);
+            x = turning();
+            x.d.status.limits = DRIVE_LIMIT_CURRENT;
+            x.d.speed.reference = sign * (c.omega_stall + beyond);
+            EXPECT_EQ(calls(x, 10000), beyond ? c.stall_ms + 1 : 10000);
+        }
+    }
+    for (const int quality : {0, 1}) {
+        Drive x = turning();
+        x.d.position.quality = quality;
+        EXPECT_EQ(calls(x, 10000), quality == 0 ? c.lost_ms + 1 : 10000);
+        EXPECT_EQ(x.d.fault, quality == 0 ? DRIVE_FAULT_POSITION_LOST : DRIVE_FAULT_NONE);
+    }
+    for (const int32_t dC : {c.temp_trip_dC + 100, c.temp_derate_dC - 1, c.temp_derate_dC}) {
+        Drive x = turning();
+        x.d.temperature_dC = static_cast<int16_t>(dC);
+        pm_q_t i_min, i_max;
+        protection_current_limits(&x.d, &i_min, &i_max);
+        EXPECT_EQ(i_max, dC > c.temp_trip_dC ? 0 : x.d.config.i_max);
+        EXPECT_EQ(i_min, -i_max);
+    }
+    for (const int32_t dC : {c.temp_trip_dC - 1, c.temp_trip_dC}) {
+        Drive x = turning();
+        x.d.temperature_dC = static_cast<int16_t>(dC);
+        calls(x, 10);
+        EXPECT_EQ(x.d.fault == DRIVE_FAULT_OVER_TEMPERATURE, dC == c.temp_trip_dC);
+    }
+}
+
+// A millisecond counter stops at its end, and a position is not judged where there is none.
+TEST(Protection, CountersDoNotWrap)
+{
+    Drive x;
+    x.step();
+    x.d.state = DRIVE_RUNNING;
+    x.d.stage = STAGE_VECTOR;
+    x.d.i_abc = {0, 0, 0};
+    x.d.position.quality = 0;
+    x.d.lost_ms = UINT16_MAX;
+    x.d.config.protection.lost_ms = UINT16_MAX; // never
+    x.d.command.mode = DRIVE_MODE_SPEED;
+    protection_slow(&x.d);
+    EXPECT_EQ(x.d.lost_ms, UINT16_MAX);
+    EXPECT_EQ(x.d.fault, DRIVE_FAULT_NONE);
+    x.d.command.mode = DRIVE_MODE_CURRENT;
+    protection_slow(&x.d);
+    EXPECT_EQ(x.d.lost_ms, 0);
+}
+
+// One by one, where the control period has seen that something is beyond its limit.
+TEST(Protection, StepNamesTheCause)
+{
+    const struct {
+        pm_q_t i, v_dc;
+        bool hw_fault;
+        drive_fault_t fault;
+    } cases[] = {{0, bench::fixed(300.0 / 450, 28), false, DRIVE_FAULT_NONE},
+                 {PM_Q(0.95), bench::fixed(300.0 / 450, 28), false, DRIVE_FAULT_OVER_CURRENT},
+                 {0, bench::fixed(401.0 / 450, 28), false, DRIVE_FAULT_OVER_VOLTAGE},
+                 {0, bench::fixed(59.0 / 450, 28), false, DRIVE_FAULT_UNDER_VOLTAGE},
+                 {0, bench::fixed(300.0 / 450, 28), true, DRIVE_FAULT_HARDWARE}};
+    for (const auto &at : cases) {
+        for (const bool live : {true, false}) {
+            Drive x;
+            x.d.stage = live ? STAGE_VECTOR : STAGE_OFF;
+            x.d.state = live ? DRIVE_RUNNING : DRIVE_OFF;
+            x.d.i_abc = {at.i, -at.i, 0};
+            x.d.status.v_dc = at.v_dc;
+            x.d.hw_fault = at.hw_fault;
+            protection_step(&x.d);
+            EXPECT_EQ(x.d.fault, live || at.hw_fault ? at.fault : DRIVE_FAULT_NONE) << at.fault;
+        }
+    }
+}
+
+// A stall is one of speed control with the current at its limit; each condition by itself.
+TEST(Protection, WhatIsNoStall)
+{
+    for (int missing = 0; missing < 5; ++missing) {
+        Drive x;
+        x.step();
+        x.d.state = missing == 1 ? DRIVE_STOPPING : DRIVE_RUNNING;
+        x.d.stage = missing == 2 ? STAGE_OPEN_LOOP : STAGE_VECTOR;
+        x.d.command.mode = missing == 3 ? DRIVE_MODE_TORQUE : DRIVE_MODE_SPEED;
+        x.d.i_abc = {0, 0, 0};
+        x.d.status.limits = missing == 4 ? uint32_t(DRIVE_LIMIT_VOLTAGE) : uint32_t(DRIVE_LIMIT_CURRENT);
+        x.d.position.quality = PM_ONE;
+        x.d.speed.reference = PM_Q(0.5);
+        for (int ms = 0; ms < 3000; ++ms) {
+            protection_slow(&x.d);
+        }
+        EXPECT_EQ(x.d.fault, missing == 0 ? DRIVE_FAULT_STALL : DRIVE_FAULT_NONE) << missing;
+    }
+}
+
 TEST(Protection, EveryFaultHasAText)
 {
     for (int f = 0; f < DRIVE_FAULT_COUNT; ++f) {

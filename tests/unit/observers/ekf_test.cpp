@@ -356,6 +356,74 @@ template <class Functions, unsigned N, class Config> double least_eigenvalue(Con
     return least;
 }
 
+// The state is scaled by 3/4 where its variance is a half or more: the covariances by as much, the variance by its square.
+TEST(Ekf, AVarianceThatHasGrownIsHeld)
+{
+    const int32_t half = 1 << (PM_KALMAN_BITS - 1);
+    for (const int32_t variance : {half - 4, half, half + half / 2}) {
+        int32_t P[6] = {};
+        for (unsigned r = 0; r < 3; ++r) {
+            for (unsigned c = 0; c <= r; ++c) {
+                P[PM_KALMAN_AT(r, c)] = r == c ? half / 4 : static_cast<int32_t>(1000 + 100 * r + c);
+            }
+        }
+        P[PM_KALMAN_AT(1, 1)] = variance;
+        pm_kalman_hold(P, 3, 1);
+        const double share = variance < half ? 1 : 0.75;
+        EXPECT_NEAR(pm_kalman_at(P, 1, 1), share * share * variance, 2);
+        EXPECT_NEAR(pm_kalman_at(P, 1, 0), share * 1100, 1);
+        EXPECT_NEAR(pm_kalman_at(P, 2, 1), share * 1201, 1);
+        EXPECT_EQ(pm_kalman_at(P, 2, 0), 1200);
+        EXPECT_EQ(pm_kalman_at(P, 0, 0), half / 4);
+        EXPECT_EQ(pm_kalman_at(P, 2, 2), half / 4);
+    }
+}
+
+// In a filter: the speed's is not measured.
+template <class Functions, class Config>
+double after_a_step(const Config &config, unsigned omega, double variance)
+{
+    typename Functions::State state;
+    obs_in_t in = {};
+    in.dir = bench::direction(0);
+    Functions::reset(&state, &config, &in);
+    state.P[PM_KALMAN_AT(omega, omega)] = bench::fixed(variance, PM_KALMAN_BITS);
+    obs_out_t out;
+    Functions::step(&state, &config, &in, &out);
+    return bench::real(pm_kalman_at(state.P, omega, omega), PM_KALMAN_BITS);
+}
+
+TEST(Ekf, SpeedThatIsNotSeenKeepsAVarianceBelowAHalf)
+{
+    const Machine m = bench::kIpmLinear;
+    const Base b = bench::kIpmBase;
+    for (const double variance : {0.55, 0.6, 0.66, 0.9, 0.99}) {
+        const double most = std::max(0.5, 0.75 * 0.75 * variance);
+        EXPECT_LT(after_a_step<FullFunctions>(bench::ekf_full_config(m, b), EKF_OMEGA, variance), most);
+        EXPECT_LT(
+            after_a_step<ReducedFunctions>(bench::ekf_reduced_config(m, b), EKF_REDUCED_OMEGA, variance),
+            most);
+    }
+}
+
+// The misfit of the reduced filter is how far its speed is from the loop's.
+TEST(Ekf, MisfitOfTheReducedFilterIsItsSpeedError)
+{
+    const ekf_reduced_config_t config = bench::ekf_reduced_config(bench::kIpmLinear, bench::kIpmBase);
+    ekf_reduced_t self;
+    obs_in_t in = {};
+    in.dir = bench::direction(0);
+    in.omega = bench::fixed(0.3, 28);
+    ekf_reduced_reset(&self, &config, &in);
+    for (const double omega : {0.3, 0.35, 0.1, -0.2}) {
+        const obs_out_t out = ekf_reduced_last(&self);
+        in.omega = bench::fixed(omega, 28);
+        self.omega = bench::fixed(0.3, 28);
+        ekf_reduced_slow(&self, &config, &in, &out, PM_ONE);
+        EXPECT_NEAR(bench::real(ekf_reduced_last(&self).misfit), std::abs(0.3 - omega), 1e-7);
+    }
+}
+
 TEST(Ekf, TheCovarianceStaysPositive)
 {
     const Machine m = bench::kIpmLinear;

@@ -340,4 +340,30 @@ TEST(Loop, LargestErrorsSaturate)
     }
 }
 
+// The inner loop's distance is forgotten where the angle is not the observer's alone, and where the loop is another.
+TEST(Loop, ForgetsItsInnerDistance)
+{
+    const struct {
+        loop_id_t before, now;
+        pm_q_t weight;
+        bool kept;
+    } cases[] = {{LOOP_ARCTANGENT, LOOP_ARCTANGENT, PM_ONE, true},
+                 {LOOP_ARCTANGENT, LOOP_ARCTANGENT, PM_ONE / 2, false},
+                 {LOOP_ARCTANGENT, LOOP_ARCTANGENT, 0, false},
+                 {LOOP_PLL, LOOP_PLL, PM_ONE / 2, true},
+                 {LOOP_PLL, LOOP_PLL, 0, false},
+                 {LOOP_PLL, LOOP_ARCTANGENT, PM_ONE, false}};
+    for (const auto &at : cases) {
+        loop_t self;
+        loop_reset(&self);
+        self.id = static_cast<uint8_t>(at.before);
+        self.inner = 12345;
+        loop_config_t c = {};
+        c.id = at.now;
+        loop_slow(&self, &c, at.weight);
+        EXPECT_EQ(self.inner, at.kept ? 12345 : 0) << at.before << at.now << ' ' << at.weight;
+        EXPECT_EQ(self.direct, at.weight == PM_ONE);
+    }
+}
+
 } // namespace

@@ -231,6 +231,179 @@ TEST(Metrics, AngleOfTheVoltageIsComparedWithTheCommandOfTwoSamplesBefore)
     EXPECT_NEAR(gather("voltage_angle_error_max_deg", turned(-3.0)).number, 3.0, 1e-6);
 }
 
+// Each is fed a signal of its own, 10 + 0.01 k with a dip of -20 at k = 500, scaled so that no other signal gives the same;
+// the folds of that signal are known.
+TEST(Metrics, FoldsOfEverySignal)
+{
+    const auto wave = [](int k) { return k == 500 ? -20.0 : 10.0 + 0.01 * k; };
+    const auto all = [&](Sample &s, int k) {
+        const double x = wave(k);
+        s.rig.truth.omega_mech_rad_s = 2 * x;
+        s.rig.omega_hat_mech_rad_s = 2 * x + 3 * x;
+        s.rig.omega_ref_mech_rad_s = 2 * x + 4 * x;
+        s.rig.truth.torque_Nm = 5 * x;
+        s.rig.truth.i_A[0] = 6 * x;
+        s.rig.truth.i_d_A = 7 * x;
+        s.rig.truth.i_q_A = 8 * x;
+        s.rig.truth.v_dc_V = 9 * x;
+        s.rig.weight = 11 * x;
+        s.rig.quality = 12 * x;
+    };
+    const double mean = 10.0 + 0.01 * 499.5 - 0.001 * (20.0 + 15.0); // 15 is the wave without the dip
+    double squares = 0.0;
+    for (int k = 0; k < 1000; ++k) {
+        squares += wave(k) * wave(k) / 1000.0;
+    }
+    const double rms = std::sqrt(squares), deviation = std::sqrt(squares - mean * mean);
+    const double high = 19.99, low = -20.0, last = 19.99;
+    const struct {
+        const char *name;
+        double expected;
+    } cases[] = {
+        {"speed_error_max_rel", 4 * 20.0 / 100},
+        {"speed_estimate_error_max_rel", 3 * 20.0 / 100},
+        {"speed_estimate_error_rms_rel", 3 * rms / 100},
+        {"speed_mean_rad_s", 2 * mean},
+        {"speed_mean_rel", 2 * mean / 100},
+        {"speed_min_rel", 2 * low / 100},
+        {"speed_max_rel", 2 * high / 100},
+        {"speed_final_rad_s", 2 * last},
+        {"speed_final_rel", 2 * last / 100},
+        {"torque_mean_Nm", 5 * mean},
+        {"torque_mean_rel", 5 * mean / 2},
+        {"torque_span_Nm", 5 * (high - low)},
+        {"current_peak_A", 6 * 20.0},
+        {"current_final_A", std::sqrt(7.0 * 7.0 + 8.0 * 8.0) * last},
+        {"i_d_mean_A", 7 * mean},
+        {"i_q_mean_A", 8 * mean},
+        {"i_q_min_A", 8 * low},
+        {"i_q_max_A", 8 * high},
+        {"i_q_std_A", 8 * deviation},
+        {"v_dc_max_V", 9 * high},
+        {"v_dc_min_V", 9 * low},
+        {"weight_mean", 11 * mean},
+        {"quality_min", 12 * low},
+    };
+    for (const auto &at : cases) {
+        EXPECT_NEAR(gather(at.name, all).number, at.expected, 1e-8) << at.name;
+    }
+}
+
+TEST(Metrics, PeakCurrentIsThatOfAnyPhase)
+{
+    for (int leg = 0; leg < 3; ++leg) {
+        for (const double sign : {1.0, -1.0}) {
+            const auto peak = [&](Sample &s, int k) { s.rig.truth.i_A[leg] = k == 3 ? 9.0 * sign : 1.0; };
+            EXPECT_EQ(gather("current_peak_A", peak).number, 9.0) << leg;
+        }
+    }
+}
+
+// Only where the drive says that it has a position; what needs none is counted always.
+TEST(Metrics, StatesThatHaveAPosition)
+{
+    for (int state = 0; state < RIG_STATES; ++state) {
+        const auto at = [state](Sample &s, int) {
+            s.rig.state = state;
+            s.rig.quality = 0.7;
+            s.rig.truth.v_dc_V = 300.0;
+        };
+        const bool has = state == RIG_RUNNING || state == RIG_STOPPING;
+        EXPECT_EQ(std::isnan(gather("quality_min", at).number), !has) << state;
+        EXPECT_EQ(gather("v_dc_min_V", at).number, 300.0) << state;
+    }
+}
+
+TEST(Metrics, TravelIsFromTheStartEitherWay)
+{
+    for (const double way : {1.0, -1.0}) {
+        const auto turned = [way](Sample &s, int k) {
+            const double mech_deg = k < 400 ? 0.01 * k : 4.0 - 0.005 * (k - 400); // to 4, back to 1.005
+            s.rig.truth.theta_e_rad = (3.0 * way * mech_deg + 50.0) * pi / 180.0;
+        };
+        EXPECT_NEAR(gather("travel_max_deg_mech", turned).number, 4.0, 1e-6);
+    }
+}
+
+TEST(Metrics, WithoutADirectionNothingMovesBackwards)
+{
+    const auto idle = [](Sample &s, int k) { s.rig.truth.theta_e_rad = -0.01 * k; };
+    EXPECT_TRUE(std::isnan(gather("backward_movement_deg_mech", idle).number));
+    Expectation expectation;
+    expectation.metric = "time_to_speed_s";
+    expectation.fraction = 0.0;
+    EXPECT_TRUE(std::isnan(gather(expectation, idle).number));
+}
+
+TEST(Metrics, TimeToSpeedIsTheFirst)
+{
+    Expectation expectation;
+    expectation.metric = "time_to_speed_s";
+    expectation.fraction = 0.5;
+    const auto twice = [](Sample &s, int k) {
+        s.direction = -1;
+        s.rig.truth.omega_mech_rad_s = k == 200 || k > 600 ? -50.0 : -49.0;
+    };
+    EXPECT_NEAR(gather(expectation, twice).number, 0.02, exact);
+}
+
+// Found twice: the worse counts. A window that begins while the drive runs has seen no start.
+TEST(Metrics, FoundAngleErrorIsTheWorstOfItsStarts)
+{
+    const auto found = [](Sample &s, int k) {
+        s.rig.state = k == 0 || k == 300 || k == 600 || k == 800 ? RIG_FINDING : RIG_RUNNING;
+        s.rig.angle_error_rad = k == 301 ? 0.1 : k == 601 ? -0.3 : k == 801 ? 0.2 : 1.0;
+        s.rig.angle_error_rad = k == 1 ? 0.05 : s.rig.angle_error_rad;
+    };
+    EXPECT_NEAR(gather("found_angle_error_deg", found).number, -0.3 * 180.0 / pi, exact);
+    const auto running = [](Sample &s, int) { s.rig.angle_error_rad = 1.0; };
+    EXPECT_TRUE(std::isnan(gather("found_angle_error_deg", running).number));
+}
+
+// Two faults of which one is a lost position; the bridge is off at once, and a start follows each.
+TEST(Metrics, EveryFaultCountsOnce)
+{
+    const auto story = [](Sample &s, int k) {
+        const bool first = k >= 100 && k < 200, second = k >= 500 && k < 600;
+        s.rig.fault = first ? 1 : second ? 8 : 0;
+        s.rig.state = first || second ? RIG_FAULT : k >= 200 && k < 300 ? RIG_OFF : RIG_RUNNING;
+        s.rig.driven = s.rig.state == RIG_RUNNING;
+    };
+    EXPECT_EQ(gather("fault_count", story).number, 2.0);
+    EXPECT_EQ(gather("position_lost_count", story).number, 1.0);
+    EXPECT_NE(gather("fault", story).text, "POSITION_LOST");
+    EXPECT_EQ(gather("fault", story).number, 1.0);
+    EXPECT_EQ(gather("fault_latency_periods", story).number, 0.0);
+    EXPECT_EQ(gather("restarts", story).number, 2.0);
+    EXPECT_EQ(gather("driven_after_fault_periods", story).number, 200.0 + 400.0);
+    EXPECT_NEAR(gather("driven_s", story).number, 700 * 1e-4, exact);
+    Expectation late;
+    late.metric = "fault_delay_s";
+    late.t0_s = 0.004;
+    EXPECT_NEAR(gather(late, story).number, 0.01 - 0.004, exact);
+}
+
+// Every term by itself: 1 J more of it is 1 J that the balance misses.
+TEST(Metrics, EveryEnergyIsInTheBalance)
+{
+    for (int term = 0; term < 5; ++term) {
+        for (const double sign : {1.0, -1.0}) {
+            const auto energies = [&](Sample &s, int k) {
+                const double x = k / 999.0;
+                double e[5] = {10.0, 2.0, 1.0, 4.0, 3.0};
+                e[term] += sign;
+                s.rig.truth.e_in_J = 5.0 + e[0] * x;
+                s.rig.truth.e_copper_J = 6.0 + e[1] * x;
+                s.rig.truth.e_device_J = 7.0 + e[2] * x;
+                s.rig.truth.e_mech_J = 8.0 + e[3] * x;
+                s.rig.truth.e_field_J = 9.0 + e[4] * x;
+            };
+            EXPECT_NEAR(gather("energy_residual_rel", energies).number, 1.0 / (20.0 + sign), exact) << term;
+        }
+    }
+    EXPECT_TRUE(std::isnan(gather("energy_residual_rel", [](Sample &, int) {}).number));
+}
+
 TEST(Metrics, EveryMetricOfTheTableCanBeMade)
 {
     const pmsim::Setup setup = test_setup();

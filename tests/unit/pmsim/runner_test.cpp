@@ -1,8 +1,11 @@
 #include "tools/pmsim/runner.h"
 
+#include <atomic>
 #include <cmath>
 #include <fstream>
+#include <numeric>
 #include <sstream>
+#include <vector>
 
 #include <gmock/gmock.h>
 
@@ -145,6 +148,54 @@ TEST(Runner, ImposedSpeedRampsAsTheProfileSays)
     });
     EXPECT_NEAR(at_middle, 20.0, 0.1); // one period of the ramp is 0.04 rad/s
     EXPECT_NEAR(at_end, 40.0, 1e-6);
+}
+
+// A window [from, to) holds the periods whose sample lies in it: 800 to 1199 of those that the observer is handed, and one
+// that ends with the run, or after it, the last.
+TEST(Runner, WindowIsThatOfTheExpectation)
+{
+    const std::string text = "title: dynamometer\n"
+                             "machine: sim_plant/machines/ipm_1000.yaml\n"
+                             "start: {theta_e_deg: 0}\n"
+                             "duration_s: 0.2\n"
+                             "profile:\n"
+                             "  - {t_s: 0.05, imposed_speed_rad_s: 40, ramp_s: 0.1}\n"
+                             "expect:\n"
+                             "  - {metric: speed_min_rel, window_s: [0.08, 0.12], max: 9, book: x}\n"
+                             "  - {metric: speed_max_rel, window_s: [0.08, 0.12], max: 9, book: x}\n"
+                             "  - {metric: speed_mean_rad_s, window_s: [0.08, 0.12], max: 9, book: x}\n"
+                             "  - {metric: speed_mean_rad_s, window_s: [0.1, 0.2], max: 9, book: x}\n"
+                             "  - {metric: speed_mean_rad_s, max: 9, book: x}\n";
+    const Scenario scenario = load(text);
+    std::vector<double> speed;
+    const RunResult result =
+        run_scenario(scenario, [&](const Sample &s) { speed.push_back(s.rig.truth.omega_mech_rad_s); });
+    ASSERT_EQ(speed.size(), 2000U);
+    const auto mean = [&](int from, int to) {
+        return std::accumulate(speed.begin() + from, speed.begin() + to, 0.0) / (to - from);
+    };
+    const double rated = scenario.setup.rated.speed_rated_rad_s;
+    EXPECT_DOUBLE_EQ(result.outcomes[0].value.number, speed[800] / rated);
+    EXPECT_DOUBLE_EQ(result.outcomes[1].value.number, speed[1199] / rated);
+    EXPECT_NEAR(result.outcomes[2].value.number, mean(800, 1200), 1e-9);
+    EXPECT_NEAR(result.outcomes[3].value.number, mean(1000, 2000), 1e-9);
+    EXPECT_NEAR(result.outcomes[4].value.number, mean(0, 2000), 1e-9);
+    EXPECT_LT(speed[800], speed[801]);
+    EXPECT_DOUBLE_EQ(result.simulated_s, 0.2);
+}
+
+// In thousands of periods, each of 100 us.
+TEST(Runner, ProgressIsSimulatedTime)
+{
+    std::atomic<uint64_t> progress{0};
+    std::vector<uint64_t> seen;
+    run_scenario(
+        load(small_scenario()), [&](const Sample &) { seen.push_back(progress); }, &progress);
+    EXPECT_EQ(progress, 300000U);
+    EXPECT_EQ(seen[999], 0U); // counted when the period is over
+    EXPECT_EQ(seen[1000], 100000U);
+    EXPECT_EQ(seen[1999], 100000U);
+    EXPECT_EQ(seen[2999], 200000U);
 }
 
 TEST(Runner, EventsWaitForAState)

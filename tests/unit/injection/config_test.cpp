@@ -1,0 +1,165 @@
+// Configurations of the low-speed sources against the formulas of their headers, for IPM-1000's defaults: 10 kHz, 540 rad/s.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "firmware/params/parameters.h"
+#include "tests/contract/bench.h"
+
+namespace
+{
+
+using bench::real;
+
+constexpr double kF_pwm = 10e3, kOmega = 540;
+
+drive_params_t with(int32_t injection)
+{
+    drive_params_t p;
+    drive_params_default(&p);
+    p.injection = injection;
+    p.start_method = 1;
+    return p;
+}
+
+drive_config_t configure(const drive_params_t &p)
+{
+    drive_config_t c = {};
+    const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
+    EXPECT_TRUE(r.ok) << r.reason;
+    return c;
+}
+
+// A mean of two samples is half a period old: current control up to f_pwm / 20, whatever it is set to.
+TEST(InjectionConfig, SquareWavesSlowCurrentControl)
+{
+    for (const int32_t id : {INJECTION_pulsating_square, INJECTION_stationary_square}) {
+        for (const double set_Hz : {300.0, 490.0, 510.0, 800.0, 1000.0}) {
+            drive_params_t p = with(id);
+            p.current_bandwidth = static_cast<int32_t>(std::lround(set_Hz * 1e3));
+            const double share = std::min(1.0, kF_pwm / 20 / set_Hz);
+            EXPECT_NEAR(real(configure(p).position.current_low, 31), share, 1e-6) << id << ' ' << set_Hz;
+        }
+    }
+}
+
+// Sines: half a window and 1.5 periods are a phase of 0.4 rad at the bandwidth of current control and of 0.3 rad at that of
+// the position loop.
+TEST(InjectionConfig, SinesSlowCurrentControlByTheirWindow)
+{
+    for (const int32_t id : {INJECTION_pulsating_sine, INJECTION_rotating_sine, INJECTION_stationary_sine}) {
+        for (const int n : {10, 20}) {
+            drive_params_t p = with(id);
+            p.f_injection = static_cast<int32_t>(
+                std::lround(kF_pwm / n * std::pow(10, -drive_param_exp10[DRIVE_PARAM_f_injection])));
+            const double delay = (n + 2) / 2.0 / kF_pwm;
+            p.current_bandwidth = 500000;
+            p.injection_bandwidth = 1000;
+            EXPECT_NEAR(real(configure(p).position.current_low, 31),
+                        std::min(1.0, 0.4 / (2 * bench::kPi * delay) / 500), 1e-6)
+                << id << ' ' << n;
+            const double most_Hz = 0.3 / (2 * bench::kPi * delay);
+            for (const double share : {0.99, 1.01}) {
+                p.injection_bandwidth = static_cast<int32_t>(std::lround(share * most_Hz * 1e3));
+                drive_config_t c = {};
+                const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
+                EXPECT_EQ(!r.ok && r.param == DRIVE_PARAM_injection_bandwidth, share > 1) << id << ' ' << n;
+            }
+        }
+    }
+}
+
+// By half a period the mean of two samples is late.
+TEST(InjectionConfig, SquareWavesTurnByHalfAPeriod)
+{
+    const double half = kOmega / kF_pwm / 2;
+    EXPECT_NEAR(
+        real(configure(with(INJECTION_pulsating_square)).position.injection.pulsating_square.half_step, 32),
+        half, 1e-8);
+    EXPECT_NEAR(
+        real(configure(with(INJECTION_stationary_square)).position.injection.stationary_square.half_step, 32),
+        half, 1e-8);
+}
+
+// Left to itself (start_method 0) the drive injects where there is a saliency of more than 5 % of L_q at zero current.
+TEST(InjectionConfig, SaliencyOfFivePerCentIsEnough)
+{
+    for (int32_t id = 0; id < INJECTION_COUNT; ++id) {
+        for (const double share : {0.045, 0.055}) {
+            drive_params_t p = with(id);
+            p.start_method = 0;
+            p.i_noise = 1;
+            p.L_d = static_cast<int32_t>(std::lround((1 - share) * p.L_q));
+            drive_config_t c = {};
+            drive_configure(&c, &p, PM_CHANNELS);
+            EXPECT_EQ(c.injection, share > 0.05) << id << ' ' << share;
+        }
+    }
+}
+
+// And not where noise hides the answer.
+TEST(InjectionConfig, AnswerMustExceedTheNoise)
+{
+    for (int32_t id = 0; id < INJECTION_COUNT; ++id) {
+        drive_params_t p = with(id);
+        p.start_method = 0;
+        p.i_noise = 1;
+        drive_config_t c = {};
+        drive_configure(&c, &p, PM_CHANNELS);
+        EXPECT_TRUE(c.injection) << id;
+        p.i_noise = 400000;
+        drive_configure(&c, &p, PM_CHANNELS);
+        EXPECT_FALSE(c.injection) << id;
+    }
+}
+
+// Half the difference of two samples: V T (L_q - L_d) / (2 L_d L_q) across d, against four times the noise.
+TEST(InjectionConfig, AnswerOfThePulsatingSquareIsItsFormula)
+{
+    drive_params_t p = with(INJECTION_pulsating_square);
+    p.start_method = 0;
+    const double L_d = p.L_d * 1e-9, L_q = p.L_q * 1e-9, flux = p.v_injection * 1e-3 / kF_pwm;
+    const double answer_mA = 1e3 * flux * (L_q - L_d) / (2 * L_d * L_q);
+    for (const double share : {0.9, 1.1}) {
+        const drive_param_info_t &info = drive_param_table[DRIVE_PARAM_i_noise];
+        p.i_noise = static_cast<int32_t>(
+            std::lround(share * answer_mA / 4 * std::pow(10, -3 - drive_param_exp10[DRIVE_PARAM_i_noise])));
+        ASSERT_GE(p.i_noise, info.min);
+        drive_config_t c = {};
+        drive_configure(&c, &p, PM_CHANNELS);
+        EXPECT_EQ(c.injection, share < 1) << share;
+    }
+}
+
+TEST(InjectionConfig, NoSaliencyAtRatedCurrentIsRefused)
+{
+    for (const int32_t id :
+         {INJECTION_pulsating_square, INJECTION_rotating_sine, INJECTION_stationary_square}) {
+        drive_params_t p = with(id);
+        p.L_qh_rated = p.L_dh_rated - 1000000;
+        p.L_dqh_rated = 0;
+        drive_config_t c = {};
+        const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
+        EXPECT_FALSE(r.ok) << id;
+        EXPECT_TRUE(r.param == DRIVE_PARAM_L_qh_rated || r.param == DRIVE_PARAM_L_dqh_rated) << id;
+    }
+}
+
+// Of the pulse: flux L_d i in periods of 2/3 v_dc T at a duty of 1 or less; waits for eight times that and 50.
+TEST(InjectionConfig, PulseIsThatOfItsFlux)
+{
+    for (const double i_A : {2.0, 4.0, 6.0}) {
+        drive_params_t p = with(INJECTION_pulsating_square);
+        p.i_pulse = static_cast<int32_t>(std::lround(i_A * 1e3));
+        const initial_pulses_config_t c = configure(p).pulses;
+        const double exact = p.L_d * 1e-9 * i_A / (2.0 / 3 * p.v_dc_nominal * 1e-3 / kF_pwm);
+        const double whole = std::ceil(exact);
+        EXPECT_EQ(c.periods, whole) << i_A;
+        EXPECT_EQ(c.timeout, 8 * whole + 50) << i_A;
+        EXPECT_NEAR(real(c.duty), std::min(1.0, exact / whole), 1e-6) << i_A;
+        EXPECT_NEAR(real(c.y_min), 0.75 * (p.L_q - p.L_d) / p.L_q * i_A / 10, 1e-6) << i_A;
+    }
+}
+
+} // namespace
