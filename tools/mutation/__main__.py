@@ -115,7 +115,7 @@ def try_all(todo, places, options, report):
     tree.write(changed)
     tree.build(options.jobs)
     workers = trials.Workers(options.jobs)
-    tests = trials.listed(options.labels.split(","), LEFT_OUT)
+    tests = [t for t in trials.listed(options.labels.split(","), LEFT_OUT) if re.search(options.tests, t.name)]
     print(f"{len(tests)} tests; running each without a mutant", flush=True)
     tests, failed = trials.record(tests, max(alive, default=0) + 1, options.longest, workers)
     for command in failed:
@@ -142,6 +142,8 @@ def main():
     parser.add_argument("--seed", type=int, default=1, help="of the sample")
     parser.add_argument("--list", action="store_true", help="print the mutants and end")
     parser.add_argument("--again", action="store_true", help="try those again that survived the last time")
+    parser.add_argument("--only", default="", metavar="REGEX", help="of the sample, only files that match")
+    parser.add_argument("--tests", default="", metavar="REGEX", help="only tests whose names match")
     parser.add_argument("--labels", default="unit,contract", help="kinds of tests (default: %(default)s)")
     parser.add_argument("--longest", type=float, default=15, metavar="SECONDS",
                         help="tests that take longer are left out (default: %(default)s s of the processor)")
@@ -169,7 +171,8 @@ def main():
         row = known.get(mutant.key())
         return row is None or (options.again and row["verdict"] in ("survived", "not reached"))
 
-    todo = [mutant for mutant in chosen if open_still(mutant) and mutant.key() not in accepted]
+    todo = [mutant for mutant in chosen if open_still(mutant) and mutant.key() not in accepted
+            and re.search(options.only, mutant.file)]
     if todo and not options.page:
         with RESULTS.open("a") as output:
             def report(mutant, verdict, test):

@@ -434,6 +434,15 @@ TEST(Drive, AnAbandonedIdentificationIsReported)
     }
 }
 
+TEST(Drive, IdentificationBeginsAtNothing)
+{
+    Drive x;
+    x.step();
+    x.d.commissioning_report.progress = 55;
+    procedure_begin(&x.d, PROCEDURE_identify);
+    EXPECT_EQ(x.d.commissioning_report.progress, 0);
+}
+
 // Whichever regulator, and with the optional stages between source and loop: the plant turns as commanded.
 TEST(Drive, EveryRegulatorTurnsTheMotor)
 {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/unit/injection/rig.h"
@@ -132,6 +133,17 @@ TEST(PulsatingSine, VoltageSwingsAlongD)
         const Complex v = bench::complex(run.given[static_cast<size_t>(k)].v) * rig::kBase.v_V;
         const Complex expected = 35 * std::cos(2 * bench::kPi * k / 20) * std::polar(1.0, 0.4 + 0.3);
         EXPECT_LT(std::abs(v - expected), 1e-4) << k;
+    }
+}
+
+// sine.h: a phase is followed up to 0.7 rad either way.
+TEST(Sine, PhaseIsLimited)
+{
+    for (const double delta : {0.0, 0.3, -0.3, 0.65, -0.65, 0.75, -0.75, 1.5, -3.0}) {
+        const pm_dir_t dir = sine_phase(bench::fixed(std::cos(delta), 28), bench::fixed(std::sin(delta), 28));
+        const double expected = std::clamp(delta, -0.7, 0.7);
+        EXPECT_NEAR(bench::real(dir.cos, 31), std::cos(expected), 1e-4) << delta;
+        EXPECT_NEAR(bench::real(dir.sin, 31), std::sin(expected), 1e-4) << delta;
     }
 }
 

@@ -231,4 +231,20 @@ TEST(SlidingMode, EveryRemedyHalvesTheRipple)
               kRippleShare * Closed(conventional, slow).settled().ripple);
 }
 
+// A gain of nothing is a thousandth of the base voltage, and one beyond the base is the base.
+TEST(SlidingMode, GainHasLimits)
+{
+    for (const double k : {0.0, 0.0005, 0.002, 0.4, 3.0}) {
+        sliding_mode_config_t c =
+            bench::sliding_mode_config(bench::kIpmLinear, bench::kIpmBase, SLIDING_MODE_SIGN, true);
+        c.k_base = bench::fixed(k, 28);
+        c.k_speed = 0;
+        sliding_mode_t self = {};
+        obs_in_t in = {};
+        in.dir = bench::direction(0);
+        sliding_mode_reset(&self, &c, &in);
+        EXPECT_NEAR(bench::real(self.K), std::clamp(k, 0.001, 1.0), 1e-6);
+    }
+}
+
 } // namespace
