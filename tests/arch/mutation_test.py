@@ -122,7 +122,7 @@ class Accepted(unittest.TestCase):
         self.assertEqual(stale, [])
         self.assertGreaterEqual(len(accepted), len(rows))
         for row in rows:
-            self.assertGreater(len(row["reason"]), 20, row)
+            self.assertTrue(row["reason"].strip(), row)
 
 
 if __name__ == "__main__":
