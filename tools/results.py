@@ -10,6 +10,7 @@ usage: results.py [--seeds N] [SCENARIO...]     measures all scenarios, or those
 """
 import argparse
 import csv
+import io
 import json
 import math
 import os
@@ -55,26 +56,31 @@ def measure(name, seeds):
         if run.returncode > 1:
             sys.exit(run.stderr)
         result = json.loads((Path(folder) / "result.json").read_text(encoding="utf-8"))
-        with (Path(folder) / "runs.csv").open(encoding="utf-8") as file:
+        path = Path(folder) / "runs.csv"
+        with path.open(encoding="utf-8") if path.exists() else io.StringIO("") as file:
             runs = list(csv.reader(file))
     items = [{key: item[key] for key in KEPT} for item in result["expectations"]]
-    for item in items:
-        item["cases"] = by_case(item["name"], runs)
+    for place, item in enumerate(items):
+        item["cases"] = by_case(place - len(items), runs) if runs else one_run(item["value"])
     return {"title": result["title"], "runs": result["runs"], "simulated_s": result["simulated_s"], "expectations": items}
 
 
-def by_case(name, runs):
-    """Case -> of the runs of each seed the smallest, the largest and the largest magnitude: of all seeds, and their median."""
+def one_run(value):
+    return {"": figures([[value]])} if isinstance(value, (int, float)) else {}
+
+
+def by_case(place, runs):
+    """Case -> of the runs of each seed the smallest, the largest and the largest magnitude: of all seeds, and their median.
+    place: of the expectation, from the end; each has two columns."""
     head, rows = runs[0], runs[1:]
-    column, seed = head.index(name), head.index("seed")
     found = {}
     for row in rows:
         try:
-            value = float(row[column])
+            value = float(row[2 * place])
         except ValueError:
             return {}  # a word
-        case = row[head.index("case")] if "case" in head else ""
-        found.setdefault(case, {}).setdefault(row[seed], []).append(value)
+        case, seed = (row[head.index(name)] if name in head else "" for name in ("case", "seed"))
+        found.setdefault(case, {}).setdefault(seed, []).append(value)
     return {case: figures(list(seeds.values())) for case, seeds in found.items()}
 
 
@@ -240,14 +246,14 @@ def stale(record, build):
         path = folder / name / "result.json" if folder else None
         if not path or not path.exists():
             continue  # not run
-        now = {item["name"]: item for item in json.loads(path.read_text())["expectations"]}
-        recorded = {item["name"]: item for item in result["expectations"]}
-        if now.keys() != recorded.keys():
+        now = json.loads(path.read_text())["expectations"]
+        if [item["metric"] for item in now] != [item["metric"] for item in result["expectations"]]:
             yield f"{name}.yaml: expects other things than were recorded"
-        for key in now.keys() & recorded.keys():
-            why = differs(recorded[key], now[key])
+            continue
+        for recorded, item in zip(result["expectations"], now):
+            why = differs(recorded, item)
             if why:
-                yield f"{name}.yaml: {key}: {why}"
+                yield f"{name}.yaml: {item['name']}: {why}"
     if (ROOT / PAGE).read_text(encoding="utf-8") != page(record):
         yield f"{PAGE}: not what {RECORD} and {acceptance.FILE} make"
     if (ROOT / README).read_text(encoding="utf-8") != with_readme(record):
