@@ -14,7 +14,7 @@ using app_test::defaults;
 namespace
 {
 
-constexpr double kI_A = 10, kV_V = 450, kOmega = 540, kPairs = 3, kPeriod_s = 100e-6;
+constexpr double kI_A = 10, kV_V = 450, kOmega = 540, kPairs = 3;
 constexpr double kPsi_Wb = kV_V / kOmega, kTorque_Nm = 1.5 * kPairs * kPsi_Wb * kI_A;
 constexpr double kRounding = 0.5 + 1e-3;
 
