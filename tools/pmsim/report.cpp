@@ -19,6 +19,7 @@ static std::string value_text(const Outcome &outcome)
 static void rank_seeds(Verdict &verdict, const std::map<std::string, Outcome> &worst_of_seed)
 {
     std::vector<Outcome> ranked;
+    ranked.reserve(worst_of_seed.size());
     for (const auto &entry : worst_of_seed) {
         ranked.push_back(entry.second);
     }
