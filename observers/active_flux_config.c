@@ -2,8 +2,8 @@
 
 #include "observers/model_config.h"
 
-/* R follows in 24 ms at rated current: docs/decisions/004-resistance.md. */
-#define FOLLOW pm_num_ratio(1, 24)
+/* R follows in 8 ms at rated current: docs/decisions/004-resistance.md. */
+#define FOLLOW pm_num_ratio(1, 8)
 
 void make_active_flux(maker_t *m, active_flux_config_t *c)
 {

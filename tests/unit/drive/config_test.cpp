@@ -195,7 +195,7 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
         {"flux t_s", c.position.observer.active_flux.model.t_s, 32, T * W},
         {"flux g", c.position.observer.active_flux.g, 32, 0.5 * T * W},
         {"flux k_seed", c.position.observer.active_flux.k_seed, 32, 300 * T},
-        {"flux k_R", c.position.observer.active_flux.resistance.k, 26, 300 / 24.0 / (W * i_r * i_r)},
+        {"flux k_R", c.position.observer.active_flux.resistance.k, 26, 300 / 8.0 / (W * i_r * i_r)},
         {"flux omega_R", c.position.observer.active_flux.resistance.omega, 28, 10.5 * P / W},
         {"omega_low", c.position.omega_low, 28, 21 * P / W},
         {"omega_high", c.position.omega_high, 28, 40 * P / W},
