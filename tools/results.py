@@ -25,13 +25,12 @@ from statistics import median
 import yaml
 
 import acceptance
-from acceptance import ROOT
+from acceptance import FIGURES, ROOT, read_figures
 
 BUILD = ROOT / "out/build/host-release"
 PMSIM = BUILD / "tools/pmsim/pmsim"
 SCENARIOS = ROOT / "tests/scenario"
 RECORD = "docs/results/scenarios.json"
-FIGURES = "docs/results/tests.json"
 PAGE = "docs/results.md"
 README = "README.md"
 PERFORMANCE = "docs/performance.md"
@@ -109,11 +108,6 @@ def write_record(record):
 
 def read_record():
     path = ROOT / RECORD
-    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
-
-
-def read_figures():
-    path = ROOT / FIGURES
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
 
 

@@ -31,6 +31,7 @@ WHOLE = {
     "tests/scenario/spm.yaml": SCENARIO,
     "tests/unit/observers/active_test.cpp": 'TEST(Active, IsRight) { measured("active_error", 1, 2, "deg", "2.2.2"); }',
     "tests/acceptance.yaml": ASKED,
+    "docs/results/tests.json": '{"active_error": [1, 2]}',
     "docs/methods_notes.md": "# Notes\n\n## Why three\n",
 }
 
@@ -124,6 +125,8 @@ class BookMap(unittest.TestCase):
                 ("equals: NONE", "equals: STALL", "the bound of fault is looser than asked"),
                 ("scenario: spm}", "scenario: none}", "tests/scenario/none.yaml is missing"),
                 ("measured: active_", "measured: passive_", "observers/active measures no passive_"),
+                ("measured: active_, max: 2", "measured: active_, max: 1", "the bound of active_ is looser than asked"),
+                ("max: 2, scenario: spm,", "max: 2, scenario: spm, window_s: [1, 2],", "expects no angle_error_max_deg for 2.2.1"),
                 ("Active.IsRight", "Active.IsWrong", "observers/active has no test Active.IsWrong"),
                 ("asks: largest, metric", "asked: largest, metric", "unknown asked"),
                 ("13:\n", "14:\n", "row 14 is not implemented"),
