@@ -183,7 +183,7 @@ class Values(Bench):
 
     def test_nobody_there(self):
         _, err = self.command("get", "R_s", code=1, node=SILENT)
-        self.assertIn(f"node {SILENT} does not answer to R_s (2100h:02)", err)
+        self.assertIn(f"node {SILENT} does not answer to identity.product_code (1018h:02)", err)
         self.assertIn("pmdrive scan", err)
 
     def test_errors_as_json(self):

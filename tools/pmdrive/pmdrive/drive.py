@@ -225,11 +225,11 @@ class Drive:
         return {name: self.read(name) for name in wanted}
 
     def foreign(self):
-        """Why the node's dictionary may be another than this tool's; "" if it is the same, or nobody answers."""
+        """Why the node's dictionary may be another than this tool's; "" if it is the same."""
         try:
             product, revision = self.read("identity.product_code"), self.read("identity.revision")
-        except (NoAnswer, Refused):
-            return ""
+        except Refused:
+            return f"node {self.node_id} does not say what it is"
         if product != dictionary.PRODUCT_CODE:
             return f"node {self.node_id} is no pmdrive: its product code is {product:08X}h"
         if revision != dictionary.REVISION:
