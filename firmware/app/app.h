@@ -62,6 +62,7 @@ struct app {
     volatile bool slow_busy; /* from its pending to its end */
 
     volatile bool stalled;         /* the monitor has found that control has ceased */
+    volatile bool storing;         /* flash is written: neither control nor this is on time */
     uint32_t seen_periods;         /* by the monitor */
     volatile uint32_t turn_age_ms; /* since the main loop's last round */
 

@@ -43,7 +43,7 @@ void app_slow(app_t *app)
 void app_monitor(app_t *app)
 {
     const uint32_t periods = app->drive.period;
-    const bool alive = periods != app->seen_periods || !app->hardware;
+    const bool alive = periods != app->seen_periods || !app->hardware || app->storing;
     app->seen_periods = periods;
     if (!alive && !app->stalled) {
         hal_bridge_off(app->hal);

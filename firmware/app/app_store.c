@@ -221,21 +221,22 @@ bool app_save(hal_t *hal, const drive_params_t *params)
     return write_page(hal, &selection);
 }
 
-/* While flash is written it cannot be read: control comes late, and what is left of its period is too short
- * for the slow interrupt. The bridge is off meanwhile. */
-static void rest_slow(app_t *app, bool rest)
+/* While flash is written it cannot be read: control comes late, even later than the monitor, and what is left
+ * of its period is too short for the slow interrupt. The bridge is off meanwhile. */
+static void set_storing(app_t *app, bool storing)
 {
     hal_lock(app->hal);
+    app->storing = storing;
     /* a period that has passed comes again in days */
-    app->slow_at = rest ? app->drive.period - 1U : app->drive.period + app->slow_divider;
+    app->slow_at = storing ? app->drive.period - 1U : app->drive.period + app->slow_divider;
     hal_unlock(app->hal);
 }
 
 bool app_store_group(app_t *app, uint32_t group, bool keep)
 {
     selection_t selection = {.app = app, .params = &app->params, .group = group, .keep = keep};
-    rest_slow(app, true);
+    set_storing(app, true);
     const bool done = write_page(app->hal, &selection);
-    rest_slow(app, false);
+    set_storing(app, false);
     return done;
 }

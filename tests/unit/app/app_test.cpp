@@ -370,6 +370,24 @@ TEST(App, SlowRestsWhileFlashIsWritten)
     EXPECT_LE(x.loop.app.slow_at - x.loop.app.drive.period, x.loop.app.slow_divider);
 }
 
+// The monitor is no later than before when the erase begins, and comes first when it ends.
+TEST(App, ControlThatWaitsForFlashHasNotCeased)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_ms(10);
+    x.loop.hal.while_storing = app_monitor;
+    app_monitor(&x.loop.app);
+    EXPECT_EQ(x.sdo({0x23, 0x10, 0x10, 1, 's', 'a', 'v', 'e'}), 0U);
+    x.run_ms(2);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    app_monitor(&x.loop.app);
+    app_monitor(&x.loop.app); // from then on it must come again
+    app_turn(&x.loop.app);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_OVERRUN);
+}
+
 // The converters hang, so control does not come: the monitor opens the bridge and lets the dog bite.
 TEST(App, MonitorOpensTheBridgeWhenControlCeases)
 {
