@@ -160,7 +160,9 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     config->injection =
         params->start_method % 2 == 1 || (params->start_method == 0 && injection_sees_saliency(&m));
     config->start = (uint8_t)start_of(params, config->injection);
-    require(&m, sequence_needs((sequence_id_t)config->start), DRIVE_PARAM_start_method);
+    config->find =
+        params->position_pulses == 0 ? (uint8_t)PROCEDURE_initial_pulses : (uint8_t)PROCEDURE_four_pulses;
+    require(&m, sequence_needs((sequence_id_t)config->start, config->find), DRIVE_PARAM_start_method);
     make_modulator(&m, &config->modulator);
     make_regulator(&m, &config->regulator);
     if (config->injection && (regulator_traits(config->regulator.id) & REGULATOR_SWITCHES) != 0U) {
@@ -172,7 +174,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     make_field_weakening(&m, &config->field_weakening);
     make_position(&m, &config->position, config->injection);
     if (config->start != (uint8_t)SEQUENCE_align) {
-        make_initial_pulses(&m, &config->pulses);
+        make_pulses(&m, &config->pulses);
     }
     make_open_loop(&m, &config->open_loop);
     make_protection(&m, &config->protection);

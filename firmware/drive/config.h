@@ -14,7 +14,7 @@
 #include "firmware/drive/procedures/sequence.h"
 #include "firmware/math/num.h"
 #include "firmware/params/types.h"
-#include "injection/initial_pulses.h"
+#include "injection/pulses.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -53,13 +53,14 @@ typedef struct {
     mtpa_config_t mtpa;
     field_weakening_config_t field_weakening;
     position_config_t position;
-    initial_pulses_config_t pulses;
+    pulses_config_t pulses;
     open_loop_config_t open_loop;
     protection_config_t protection;
     pm_num_t pole_pairs;
     uint32_t slow_divider; /* periods per drive_slow(): the nearest to 1 ms */
     bool injection;        /* injection leads at low speed; else open-loop start */
-    uint8_t start;         /* SEQUENCE_...: how the initial position is found */
+    uint8_t start;         /* SEQUENCE_...: how the initial position is found ... */
+    uint8_t find;          /* PROCEDURE_...: ... and by which pulses */
     int32_t k_theta;       /* pm_omega_to_angle() */
     pm_q_t i_max;
     pm_q_t i_d_light;

@@ -32,7 +32,8 @@ PM_RARE static void begin_step(drive_t *drive)
     drive->stall_ms = 0;
     drive->lost_ms = 0;
     drive->sum_ms = 0;
-    procedure_begin(drive, (procedure_id_t)sequence_step((sequence_id_t)self->id, self->step)->procedure);
+    const sequence_step_t *step = sequence_step((sequence_id_t)self->id, self->step);
+    procedure_begin(drive, (procedure_id_t)sequence_procedure(step, drive->config.find));
 }
 
 static void begin_sequence(drive_t *drive)

@@ -10,6 +10,7 @@
 
 #define PM_WITHOUT_deadbeat 1
 #define PM_WITHOUT_finite_set 1
+#define PM_WITHOUT_four_pulses 1
 #define PM_WITHOUT_mismatch 1
 #define PM_WITHOUT_back_emf 1
 #define PM_WITHOUT_extended_emf 1

@@ -21,5 +21,6 @@ typedef enum {
 /* A margin: how far a result lies above its own noise, in standard deviations, Q8; 0: it has none. */
 typedef int32_t pm_sigma_t;
 #define PM_SIGMA_BITS 8
+#define PM_SIGMA_ONE  (1 << PM_SIGMA_BITS)
 
 #endif

@@ -8,6 +8,7 @@
 #include "firmware/control/speed_control.h"
 #include "firmware/drive/drive_parts.h"
 #include "firmware/math/estimate.h"
+#include "injection/four_pulses.h"
 #include "injection/initial_pulses.h"
 #include "injection/pulsating_square.h"
 #include "observers/observer.h"

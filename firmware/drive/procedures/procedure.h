@@ -30,6 +30,7 @@
 #include "firmware/drive/procedures/calibrate.h"
 #include "firmware/math/pll.h"
 #include "firmware/math/procedure.h"
+#include "injection/four_pulses.h"
 #include "injection/initial_pulses.h"
 
 #ifdef __cplusplus

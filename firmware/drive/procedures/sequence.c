@@ -11,9 +11,9 @@
 
 static const sequence_step_t steps[SEQUENCE_COUNT][SEQUENCE_STEPS] = {
     [SEQUENCE_align] = {CALIBRATE, {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
-    [SEQUENCE_pulses] = {CALIBRATE, {PROCEDURE_initial_pulses, SEQUENCE_RUN, FAULT_ALWAYS}},
+    [SEQUENCE_pulses] = {CALIBRATE, {SEQUENCE_FIND, SEQUENCE_RUN, FAULT_ALWAYS}},
     [SEQUENCE_pulses_align] = {CALIBRATE,
-                               {PROCEDURE_initial_pulses, SEQUENCE_RUN, 2, PM_FAILED_POLARITY},
+                               {SEQUENCE_FIND, SEQUENCE_RUN, 2, PM_FAILED_POLARITY},
                                {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
     [SEQUENCE_identify] = {CALIBRATE, {PROCEDURE_identify, SEQUENCE_WAIT, SEQUENCE_WAIT, SEQUENCE_ANY}},
 };
@@ -21,6 +21,11 @@ static const sequence_step_t steps[SEQUENCE_COUNT][SEQUENCE_STEPS] = {
 const sequence_step_t *sequence_step(sequence_id_t id, uint32_t step)
 {
     return &steps[id][step];
+}
+
+uint8_t sequence_procedure(const sequence_step_t *step, uint8_t find)
+{
+    return step->procedure == SEQUENCE_FIND ? find : step->procedure;
 }
 
 static uint32_t procedure_needs(uint8_t procedure)
@@ -34,11 +39,11 @@ static uint32_t procedure_needs(uint8_t procedure)
     return needed[procedure];
 }
 
-uint32_t sequence_needs(sequence_id_t id)
+uint32_t sequence_needs(sequence_id_t id, uint8_t find)
 {
     uint32_t needs = 0;
     for (uint32_t step = 0; step < SEQUENCE_STEPS; step++) {
-        needs |= procedure_needs(steps[id][step].procedure);
+        needs |= procedure_needs(sequence_procedure(&steps[id][step], find));
     }
     return needs;
 }

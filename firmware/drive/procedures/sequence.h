@@ -1,10 +1,10 @@
 /* What a start consists of: procedures one after the other, and where a refusal leads.
  *
  *   align          calibrate, align
- *   pulses         calibrate, initial_pulses
- *   pulses_align   calibrate, initial_pulses; align, if these found no polarity
+ *   pulses         calibrate, find
+ *   pulses_align   calibrate, find; align, if that found no polarity
  *   identify       calibrate, identify
- * The fall-back is for what alignment can replace: without saliency injection has nothing to go by, and
+ * find is the procedure of drive_config_t.find. The fall-back is for what alignment can replace: without saliency injection has nothing to go by, and
  * without a current nothing is connected; those are faults in all of them.
  * Tests: tests/unit/drive/sequence_test.cpp. */
 #ifndef DRIVE_PROCEDURES_SEQUENCE_H
@@ -36,18 +36,20 @@ enum {
     SEQUENCE_WAIT, /* bridge off, until enable is taken back */
 };
 
-#define SEQUENCE_ANY PM_PROCEDURE_COUNT
+#define SEQUENCE_ANY  PM_PROCEDURE_COUNT
+#define SEQUENCE_FIND 255
 
 typedef struct {
-    uint8_t procedure; /* PROCEDURE_... */
+    uint8_t procedure; /* PROCEDURE_... or SEQUENCE_FIND */
     uint8_t done;
     uint8_t refused; /* where it leads when it fails by ... */
     uint8_t reason;  /* ... this, PM_FAILED_... or SEQUENCE_ANY; by another: SEQUENCE_FAULT */
 } sequence_step_t;
 
 const sequence_step_t *sequence_step(sequence_id_t id, uint32_t step);
+uint8_t sequence_procedure(const sequence_step_t *step, uint8_t find); /* PROCEDURE_... */
 uint32_t sequence_next(const sequence_step_t *step, pm_procedure_t result);
-uint32_t sequence_needs(sequence_id_t id); /* NEEDS_...: of all its procedures */
+uint32_t sequence_needs(sequence_id_t id, uint8_t find); /* NEEDS_...: of all its procedures */
 
 /* The drive's place in it. */
 typedef struct {

@@ -217,7 +217,7 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
         {"pulse duty", c.pulses.duty, 28, exact / std::round(exact)},
         {"i_zero", c.pulses.i_zero, 28, 5 * 5e-3 / I},
         {"y_min", c.pulses.y_min, 28, 0.75 * (L_q - L_d) / L_q * 4 / I},
-        {"w_min", c.pulses.w_min, 28, 10 * 5e-3 / I},
+        {"i_noise", c.pulses.i_noise, 28, 5e-3 / I},
         {"open-loop i", c.open_loop.i, 28, 2 / I},
         {"open-loop slope", c.open_loop.slope, 28, 50 * P * slow / W},
         {"i_trip", c.protection.i_trip, 28, 9 / I},

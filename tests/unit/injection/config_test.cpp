@@ -152,7 +152,7 @@ TEST(InjectionConfig, PulseIsThatOfItsFlux)
     for (const double i_A : {2.0, 4.0, 6.0}) {
         drive_params_t p = with(INJECTION_pulsating_square);
         p.i_pulse = static_cast<int32_t>(std::lround(i_A * 1e3));
-        const initial_pulses_config_t c = configure(p).pulses;
+        const pulses_config_t c = configure(p).pulses;
         const double exact = p.L_d * 1e-9 * i_A / (2.0 / 3 * p.v_dc_nominal * 1e-3 / kF_pwm);
         const double whole = std::ceil(exact);
         EXPECT_EQ(c.periods, whole) << i_A;

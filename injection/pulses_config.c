@@ -1,8 +1,8 @@
 #include "firmware/params/maker.h"
-#include "injection/initial_pulses.h"
+#include "injection/pulses.h"
 
 /* Flux that gives i_pulse along the d-axis, by whole periods at a duty <= 1. */
-void make_initial_pulses(maker_t *m, initial_pulses_config_t *c)
+void make_pulses(maker_t *m, pulses_config_t *c)
 {
     const pm_num_t L_d = si(m, DRIVE_PARAM_L_d);
     const pm_num_t L_q = si(m, DRIVE_PARAM_L_q);
@@ -27,5 +27,5 @@ void make_initial_pulses(maker_t *m, initial_pulses_config_t *c)
     const pm_num_t share = pm_num_div(pm_num_sub(L_q, L_d), L_q);
     const pm_num_t i_pulse = pm_num_div(si(m, DRIVE_PARAM_i_pulse), m->base.i);
     c->y_min = fixed(m, mul3(share, i_pulse, pm_num_ratio(3, 4)), Q_BITS, DRIVE_PARAM_i_pulse);
-    c->w_min = fixed(m, pm_num_mul(pm_num(10), noise), Q_BITS, DRIVE_PARAM_i_noise);
+    c->i_noise = pm_max(fixed(m, noise, Q_BITS, DRIVE_PARAM_i_noise), 1);
 }

@@ -1,0 +1,92 @@
+#include "injection/four_pulses.h"
+
+#include "firmware/math/root.h"
+#include "firmware/math/trig.h"
+
+#define PULSES      4
+#define THIRD       PM_Q(0.11) /* r */
+#define CORRECTIONS 3
+
+void four_pulses_reset(four_pulses_t *self)
+{
+    *self = (four_pulses_t){0};
+}
+
+/* That whose two poles are nearest: within 30 degrees of the axis, or of its opposite. */
+static uint16_t nearest(pm_ab_t y)
+{
+    const pm_angle_t theta = pm_atan2(y.beta, y.alpha) / 2U; /* 0 ... 180 degrees */
+    const pm_angle_t sixth = theta + PM_TURN(1.0 / 12);
+    if (sixth < PM_TURN(1.0 / 6) || sixth >= PM_TURN(0.5)) {
+        return 0; /* 0 and 180 */
+    }
+    return sixth < PM_TURN(1.0 / 3) ? 2U : 1U; /* 60 is the opposite of 240, 120 */
+}
+
+pm_procedure_t four_pulses_step(four_pulses_t *self, const pulses_config_t *config, pm_abc_t i,
+                                pulses_out_t *out)
+{
+    const bool reverse = self->train.pulse == PULSES - 1U;
+    const uint32_t axis = reverse ? self->axis : self->train.pulse;
+    const pm_procedure_t result = pulses_step(&self->train, config, axis, reverse, i, out);
+    if (result != PM_DONE) {
+        return result;
+    }
+    if (!reverse) {
+        pulses_add(&self->train, axis, false);
+    }
+    if (self->train.pulse == PULSES - 1U) {
+        self->axis = nearest(pulses_saliency(&self->train));
+    }
+    return self->train.pulse < PULSES ? PM_RUNNING : PM_DONE;
+}
+
+/* Of the two angles whose double y has, that next to `theta`. */
+static pm_angle_t half_angle(pm_ab_t y, pm_angle_t theta)
+{
+    const pm_angle_t half = pm_atan2(y.beta, y.alpha) / 2U;
+    return half - theta + PM_TURN(0.25) < PM_TURN(0.5) ? half : half + PM_TURN(0.5);
+}
+
+/* cos x + r cos 3 x */
+static pm_q_t saturation(pm_angle_t x)
+{
+    return pm_unit(PM_ONE, pm_dir(x).cos) + pm_unit(THIRD, pm_dir(3U * x).cos);
+}
+
+static pm_angle_t correct(pm_ab_t y, pm_q_t D, pm_angle_t axis, pm_angle_t theta)
+{
+    pm_angle_t better = theta;
+    for (uint32_t n = 0; n < CORRECTIONS; n++) {
+        const pm_q_t bias = pm_div(pm_abs(D) / 2, pm_abs(saturation(better - axis))); /* 3 B */
+        const pm_ab_t turned = pm_park_inverse((pm_dq_t){.d = bias, .q = 0}, pm_dir(0U - better));
+        better = half_angle((pm_ab_t){.alpha = y.alpha - turned.alpha, .beta = y.beta - turned.beta}, better);
+    }
+    return better;
+}
+
+pm_procedure_t four_pulses_find(four_pulses_t *self, const pulses_config_t *config, pulses_found_t *found)
+{
+    const pm_procedure_t balanced = pulses_balance(&self->train);
+    if (balanced != PM_DONE) {
+        return balanced;
+    }
+    const pm_ab_t y = pulses_saliency(&self->train);
+    const pm_q_t length = pm_hypot(y.alpha, y.beta);
+    if (length < config->y_min / 2) {
+        return PM_FAILED_SALIENCY;
+    }
+    const pm_angle_t axis = pulses_axis[self->axis];
+    const pm_q_t reverse = pulses_leg(&self->train.i, self->axis);
+    const pm_q_t D =
+        self->train.e[self->axis][self->axis] + reverse - pm_mul(self->train.g[self->axis], reverse);
+    const pm_sigma_t polarity = pulses_margin(pm_abs(D), pm_mul(PM_Q(1.414), config->i_noise));
+    if (polarity < PULSES_SURE) {
+        return PM_FAILED_POLARITY;
+    }
+    pm_angle_t theta = pm_atan2(y.beta, y.alpha) / 2U;
+    theta += (D < 0) != (pm_dir(theta - axis).cos < 0) ? PM_TURN(0.5) : 0U;
+    found->theta = correct(y, D, axis, theta);
+    found->margin = pm_min(polarity, pulses_margin(length, pm_mul(PM_Q(2.12), config->i_noise)));
+    return PM_DONE;
+}

@@ -1,0 +1,131 @@
+#include "injection/pulses.h"
+
+#include "firmware/math/root.h"
+#include "firmware/math/trig.h"
+
+/* Periods with zero current before the next pulse: the current has ended and the converter shows it. */
+#define QUIET 3
+/* Of a quotient in Q28, a 64th of it, to PM_SIGMA_BITS. */
+#define PER_SIGMA 16384
+/* Each step leaves the ratio of saliency and mean of the inductances' inverses, 0.3 at most, of what is wrong. */
+#define ITERATIONS 4
+#define GAIN_MAX   PM_Q(0.125)
+
+const pm_angle_t pulses_axis[PULSES_AXES] = {0, 1431655765U, 2863311531U}; /* 0, 120, 240 degrees */
+
+static void apply(const pulses_config_t *config, uint32_t axis, bool reverse, pulses_out_t *out)
+{
+    for (uint32_t k = 0; k < PULSES_AXES; k++) {
+        out->duty[k] = ((k == axis) != reverse) ? config->duty : 0;
+    }
+    out->driven = true;
+}
+
+static bool is_zero(const pulses_config_t *config, pm_abc_t i)
+{
+    return pm_abs(i.a) < config->i_zero && pm_abs(i.b) < config->i_zero && pm_abs(i.c) < config->i_zero;
+}
+
+/* The output of a step acts over the next period, so a pulse commanded in n steps ends at step n + 1. */
+static pm_procedure_t drive_pulse(pulses_t *self, const pulses_config_t *config, uint32_t axis, bool reverse,
+                                  pm_abc_t i, pulses_out_t *out)
+{
+    if (self->timer <= config->periods) {
+        apply(config, axis, reverse, out);
+    } else if (self->timer > config->periods + 1U) {
+        if (is_zero(config, i)) {
+            return PM_FAILED_TIMEOUT; /* nothing connected */
+        }
+        self->i = i;
+        self->decaying = true;
+        self->timer = 0;
+        self->quiet = 0;
+    } else {
+        /* the last period is running */
+    }
+    return PM_RUNNING;
+}
+
+pm_procedure_t pulses_step(pulses_t *self, const pulses_config_t *config, uint32_t axis, bool reverse,
+                           pm_abc_t i, pulses_out_t *out)
+{
+    *out = (pulses_out_t){.driven = false};
+    self->timer++;
+    if (!self->decaying) {
+        return drive_pulse(self, config, axis, reverse, i, out);
+    }
+    self->quiet = is_zero(config, i) ? self->quiet + 1U : 0U;
+    if (self->quiet < QUIET) {
+        return self->timer > config->timeout ? PM_FAILED_TIMEOUT : PM_RUNNING;
+    }
+    self->decaying = false;
+    self->timer = 0;
+    self->pulse++;
+    return PM_DONE;
+}
+
+void pulses_add(pulses_t *self, uint32_t axis, bool reverse)
+{
+    for (uint32_t k = 0; k < PULSES_AXES; k++) {
+        const pm_q_t i = pulses_leg(&self->i, k);
+        self->e[axis][k] += reverse ? -i : i;
+    }
+}
+
+static bool are_gains(const pm_q_t g[PULSES_AXES])
+{
+    return pm_abs(g[0]) < GAIN_MAX && pm_abs(g[1]) < GAIN_MAX && pm_abs(g[2]) < GAIN_MAX;
+}
+
+/* False: these are no gains. */
+static bool improve(pulses_t *self)
+{
+    pm_q_t change[PULSES_AXES];
+    for (uint32_t x = 0; x < PULSES_AXES; x++) {
+        pm_q_t left = 0;
+        for (uint32_t k = 0; k < PULSES_AXES; k++) {
+            left += self->e[x][k] - pm_mul(self->g[k], self->e[x][k]);
+        }
+        change[x] = pm_div(left, self->e[x][x]) / 3 * 2;
+    }
+    const pm_q_t mean = (change[0] + change[1] + change[2]) / 3;
+    for (uint32_t k = 0; k < PULSES_AXES; k++) {
+        self->g[k] += change[k] - mean;
+    }
+    return are_gains(self->g);
+}
+
+pm_procedure_t pulses_balance(pulses_t *self)
+{
+    if (!improve(self) || !improve(self)) {
+        return PM_FAILED_UNEVEN;
+    }
+    self->iterations += 2U;
+    if (self->iterations < ITERATIONS) {
+        return PM_RUNNING;
+    }
+    for (uint32_t x = 0; x < PULSES_AXES; x++) {
+        for (uint32_t k = 0; k < PULSES_AXES; k++) {
+            self->e[x][k] -= pm_mul(self->g[k], self->e[x][k]);
+        }
+    }
+    return PM_DONE;
+}
+
+pm_ab_t pulses_saliency(const pulses_t *self)
+{
+    pm_ab_t y = {0, 0};
+    for (uint32_t x = 0; x < PULSES_AXES; x++) {
+        const pm_q_t *e = self->e[x];
+        const pm_ab_t i = pm_clarke((pm_abc_t){.a = e[0], .b = e[1], .c = e[2]});
+        const pm_ab_t turned = pm_park_inverse((pm_dq_t){.d = i.alpha, .q = i.beta}, pm_dir(pulses_axis[x]));
+        y.alpha += turned.alpha;
+        y.beta += turned.beta;
+    }
+    return y;
+}
+
+pm_sigma_t pulses_margin(pm_q_t length, pm_q_t noise)
+{
+    return pm_div(length / 64, noise) / PER_SIGMA;
+}

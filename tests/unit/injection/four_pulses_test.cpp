@@ -1,0 +1,126 @@
+#include "injection/four_pulses.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "injection/initial_pulses.h"
+#include "tests/unit/injection/pulse_rig.h"
+
+namespace
+{
+
+using namespace pulse_rig;
+
+const Method<four_pulses_t> kFour = {&four_pulses_step, &four_pulses_find};
+const Method<initial_pulses_t> kSix = {&initial_pulses_step, &initial_pulses_find};
+
+// METHODS-ADDENDUM.md B (b), row 101, with a 12-bit converter, noise, and gains of 1.01, 1 and 0.99.
+constexpr double kGain = 0.01;
+constexpr double kIpmMean_deg = 0.8, kIpmMost_deg = 2;
+constexpr double kSpmMean_deg = 3.5, kSpmMost_deg = 7;
+// The same, of the first three pulses uncorrected.
+constexpr double kIpmTwin_deg = 2.7, kTwinWithin_deg = 0.5;
+constexpr double kSpmTwin_deg = 3.5; // 5.3 together with what the gains do
+
+TEST(FourPulses, FindsIpm1000)
+{
+    expect_grid(kFour, ipm(kGain), kIpmMean_deg, kIpmMost_deg);
+}
+
+TEST(FourPulses, FindsSpm400)
+{
+    expect_grid(kFour, spm(kGain), kSpmMean_deg, kSpmMost_deg);
+}
+
+TEST(FourPulses, TakesTwoThirdsOfTheTimeOfSix)
+{
+    for (const Rig &r : {ipm(0), spm(0)}) {
+        EXPECT_LE(grid(kFour, r).periods,
+                  2.0 / 3 * grid(kSix, r).periods + 3); // the decay is not the same in all
+    }
+}
+
+// What the first three pulses say, with the right pole: the saturation of first order.
+TEST(FourPulses, TwinWithoutTheFourthErrs)
+{
+    const Method<four_pulses_t> twin = {
+        &four_pulses_step, [](four_pulses_t *self, const pulses_config_t *c, pulses_found_t *found) {
+            const pm_procedure_t result = four_pulses_find(self, c, found);
+            const pm_angle_t right = found->theta;
+            const pm_ab_t y = pulses_saliency(&self->train);
+            const double half = std::atan2(y.beta, y.alpha) / 2;
+            const double away = bench::wrapped(half - bench::rad(right));
+            found->theta = bench::turns(std::abs(away) < bench::kPi / 2 ? half : half + bench::kPi);
+            return result;
+        }};
+    const Grid ipm_grid = grid(twin, ipm(kGain));
+    EXPECT_NEAR(ipm_grid.mean_deg, kIpmTwin_deg, kTwinWithin_deg);
+    EXPECT_GE(grid(twin, spm(kGain)).mean_deg, kSpmTwin_deg);
+}
+
+// A+ B+ C+, and the opposite of that whose axis the magnet's is nearest to.
+TEST(FourPulses, TheFourthIsTheOppositeOfTheNearest)
+{
+    const Rig r = ideal(ipm(0));
+    const pulses_config_t c = config(r);
+    for (int k = 0; k < 24; ++k) {
+        const double theta = (k * 15 + 5) * kDegree;
+        std::vector<int> patterns;
+        static std::vector<int> *seen;
+        seen = &patterns;
+        const Method<four_pulses_t> watched = {
+            [](four_pulses_t *self, const pulses_config_t *config, pm_abc_t i, pulses_out_t *out) {
+                const pm_procedure_t result = four_pulses_step(self, config, i, out);
+                int pattern = 0;
+                for (int leg = 0; leg < 3; ++leg) {
+                    pattern |= (out->driven && out->duty[leg] != 0 ? 1 : 0) << leg;
+                }
+                if (pattern != 0 && (seen->empty() || seen->back() != pattern)) {
+                    seen->push_back(pattern);
+                }
+                return result;
+            },
+            &four_pulses_find};
+        ASSERT_EQ(find(watched, r, c, theta).state, PM_DONE);
+        int nearest = 0;
+        for (int x = 1; x < 3; ++x) {
+            const auto near = [theta](int axis) {
+                return std::abs(std::cos(theta - axis * 2 * bench::kPi / 3));
+            };
+            nearest = near(x) > near(nearest) ? x : nearest;
+        }
+        EXPECT_EQ(patterns, (std::vector<int>{1, 2, 4, 7 & ~(1 << nearest)})) << theta;
+    }
+}
+
+TEST(FourPulses, FailsWithoutSaliency)
+{
+    Rig r = ipm(kGain);
+    r.plant.machine.L_q0_H = r.plant.machine.L_d0_H = 50e-3;
+    r.plant.machine.c_A_Wb5 = 0;
+    for (const double theta : {0.0, 0.8, 2.0}) {
+        EXPECT_EQ(find(kFour, r, config(r), theta).state, PM_FAILED_SALIENCY) << theta;
+    }
+}
+
+TEST(FourPulses, FailsWithoutPolarity)
+{
+    Rig r = ipm(kGain);
+    r.plant.machine = {6.0, 43e-3, 75e-3, 0.0, 0.236, 3}; // salient, not saturating
+    for (const double theta : {0.0, 0.8, 2.0}) {
+        EXPECT_EQ(find(kFour, r, config(r), theta).state, PM_FAILED_POLARITY) << theta;
+    }
+}
+
+TEST(FourPulses, RefusesExchangedSensors)
+{
+    const Method<four_pulses_t> wrong = {
+        [](four_pulses_t *self, const pulses_config_t *c, pm_abc_t i, pulses_out_t *out) {
+            return four_pulses_step(self, c, {i.b, i.a, i.c}, out);
+        },
+        &four_pulses_find};
+    EXPECT_EQ(find(wrong, ipm(0), config(ipm(0)), 0.5).state, PM_FAILED_UNEVEN);
+}
+
+} // namespace
