@@ -2,13 +2,18 @@
 
 #include "firmware/math/kalman.h"
 
+/* Most of a period's error is what the compensation of dead time leaves, of which more periods have more. */
+#define TOLD_FOR_HZ 10000
+
 ekf_noise_t ekf_noise(const maker_t *m)
 {
     const pm_num_t root = pm_num_sqrt(m->base.t_s);
+    const pm_num_t voltage =
+        pm_num_mul(si(m, DRIVE_PARAM_v_dc_nominal), si(m, DRIVE_PARAM_ekf_voltage_noise));
     const pm_num_t acceleration = pm_num_mul(si(m, DRIVE_PARAM_acceleration), pole_pairs(m));
     return (ekf_noise_t){
         .current = si(m, DRIVE_PARAM_i_noise),
-        .voltage = pm_num_mul(si(m, DRIVE_PARAM_v_dc_nominal), si(m, DRIVE_PARAM_ekf_voltage_noise)),
+        .voltage = pm_num_mul(voltage, pm_num_mul(si(m, DRIVE_PARAM_f_pwm), pm_num_ratio(1, TOLD_FOR_HZ))),
         .speed = mul3(acceleration, si(m, DRIVE_PARAM_ekf_speed_noise), root),
         .angle = pm_num_mul(si(m, DRIVE_PARAM_ekf_angle_noise), root),
         .u = mul3(si(m, DRIVE_PARAM_psi_m), m->base.omega, m->base.t_s),
