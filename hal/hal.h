@@ -53,7 +53,7 @@ typedef enum {
     HAL_DEAD_TIME,
     HAL_BREAK_LEVEL,
     HAL_CAN_BIT_RATE,
-    HAL_CLOCK, /* the oscillator has not started: the port runs on, but the bridge cannot be armed */
+    HAL_CLOCK, /* oscillator or PLL has not started: the port runs on, but the bridge cannot be armed */
 } hal_status_t;
 
 /* Why the last run ended, preserved over the reset by the fault handlers. */

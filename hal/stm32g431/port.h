@@ -31,6 +31,7 @@ typedef struct {
 struct hal {
     app_t *app;
     bool up, crystal;
+    bool slow;       /* the PLL has failed: the clock after reset, too slow for the bus */
     uint32_t legs;   /* CCER of the coming period */
     uint32_t bridge; /* BDTR with everything but the main output enable */
     bool refused;    /* the bridge cannot be armed */
