@@ -111,7 +111,8 @@ bool hal_bridge_armed(const hal_t *hal); /* any: as the hardware has it, so fals
 
 /* --- measure.c ----------------------------------------------------------------------------------------- */
 
-/* any: what it measures and does beside the common, NEEDS_... of measure.h; the same from reset on. A member
+/* any: what it measures and does beside the common, NEEDS_... of measure.h, and PM_BOOTSTRAP where the upper
+ * switches must be charged before the first pulse; the same from reset on. A member
  * of drive_in_t.more that belongs to no declared channel is zero, one of drive_out_t.instants is ignored. */
 uint32_t hal_channels(const hal_t *hal);
 

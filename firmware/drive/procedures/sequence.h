@@ -1,9 +1,10 @@
 /* What a start consists of: procedures one after the other, and where a refusal leads.
  *
- *   align          calibrate, align
- *   pulses         calibrate, initial_pulses
- *   pulses_align   calibrate, initial_pulses; align, if these found no polarity
- *   identify       calibrate, identify
+ *   align          calibrate, charge, align
+ *   pulses         calibrate, charge, initial_pulses
+ *   pulses_align   calibrate, charge, initial_pulses; align, if these found no polarity
+ *   identify       calibrate, charge, identify
+ * On boards without PM_BOOTSTRAP charge is passed over, without a period of its own.
  * The fall-back is for what alignment can replace: without saliency injection has nothing to go by, and
  * without a current nothing is connected; those are faults in all of them.
  * Tests: tests/unit/drive/sequence_test.cpp. */
@@ -27,7 +28,7 @@ typedef enum {
     SEQUENCE_COUNT,
 } sequence_id_t;
 
-#define SEQUENCE_STEPS 3
+#define SEQUENCE_STEPS 4
 
 /* Where a step leads: the number of another, or one of these. */
 enum {
