@@ -53,7 +53,7 @@ typedef enum {
     HAL_DEAD_TIME,
     HAL_BREAK_LEVEL,
     HAL_CAN_BIT_RATE,
-    HAL_CLOCK, /* the oscillator has not started: the port runs on, but the bridge cannot be armed */
+    HAL_CLOCK, /* oscillator or PLL has not started: the port runs on, but the bridge cannot be armed */
 } hal_status_t;
 
 /* Why the last run ended, preserved over the reset by the fault handlers. */
@@ -111,7 +111,8 @@ bool hal_bridge_armed(const hal_t *hal); /* any: as the hardware has it, so fals
 
 /* --- measure.c ----------------------------------------------------------------------------------------- */
 
-/* any: what it measures and does beside the common, NEEDS_... of measure.h; the same from reset on. A member
+/* any: what it measures and does beside the common, NEEDS_... of measure.h, and PM_BOOTSTRAP where the upper
+ * switches must be charged before the first pulse; the same from reset on. A member
  * of drive_in_t.more that belongs to no declared channel is zero, one of drive_out_t.instants is ignored. */
 uint32_t hal_channels(const hal_t *hal);
 

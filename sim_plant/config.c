@@ -153,6 +153,12 @@ static const char *inverter_fault(const plant_inverter_t *v)
             "inverter.turn_on_s with the dead time must be less than half a PWM period")
     REQUIRE(v->turn_off_s <= v->dead_time_s + v->turn_on_s,
             "inverter.turn_off_s beyond dead time and turn_on_s shorts the link at every edge")
+    REQUIRE(not_negative(v->bootstrap_charge_s),
+            "inverter.bootstrap_charge_s must be finite and not negative")
+    REQUIRE(
+        v->bootstrap_charge_s == 0.0 ||
+            (positive(v->bootstrap_hold_s) && positive(v->bootstrap_lockout) && v->bootstrap_lockout < 1.0),
+        "inverter.bootstrap_charge_s needs bootstrap_hold_s above zero and bootstrap_lockout between 0 and 1")
     REQUIRE(not_negative(v->c_leg_F), "inverter.c_leg_F must be finite and not negative")
     return NULL;
 }

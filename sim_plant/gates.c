@@ -10,9 +10,14 @@ void gates_init(gates_t *gates, const plant_inverter_t *inverter, int legs)
         .turn_on_s = inverter->turn_on_s,
         .turn_off_s = inverter->turn_off_s,
         .coincident_s = 1e-9 / inverter->f_pwm_Hz,
+        .charge_s = inverter->bootstrap_charge_s,
+        .lockout = inverter->bootstrap_lockout,
         .timer_counts = inverter->timer_counts,
         .legs = legs,
     };
+    if (gates->charge_s > 0.0) {
+        gates->fall_1_s = (1.0 - inverter->bootstrap_lockout) / inverter->bootstrap_hold_s;
+    }
 }
 
 static double duty(const gates_t *gates, uint32_t compare)
@@ -30,6 +35,7 @@ void gates_load(gates_t *gates, const plant_pwm_t *pwm)
         gates->leg[k].on_s -= gates->period_s;
         gates->leg[k].off_s -= gates->period_s;
         gates->leg[k].clear_s -= gates->period_s;
+        gates->leg[k].charge_at_s -= gates->period_s;
     }
     gates_drive(gates, pwm->driven, pwm->state, pwm->driven_after_s);
 }
@@ -99,6 +105,37 @@ static double closing_at_s(gates_t *gates, int k, gate_t command, double t_s)
     return gates->leg[k].opening ? fmax(on_s, gates->leg[k].off_s) : on_s;
 }
 
+/* Of the bootstrap capacitor at time t; the gate has not changed since charge_at_s. */
+static double charge_at(const gates_t *gates, int k, double t_s)
+{
+    double passed_s = t_s - gates->leg[k].charge_at_s;
+    double charge = gates->leg[k].charge;
+    if (gates->leg[k].gate == GATE_LOW) {
+        return 1.0 - (1.0 - charge) * exp(-passed_s / gates->charge_s);
+    }
+    return fmax(charge - gates->fall_1_s * passed_s, 0.0);
+}
+
+/* When the driver opens the upper switch that conducts. */
+static double lockout_s(const gates_t *gates, int k)
+{
+    if (gates->charge_s <= 0.0 || gates->leg[k].gate != GATE_HIGH) {
+        return HUGE_VAL;
+    }
+    return gates->leg[k].charge_at_s + (gates->leg[k].charge - gates->lockout) / gates->fall_1_s;
+}
+
+/* The commanded switch closes, if its driver lets it. */
+static void close_switch(gates_t *gates, int k)
+{
+    bool locked = gates->charge_s > 0.0 && gates->leg[k].charge <= gates->lockout;
+    if (gates->leg[k].command == GATE_HIGH && locked) {
+        gates->leg[k].on_s = HUGE_VAL;
+    } else {
+        gates->leg[k].gate = gates->leg[k].command;
+    }
+}
+
 /* The next instant after that one at which something happens to a leg. */
 static double leg_next_s(const gates_t *gates, int k, double after_s)
 {
@@ -122,13 +159,22 @@ static double leg_next_s(const gates_t *gates, int k, double after_s)
     if (gates->leg[k].gate != gates->leg[k].command && gates->leg[k].on_s < next_s) {
         next_s = gates->leg[k].on_s;
     }
-    return next_s;
+    return fmin(lockout_s(gates, k), next_s);
 }
 
 static bool update_leg(gates_t *gates, int k, double t_s)
 {
     double late_s = t_s + gates->coincident_s;
     gate_t before = gates->leg[k].gate;
+    bool locked = late_s >= lockout_s(gates, k);
+    if (gates->charge_s > 0.0) {
+        gates->leg[k].charge = charge_at(gates, k, t_s);
+        gates->leg[k].charge_at_s = t_s;
+    }
+    if (locked) {
+        gates->leg[k].gate = GATE_OFF;
+        gates->leg[k].on_s = HUGE_VAL;
+    }
     if (late_s >= gates->drive_s) {
         gates->leg[k].driven = gates->leg[k].to_drive;
         gates->leg[k].state = gates->leg[k].to_state;
@@ -148,7 +194,7 @@ static bool update_leg(gates_t *gates, int k, double t_s)
         gates->leg[k].gate = GATE_OFF;
     }
     if (!gates->leg[k].opening && gates->leg[k].gate != command && late_s >= gates->leg[k].on_s) {
-        gates->leg[k].gate = command;
+        close_switch(gates, k);
     }
     gates->leg[k].next_s = leg_next_s(gates, k, late_s);
     return gates->leg[k].gate != before;

@@ -13,6 +13,11 @@
  * turn_on_s after its edge, as the other one is off; where the leg's other switch was the last one on, its
  * first closing waits for the dead time too.
  *
+ * With bootstrap_charge_s each upper switch lives on a capacitor, empty at first, whose charge q
+ *   rises by   dq/dt = (1 - q) / bootstrap_charge_s                    while the lower switch conducts
+ *   falls by   dq/dt = -(1 - bootstrap_lockout) / bootstrap_hold_s     else
+ * At or below bootstrap_lockout the driver keeps the upper switch open, or opens it, until the next command.
+ *
  * A faulty switch keeps its state whatever its gate. Edges closer than 1e-9 T are one event. Times are
  * relative to the start of the period. Tests: gates_test.cpp. */
 #ifndef PLANT_GATES_H
@@ -29,6 +34,7 @@ typedef struct {
     double turn_on_s;
     double turn_off_s;
     double coincident_s;
+    double charge_s, fall_1_s, lockout; /* of the bootstrap capacitors; charge_s 0: none */
     uint32_t timer_counts;
     int legs;
     double edge_s;  /* the last change of any gate */
@@ -45,8 +51,9 @@ typedef struct {
         gate_t gate;           /* of healthy switches */
         bool opening;          /* the conducting switch opens at off_s */
         double off_s;
-        double on_s;   /* the commanded one closes, when gate != command */
-        double next_s; /* nothing happens to the leg before */
+        double on_s;                /* the commanded one closes, when gate != command */
+        double charge, charge_at_s; /* of the upper switch's capacitor, and when */
+        double next_s;              /* nothing happens to the leg before */
         plant_leg_fault_t fault;
     } leg[PLANT_LEGS];
 } gates_t;

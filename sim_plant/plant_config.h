@@ -81,7 +81,11 @@ typedef struct {
     double r_on_ohm;              /* in series with both */
     uint32_t timer_counts;        /* carrier counts in half a period: resolution of an edge */
     double turn_on_s, turn_off_s; /* delay of a switch behind its gate signal (E6) */
-    double c_leg_F;               /* output capacitance of a leg (E7); 0: voltage steps at once */
+    double
+        bootstrap_charge_s; /* time constant at which the lower switches charge the upper ones' supply; 0: ideal */
+    double bootstrap_hold_s;  /* from full to the lock-out, without charging */
+    double bootstrap_lockout; /* share of the full voltage below which an upper switch stays open */
+    double c_leg_F;           /* output capacitance of a leg (E7); 0: voltage steps at once */
 } plant_inverter_t;
 
 typedef struct {

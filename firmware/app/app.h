@@ -12,7 +12,8 @@
  *
  * drive_slow() runs in app_slow() between two control interrupts and is never interrupted by one: if it is
  * still running when the next one comes, the fault is OVERRUN. A new parameter set is applied there too, as a
- * whole.
+ * whole, in a period of its own before drive_slow(). Each takes less than a period of 40 kHz, the highest
+ * carrier that the port stm32g431 accepts (target.board_IMAGE_modes_40kHz).
  *
  * Parameters are written to a shadow set, which is also what is read back. A write that the drive's
  * configuration refuses is undone (0604 0043h). Parameters that decide the meaning of the drive's state
@@ -55,6 +56,7 @@ struct app {
     drive_in_t in;
     drive_out_t out;
     hal_slow_t slow;
+    bool swapping; /* app_slow() has taken a parameter set the last time, and nothing else */
 
     hal_t *hal;
     uint32_t slow_divider;   /* periods per app_slow() */

@@ -27,9 +27,16 @@ void app_control(app_t *app)
     trace_sample(&app->trace);
 }
 
+/* A new parameter set has a period of its own: with it and drive_slow() in one, the carrier would be limited to
+ * 30 kHz. The next control interrupt pends this again, which then is drive_slow(), whatever is written meanwhile. */
 void app_slow(app_t *app)
 {
-    app_take_parameters(app);
+    app->swapping = app->next_ready && !app->swapping;
+    if (app->swapping) {
+        app_take_parameters(app);
+        app->slow_busy = false;
+        return;
+    }
     hal_measure_slow(app->hal, &app->slow);
     if (app->slow.temperature_missing) {
         drive_trip(&app->drive, DRIVE_FAULT_TEMPERATURE_SENSOR);

@@ -16,13 +16,11 @@ static bool needs_restart(const app_t *app)
 
 void app_take_parameters(app_t *app)
 {
-    if (app->next_ready) {
-        drive_reconfigure(&app->drive, &app->next);
-        app->next_ready = false;
-        app->slow_divider = app->drive.config.slow_divider;
-        if (app_ready(app) != APP_READY) {
-            drive_trip(&app->drive, DRIVE_FAULT_PARAMETERS);
-        }
+    drive_reconfigure(&app->drive, &app->next);
+    app->next_ready = false;
+    app->slow_divider = app->drive.config.slow_divider;
+    if (app_ready(app) != APP_READY) {
+        drive_trip(&app->drive, DRIVE_FAULT_PARAMETERS);
     }
 }
 

@@ -34,7 +34,7 @@ void app_identify_command(const app_t *app, drive_command_t *command); /* with w
 uint32_t app_put_parameter(app_t *app, drive_param_id_t id, int32_t value);
 uint32_t app_put_batch(app_t *app, bool open);
 uint32_t app_refused_object(const app_t *app);
-void app_take_parameters(app_t *app); /* slow */
+void app_take_parameters(app_t *app); /* slow, when next_ready is set */
 void app_give_parameters(app_t *app); /* the present set again: it may be good for something now */
 
 /* app_store.c */

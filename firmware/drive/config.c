@@ -162,6 +162,8 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     config->start = (uint8_t)start_of(params, config->injection);
     config->find =
         params->position_pulses == 0 ? (uint8_t)PROCEDURE_initial_pulses : (uint8_t)PROCEDURE_four_pulses;
+    config->charge_periods =
+        (channels & PM_BOOTSTRAP) != 0U ? (uint16_t)(m.slow_divider * (uint32_t)CHARGE_MS) : 0U;
     require(&m, sequence_needs((sequence_id_t)config->start, config->find), DRIVE_PARAM_start_method);
     make_modulator(&m, &config->modulator);
     make_regulator(&m, &config->regulator);

@@ -57,11 +57,12 @@ typedef struct {
     open_loop_config_t open_loop;
     protection_config_t protection;
     pm_num_t pole_pairs;
-    uint32_t slow_divider; /* periods per drive_slow(): the nearest to 1 ms */
-    bool injection;        /* injection leads at low speed; else open-loop start */
-    uint8_t start;         /* SEQUENCE_...: how the initial position is found ... */
-    uint8_t find;          /* PROCEDURE_...: ... and by which pulses */
-    int32_t k_theta;       /* pm_omega_to_angle() */
+    uint32_t slow_divider;   /* periods per drive_slow(): the nearest to 1 ms */
+    bool injection;          /* injection leads at low speed; else open-loop start */
+    uint8_t start;           /* SEQUENCE_...: how the initial position is found ... */
+    uint8_t find;            /* PROCEDURE_...: ... and by which pulses */
+    uint16_t charge_periods; /* of the upper switches' supply; 0: needs none */
+    int32_t k_theta;         /* pm_omega_to_angle() */
     pm_q_t i_max;
     pm_q_t i_d_light;
     pm_q_t omega_max;

@@ -53,6 +53,7 @@ bool protection_cause_present(const drive_t *drive); /* of the faults that show 
 void protection_current_limits(drive_t *drive, pm_q_t *i_min, pm_q_t *i_max);
 
 /* reference.c: at 1 kHz, from the command to current references. */
+void reference_units(drive_t *drive);  /* for a new configuration: what reference_take() multiplies with */
 void reference_take(drive_t *drive);   /* command to per-unit */
 void reference_vector(drive_t *drive); /* speed or torque -> i_ref */
 void reference_reset(drive_t *drive, pm_q_t i_q);

@@ -74,7 +74,12 @@ static void begin_running(drive_t *drive)
 static void advance(drive_t *drive, pm_procedure_t result)
 {
     sequence_t *self = &drive->sequence;
-    const uint32_t next = sequence_next(sequence_step((sequence_id_t)self->id, self->step), result);
+    const sequence_id_t id = (sequence_id_t)self->id;
+    uint32_t next = sequence_next(sequence_step(id, self->step), result);
+    if (next < SEQUENCE_STEPS && drive->config.charge_periods == 0U &&
+        sequence_step(id, next)->procedure == (uint8_t)PROCEDURE_charge) {
+        next = sequence_step(id, next)->done;
+    }
     if (result != PM_DONE) {
         drive->status.refusal = (drive_refusal_t){.procedure = self->procedure, .reason = (uint8_t)result};
     }

@@ -82,10 +82,11 @@ void protection_slow(drive_t *drive)
     if (lasts(&drive->lost_ms, judged && drive->position.quality == 0, c->lost_ms)) {
         drive_trip(drive, DRIVE_FAULT_POSITION_LOST);
     }
-    const bool stalled = turning && drive->state == DRIVE_RUNNING &&
-                         drive->command.mode == DRIVE_MODE_SPEED &&
-                         (drive->status.limits & DRIVE_LIMIT_CURRENT) != 0U &&
-                         pm_abs(omega) < c->omega_stall && pm_abs(drive->speed.reference) > c->omega_stall;
+    /* In torque control the limit is at work only if more torque is wanted than there is. */
+    const bool wanted =
+        drive->command.mode == DRIVE_MODE_TORQUE || pm_abs(drive->speed.reference) > c->omega_stall;
+    const bool stalled = turning && drive->state == DRIVE_RUNNING && wanted &&
+                         (drive->status.limits & DRIVE_LIMIT_CURRENT) != 0U && pm_abs(omega) < c->omega_stall;
     if (lasts(&drive->stall_ms, stalled, c->stall_ms)) {
         drive_trip(drive, DRIVE_FAULT_STALL);
     }

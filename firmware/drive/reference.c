@@ -2,23 +2,29 @@
 
 #include "firmware/math/root.h"
 
-/* A value in 10^exponent SI as a signal; what does not fit saturates, and the limits below clamp it with a
- * flag. */
-static pm_q_t to_signal(int32_t value, int exponent10, pm_num_t base)
+/* What does not fit saturates, and the limits below clamp it with a flag. */
+static pm_q_t to_signal(int32_t value, pm_num_t unit)
 {
     int32_t x;
-    (void)pm_num_to_fixed(pm_num_div(pm_num_dec(value, exponent10), base), PM_Q_BITS, &x);
+    (void)pm_num_to_fixed(pm_num_mul(pm_num(value), unit), PM_Q_BITS, &x);
     return pm_clamp(x, -PM_Q(4.0), PM_Q(4.0));
 }
 
 void reference_take(drive_t *drive)
 {
-    const drive_base_t *base = &drive->config.base;
     const drive_command_t *command = &drive->command;
+    drive->omega_target = to_signal(command->speed_mrad_s, drive->per_mrad_s);
+    drive->torque_target = to_signal(command->torque_uNm, drive->per_uNm);
+    drive->i_target = to_signal(command->current_mA, drive->per_mA);
+}
+
+void reference_units(drive_t *drive)
+{
+    const drive_base_t *base = &drive->config.base;
     const pm_num_t mechanical = pm_num_div(base->omega, drive->config.pole_pairs);
-    drive->omega_target = to_signal(command->speed_mrad_s, -3, mechanical);
-    drive->torque_target = to_signal(command->torque_uNm, -6, base->torque);
-    drive->i_target = to_signal(command->current_mA, -3, base->i);
+    drive->per_mrad_s = pm_num_div(pm_num_dec(1, -3), mechanical);
+    drive->per_uNm = pm_num_div(pm_num_dec(1, -6), base->torque);
+    drive->per_mA = pm_num_div(pm_num_dec(1, -3), base->i);
 }
 
 void reference_reset(drive_t *drive, pm_q_t i_q)

@@ -34,6 +34,10 @@
 #define NEEDS_ONE_SWITCH 0x0400U /* PWM on one switch of a leg, the other open */
 #define NEEDS_COMMUTATE  0x0800U /* the legs change at an instant within the period */
 
+/* Of the board, no need of a method: its upper switches live on capacitors that the lower ones charge. A start charges
+ * them before its first pulse (firmware/drive/procedures/charge.h). */
+#define PM_BOOTSTRAP 0x8000U
+
 /* X(name, needs, bit, what it is, what a board without it does not do) */
 #define PM_NEED_LIST(X, name, needs)                                                                         \
     X(name, needs, NEEDS_DC_CURRENT, "the DC-link current", "measure")                                       \

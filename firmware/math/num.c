@@ -25,22 +25,30 @@ static uint64_t magnitude(int32_t x)
     return (uint64_t)(x < 0 ? -(int64_t)x : (int64_t)x);
 }
 
-/* The upper half in one division, the lower half bit by bit; den <= 2^31, so that the doubled remainder
- * fits. */
+/* One digit of 16 bits: (rest 2^16 + next) / den, with rest < den and the top bit of den set. The upper half of
+ * den gives a digit that is at most two too large. */
+static uint32_t digit(uint32_t *rest, uint32_t next, uint32_t den)
+{
+    uint32_t q = *rest / (den >> 16);
+    int64_t left = (int64_t)((uint64_t)*rest << 16 | next) - (int64_t)((uint64_t)q * den);
+    while (left < 0) {
+        q--;
+        left += den;
+    }
+    *rest = (uint32_t)left;
+    return q;
+}
+
+/* The upper half in one division, the lower half by two digits; 0 < den <= 2^31. */
 static uint64_t quotient(uint64_t num, uint32_t den)
 {
     const uint32_t top = (uint32_t)(num >> 32);
-    uint32_t low = (uint32_t)num;
-    uint32_t rest = top % den;
-    for (int n = 0; n < 32; ++n) {
-        rest = (rest << 1) | (low >> 31);
-        low <<= 1;
-        if (rest >= den) {
-            rest -= den;
-            low |= 1U;
-        }
-    }
-    return ((uint64_t)(top / den) << 32) | low;
+    const int spare = __builtin_clz(den);
+    const uint64_t left = ((uint64_t)(top % den) << 32 | (uint32_t)num) << spare;
+    uint32_t rest = (uint32_t)(left >> 32);
+    const uint32_t high = digit(&rest, (uint32_t)(left >> 16) & 0xFFFFU, den << spare);
+    const uint32_t low = digit(&rest, (uint32_t)left & 0xFFFFU, den << spare);
+    return ((uint64_t)(top / den) << 32) + ((uint64_t)high << 16) + low;
 }
 
 int64_t pm_quotient(int64_t num, int32_t den)

@@ -3,7 +3,7 @@
  *   value = m 2^e,   |m| in [2^30, 2^31), or m = e = 0
  * Results are rounded to nearest: relative error of an operation <= 1.25 2^-31, with |e| <= 2^20 (far beyond
  * any quantity of a drive; not checked). Not for the control path: sums and products cost about 60
- * instructions, quotients 350, roots up to 600. Conversions report a result that does not fit instead of only
+ * instructions, quotients 120, roots up to 600. Conversions report a result that does not fit instead of only
  * clamping it.
  * Tests: tests/unit/math/num_test.cpp. */
 #ifndef PM_MATH_NUM_H
@@ -36,7 +36,7 @@ int pm_num_cmp(pm_num_t a, pm_num_t b); /* -1, 0, 1 */
 bool pm_num_to_fixed(pm_num_t a, int frac_bits, int32_t *out);
 pm_num_t pm_num_from_fixed(int32_t x, int frac_bits);
 
-/* num / den toward zero, as C does; den == 0 gives 0. 300 instructions; the compiler's own division, for
+/* num / den toward zero, as C does; den == 0 gives 0. 70 instructions; the compiler's own division, for
  * divisors of 64 bits, would take 800 bytes. */
 int64_t pm_quotient(int64_t num, int32_t den);
 

@@ -15,7 +15,8 @@ uint32_t hal_channels(const hal_t *hal)
                          NEEDS_ONE_SWITCH | NEEDS_COMMUTATE | (terminals ? NEEDS_TERMINALS : 0U) |
                          (neutral ? NEEDS_NEUTRAL : 0U) |
                          (sensor->i_dc_full_scale_A > 0.0 ? NEEDS_DC_CURRENT : 0U) |
-                         (sensor->capture_s > 0.0 ? NEEDS_CAPTURES : 0U);
+                         (sensor->capture_s > 0.0 ? NEEDS_CAPTURES : 0U) |
+                         (plant_inverter(hal->plant)->bootstrap_charge_s > 0.0 ? PM_BOOTSTRAP : 0U);
     return all & ~hal->without;
 }
 

@@ -10,6 +10,7 @@ enum {
     DEAD_TIME_LEAST_ns = 300,
     BREAK_FILTER = 12, /* of BKF: 8 samples at 1/16 of the clock, 0.75 us */
     BREAK_LEVEL_MOST = 0x7FFF,
+    DETECTOR_2_9_V = 6, /* of PLS: below it the converters' reference is wrong, too */
 };
 
 /* Both switches of a leg; the legs follow each other by four bits, as the states in drive_out_t. */
@@ -52,7 +53,8 @@ static void configure_timer(uint32_t counts)
     TIM1.AF1 = TIM_AF1_BKINE | TIM_AF1_BKCMP1E | TIM_AF1_BKCMP2E | TIM_AF1_BKCMP4E;
     TIM1.RCR = 0U;
     TIM1.EGR = TIM_EGR_UG;
-    SYSCFG.CFGR2 |= SYSCFG_CFGR2_CLL | SYSCFG_CFGR2_ECCL;
+    PWR.CR2 = PWR_CR2_PVDE | reg_field(PWR_CR2_PLS, DETECTOR_2_9_V);
+    SYSCFG.CFGR2 = SYSCFG_CFGR2_CLL | SYSCFG_CFGR2_SPL | SYSCFG_CFGR2_PVDL | SYSCFG_CFGR2_ECCL;
     DBGMCU.APB2FZR |= DBGMCU_APB2FZR_TIM1; /* a halted processor must not leave a voltage applied */
 }
 

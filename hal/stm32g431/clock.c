@@ -51,31 +51,37 @@ static void supply_clocks(void)
 }
 
 /* 340 MHz from an input of 4 MHz, halved. */
-static void start_pll(bool crystal)
+static bool start_pll(bool crystal)
 {
     RCC.PLLCFGR = reg_field(RCC_PLLCFGR_PLLSRC, crystal ? RCC_PLLSRC_HSE : RCC_PLLSRC_HSI) |
                   reg_field(RCC_PLLCFGR_PLLM, crystal ? 1U : 3U) | reg_field(RCC_PLLCFGR_PLLN, 85U) |
                   RCC_PLLCFGR_PLLREN;
     RCC.CR |= RCC_CR_PLLON;
-    (void)clock_await(&RCC.CR, RCC_CR_PLLRDY, RCC_CR_PLLRDY, READY_US);
+    return clock_await(&RCC.CR, RCC_CR_PLLRDY, RCC_CR_PLLRDY, READY_US);
 }
 
 /* Above 80 MHz through half the speed, for 1 us at least. */
-static void switch_to_pll(void)
+static bool switch_to_pll(void)
 {
     PWR.CR5 &= ~PWR_CR5_R1MODE;
     FLASH.ACR = (FLASH.ACR & ~FLASH_ACR_LATENCY) | reg_field(FLASH_ACR_LATENCY, WAIT_STATES) |
                 FLASH_ACR_PRFTEN | FLASH_ACR_ICEN | FLASH_ACR_DCEN;
-    (void)clock_await(&FLASH.ACR, FLASH_ACR_LATENCY, WAIT_STATES, READY_US);
+    if (!clock_await(&FLASH.ACR, FLASH_ACR_LATENCY, WAIT_STATES, READY_US)) {
+        return false;
+    }
     RCC.CFGR = reg_field(RCC_CFGR_HPRE, RCC_HPRE_DIV_2) | reg_field(RCC_CFGR_SW, RCC_SW_PLL);
-    (void)clock_await(&RCC.CFGR, RCC_CFGR_SWS, reg_field(RCC_CFGR_SWS, RCC_SW_PLL), READY_US);
+    if (!clock_await(&RCC.CFGR, RCC_CFGR_SWS, reg_field(RCC_CFGR_SWS, RCC_SW_PLL), READY_US)) {
+        RCC.CFGR = reg_field(RCC_CFGR_SW, RCC_SW_HSI);
+        return false;
+    }
     count_microseconds(PORT_CLOCK_HZ / 2000000U);
     clock_delay(2U);
     RCC.CFGR = reg_field(RCC_CFGR_SW, RCC_SW_PLL);
     count_microseconds(PORT_CLOCK_HZ / 1000000U);
+    return true;
 }
 
-bool clock_start(void)
+uint32_t clock_start(bool *from_crystal)
 {
     supply_clocks();
     count_microseconds(RESET_MHZ);
@@ -84,10 +90,12 @@ bool clock_start(void)
     if (!crystal) {
         RCC.CR &= ~RCC_CR_HSEON;
     }
-    start_pll(crystal);
-    switch_to_pll();
+    *from_crystal = crystal;
+    if (!start_pll(crystal) || !switch_to_pll()) {
+        return RESET_MHZ * 1000000U;
+    }
     if (crystal) {
         RCC.CR |= RCC_CR_CSSON;
     }
-    return crystal;
+    return PORT_CLOCK_HZ;
 }

@@ -4,9 +4,9 @@
 
 enum { BAUD = 115200 };
 
-void console_start(void)
+void console_start(uint32_t clock_Hz)
 {
-    USART2.BRR = (PORT_CLOCK_HZ + BAUD / 2U) / BAUD;
+    USART2.BRR = (clock_Hz + BAUD / 2U) / BAUD;
     USART2.CR1 = USART_CR1_UE | USART_CR1_TE;
     system_interrupt(IRQ_USART2, PORT_PRIO_IO);
 }

@@ -20,7 +20,9 @@ extern hal_t port_hal;                                                 /* the on
 extern uint32_t port_store[HAL_STORE_PAGES][HAL_STORE_PAGE_SIZE / 4U]; /* from the link script */
 
 /* --- clock.c */
-bool clock_start(void); /* false: the crystal does not start. Starts the microsecond counter. */
+/* The processor's clock in Hz: PORT_CLOCK_HZ, or that after reset, because the PLL does not lock or does not take
+ * over. Starts the microsecond counter. */
+uint32_t clock_start(bool *from_crystal);
 uint32_t clock_us(void);
 void clock_delay(uint32_t time_us);
 /* Waits until the bits have that value; false on time-out. */
@@ -42,7 +44,7 @@ void measure_start(void);
 void measure_run(void);
 hal_status_t can_start(const hal_config_t *config);
 void can_take_element(port_can_t *can, const fdcan_element_t *element); /* into the ring */
-void console_start(void);
+void console_start(uint32_t clock_Hz);
 
 /* --- exceptions: the vector table is in startup.c */
 void port_control(void);

@@ -70,7 +70,7 @@ void measure_run(void)
 uint32_t hal_channels(const hal_t *hal)
 {
     (void)hal;
-    return PORT_CHANNELS;
+    return PORT_CHANNELS | PM_BOOTSTRAP;
 }
 
 /* A code has 16 bits, which the compiler cannot know of a conversion. */

@@ -26,7 +26,7 @@ static const pin_t PINS[] = {
     {&GPIOB, 9, MODE_FUNCTION, 9, PULL_NONE, MEDIUM, true}, /* FDCAN1_TX */
     {&GPIOB, 3, MODE_FUNCTION, 7, PULL_NONE, SLOW, false},  /* USART2_TX */
     {&GPIOB, 5, MODE_OUTPUT, 0, PULL_NONE, SLOW,
-     false}, /* GPIO_BEMF: dividers of the terminal voltages off */
+     false}, /* GPIO_BEMF: low switches the dividers of the terminals on, which keeps their pins in range */
     {&GPIOC, 6, MODE_OUTPUT, 0, PULL_NONE, SLOW, false},  /* STATUS LED */
     {&GPIOC, 10, MODE_INPUT, 0, PULL_UP, SLOW, false},    /* BUTTON */
     {&GPIOC, 11, MODE_OUTPUT, 0, PULL_NONE, SLOW, false}, /* CAN_SHDN: transceiver on */

@@ -9,7 +9,7 @@
 #include "hal/hal.h"
 
 /* As wired and programmed today: three leg currents and the DC-link voltage, both halves of a period alike.
- * Dividers of the terminals are on the board (PA4, PC4, PB11, enabled by PB5), not yet in the sequence of the
+ * Dividers of the terminals are on the board (PA4, PC4, PB11, switched on by PB5 low), not yet in the sequence of the
  * converters. PWM on one switch and commutation by COM events are within TIM1 and not yet programmed. */
 #define PORT_CHANNELS NEEDS_HELD
 
@@ -31,6 +31,7 @@ typedef struct {
 struct hal {
     app_t *app;
     bool up, crystal;
+    bool slow;       /* the PLL has failed: the clock after reset, too slow for the bus */
     uint32_t legs;   /* CCER of the coming period */
     uint32_t bridge; /* BDTR with everything but the main output enable */
     bool refused;    /* the bridge cannot be armed */

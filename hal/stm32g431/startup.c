@@ -71,8 +71,9 @@ __attribute__((used)) void port_fault(const uint32_t *frame, uint32_t exception)
     port_bury(&words);
 }
 
-/* The crystal has stopped, or flash has a read error. With the bridge off the latter is a page of the store
- * whose writing was interrupted: no reason to stop, because the reader checks it. */
+/* The crystal has stopped, flash has a read error, or the memory one of parity, which neither of the two words shows.
+ * With the bridge off an error of flash is a page of the store whose writing was interrupted: no reason to stop,
+ * because the reader checks it. */
 void port_nmi(void)
 {
     const bool armed = (TIM1.BDTR & TIM_BDTR_MOE) != 0U;
@@ -165,6 +166,9 @@ __attribute__((noreturn)) void port_reset(void)
     copy(port_ccm_begin, port_ccm_end, port_ccm_load);
     copy(port_data, port_data_end, port_data_load);
     fill(port_bss, port_bss_end, 0U);
+    if ((RCC.CSR & RCC_CSR_BORRSTF) != 0U) {
+        port_grave.magic = 0U; /* never written, so its parity is wrong */
+    }
     set_vectors();
     protect_memory();
     (void)main();

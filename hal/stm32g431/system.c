@@ -45,11 +45,12 @@ static void start_once(hal_t *hal)
 {
     if (!hal->up) {
         hal->up = true;
-        hal->crystal = clock_start();
+        const uint32_t clock_Hz = clock_start(&hal->crystal);
+        hal->slow = clock_Hz != PORT_CLOCK_HZ;
         hal->reset = take_reset_cause();
         pins_start();
         measure_start();
-        console_start();
+        console_start(clock_Hz);
     }
 }
 
@@ -57,11 +58,11 @@ hal_status_t hal_init(hal_t *hal, const hal_config_t *config)
 {
     start_once(hal);
     hal_status_t status = bridge_start(hal, config);
-    const hal_status_t can = can_start(config);
-    if (status == HAL_OK) {
-        status = can;
+    if (!hal->slow) { /* else it would disturb the others */
+        const hal_status_t can = can_start(config);
+        status = status == HAL_OK ? can : status;
     }
-    if (!hal->crystal) {
+    if (!hal->crystal || hal->slow) {
         status = HAL_CLOCK;
     }
     hal->refused = status != HAL_OK;

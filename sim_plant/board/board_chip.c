@@ -62,6 +62,7 @@ void board_chip_init(board_chip_t *chip, cpu_t *cpu, plant_t *plant)
 {
     *chip = (board_chip_t){.cpu = cpu, .plant = plant};
     chip->wiring.temperature_degC = 25.0;
+    chip->wiring.supply_V = BOARD_SUPPLY_V;
     rcc_init(&chip->rcc, chip);
     flash_init(&chip->flash, chip, cpu_memory(cpu, FLASH_BASE, FLASH_SIZE));
     gpio_init(&chip->gpio, chip);

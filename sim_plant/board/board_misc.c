@@ -1,9 +1,10 @@
 #include "sim_plant/board/board_misc.h"
 
 enum { SYSCFG_CFGR2 = 0x1C, DBGMCU_APB1FZR1 = 0x08, DBGMCU_APB2FZR = 0x10 };
+enum { SPL = 0x2, PVDL = 0x4, SPF = 0x100 }; /* CLL and ECCL lock what cannot happen here */
 enum { FREEZE_IWDG = 0x1000, FREEZE_TIM1 = 0x800 };
 
-static const board_register_t syscfg_list[] = {{SYSCFG_CFGR2, "CFGR2", 0, 0x9u, 0}};
+static const board_register_t syscfg_list[] = {{SYSCFG_CFGR2, "CFGR2", 0, 0xFu, SPF}};
 static const board_register_t debug_list[] = {
     {DBGMCU_APB1FZR1, "APB1FZR1", 0, FREEZE_IWDG, 0},
     {DBGMCU_APB2FZR, "APB2FZR", 0, FREEZE_TIM1, 0},
@@ -29,6 +30,22 @@ bool board_misc_freezes_iwdg(const board_misc_t *misc)
 bool board_misc_freezes_tim1(const board_misc_t *misc)
 {
     return (misc->debug.value[DBGMCU_APB2FZR / 4] & FREEZE_TIM1) != 0u;
+}
+
+bool board_misc_locks_detector(const board_misc_t *misc)
+{
+    return (misc->syscfg.value[SYSCFG_CFGR2 / 4] & PVDL) != 0u;
+}
+
+bool board_misc_breaks(const board_misc_t *misc, bool supply_low)
+{
+    uint32_t set = misc->syscfg.value[SYSCFG_CFGR2 / 4];
+    return (supply_low && (set & PVDL) != 0u) || ((set & SPL) != 0u && (set & SPF) != 0u);
+}
+
+void board_misc_parity_error(board_misc_t *misc)
+{
+    *board_register(&misc->syscfg, SYSCFG_CFGR2) |= SPF;
 }
 
 static bool read_any(void *self, uint32_t offset, uint32_t *value)

@@ -116,6 +116,32 @@ void board_stop_oscillator(board_t *board, bool stopped)
     rcc_oscillator(&board_inside(board)->rcc, stopped);
 }
 
+void board_fail_pll(board_t *board, bool fails)
+{
+    board_inside(board)->wiring.pll_fails = fails;
+}
+
+void board_set_supply(board_t *board, double supply_V)
+{
+    board_inside(board)->wiring.supply_V = supply_V;
+    tim1_check_break(&board_inside(board)->tim1);
+}
+
+void board_check_parity(board_t *board, bool checked)
+{
+    board_inside(board)->wiring.parity = checked;
+}
+
+void board_flip_ram(board_t *board)
+{
+    board_chip_t *chip = board_inside(board);
+    if (chip->wiring.parity) {
+        board_misc_parity_error(&chip->misc);
+        tim1_check_break(&chip->tim1);
+        cpu_irq(chip->cpu, CPU_NMI, true);
+    }
+}
+
 void board_cut_flash(board_t *board, uint32_t after_words)
 {
     board_inside(board)->flash.cut_after = after_words;

@@ -21,8 +21,10 @@ typedef struct board_chip board_chip_t;
 typedef struct {
     uint64_t start; /* cycle of the plant's period */
     bool in_step;   /* with TIM1: its update events are the plant's period ends */
-    bool button, break_held, converter_stuck, oscillator_stopped;
+    bool button, break_held, converter_stuck, oscillator_stopped, pll_fails;
+    bool parity; /* option byte SRAM_PE: the memory's parity is checked */
     double temperature_degC, dial;
+    double supply_V;         /* of the processor */
     bool driven[PLANT_LEGS]; /* what the plant was told last */
 
 } board_wiring_t;

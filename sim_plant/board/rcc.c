@@ -25,7 +25,7 @@ enum {
     CCIPR = 0x88,
     CSR = 0x94
 };
-enum { PWR_CR1 = 0x00, PWR_CR5 = 0x80 };
+enum { PWR_CR1 = 0x00, PWR_CR2 = 0x04, PWR_CR5 = 0x80 };
 
 #define HSION  0x00000100u
 #define HSIRDY 0x00000400u
@@ -57,6 +57,7 @@ static const board_register_t list[] = {
 
 static const board_register_t power_list[] = {
     {PWR_CR1, "CR1", 0x00000200u, 0, 0},
+    {PWR_CR2, "CR2", 0, 0x0000000Fu, 0}, /* PVDE, PLS */
     {PWR_CR5, "CR5", 0x00000100u, 0x00000100u, 0},
 };
 
@@ -88,6 +89,14 @@ bool rcc_fdcan_on_pclk(const rcc_t *rcc)
 bool rcc_failed(const rcc_t *rcc)
 {
     return (rcc->regs.value[CIFR / 4] & CSSF) != 0u;
+}
+
+bool rcc_supply_low(const rcc_t *rcc)
+{
+    /* falling, DS12589 5.3.4, typical */
+    static const double threshold_V[] = {2.05, 2.20, 2.36, 2.52, 2.64, 2.81, 2.90, 0.0};
+    uint32_t cr2 = rcc->pwr.value[PWR_CR2 / 4];
+    return (cr2 & 1u) != 0u && rcc->chip->wiring.supply_V < threshold_V[board_field(cr2, 1, 3)];
 }
 
 static bool ready(const rcc_t *rcc, double ready_s)
@@ -233,7 +242,8 @@ static void write_cr(rcc_t *rcc, uint32_t before)
         if (!ready(rcc, hse ? rcc->hse_ready_s : rcc->hsi_ready_s)) {
             cpu_fail(rcc->chip->cpu, "RCC_CR: PLL on before its source is ready");
         }
-        rcc->pll_ready_s = pll_Hz(rcc) > 0.0 ? rcc_seconds(rcc) + PLL_LOCK_S : (double)INFINITY;
+        bool locks = pll_Hz(rcc) > 0.0 && !rcc->chip->wiring.pll_fails;
+        rcc->pll_ready_s = locks ? rcc_seconds(rcc) + PLL_LOCK_S : (double)INFINITY;
     }
     rcc->hsi_ready_s = off & HSION ? (double)INFINITY : rcc->hsi_ready_s;
     rcc->hse_ready_s = off & HSEON ? (double)INFINITY : rcc->hse_ready_s;
@@ -335,7 +345,18 @@ static bool power_read(void *self, uint32_t offset, uint32_t *value)
 static bool power_write(void *self, uint32_t offset, uint32_t value, uint32_t mask)
 {
     rcc_t *rcc = self;
-    return board_registers_write(&rcc->pwr, offset, value, mask);
+    uint32_t detector = rcc->pwr.value[PWR_CR2 / 4];
+    if (!board_registers_write(&rcc->pwr, offset, value, mask)) {
+        return false;
+    }
+    if (board_misc_locks_detector(&rcc->chip->misc)) {
+        *board_register(&rcc->pwr, PWR_CR2) = detector;
+    }
+    if (board_field(rcc->pwr.value[PWR_CR2 / 4], 1, 3) == 7u) {
+        cpu_fail(rcc->chip->cpu, "PWR_CR2: the input PVD_IN is not modelled");
+    }
+    tim1_check_break(&rcc->chip->tim1);
+    return true;
 }
 
 cpu_device_t rcc_device(rcc_t *rcc)

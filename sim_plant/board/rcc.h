@@ -41,7 +41,8 @@ double rcc_seconds(const rcc_t *rcc); /* since board_create() */
 uint64_t rcc_cycles(const rcc_t *rcc, double seconds);
 bool rcc_boost(const rcc_t *rcc);
 bool rcc_fdcan_on_pclk(const rcc_t *rcc);
-bool rcc_failed(const rcc_t *rcc); /* the clock security system has acted and is not acknowledged */
+bool rcc_failed(const rcc_t *rcc);     /* the clock security system has acted and is not acknowledged */
+bool rcc_supply_low(const rcc_t *rcc); /* by the voltage detector, if it is on */
 
 /* The crystal stops, or may start again. */
 void rcc_oscillator(rcc_t *rcc, bool stopped);

@@ -77,7 +77,9 @@ void tim1_check_break(tim1_t *tim)
     if (input_active(tim)) {
         stop(tim, TIM1_BIF);
     }
-    if (rcc_failed(&tim->chip->rcc) && (tim->regs.value[TIM1_BDTR / 4] & BKE) != 0u) {
+    const rcc_t *rcc = &tim->chip->rcc;
+    bool system = rcc_failed(rcc) || board_misc_breaks(&tim->chip->misc, rcc_supply_low(rcc));
+    if (system && (tim->regs.value[TIM1_BDTR / 4] & BKE) != 0u) {
         stop(tim, TIM1_SBIF);
     }
 }

@@ -83,6 +83,9 @@ const std::vector<Field> &setup_fields()
         PM_FIELD("inverter", "i_break_A", 0, 1e5, optional, i_break_A),
         PM_FIELD("inverter", "turn_on_s", 0, 20e-6, optional, plant.inverter.turn_on_s),
         PM_FIELD("inverter", "turn_off_s", 0, 20e-6, optional, plant.inverter.turn_off_s),
+        PM_FIELD("inverter", "bootstrap_charge_s", 0, 1, optional, plant.inverter.bootstrap_charge_s),
+        PM_FIELD("inverter", "bootstrap_hold_s", 0, 1e3, optional, plant.inverter.bootstrap_hold_s),
+        PM_FIELD("inverter", "bootstrap_lockout", 0, 1, optional, plant.inverter.bootstrap_lockout),
         PM_FIELD("inverter", "c_leg_F", 0, 1e-6, optional, plant.inverter.c_leg_F),
 
         PM_FIELD("sensor", "bits", 0, 16, optional, plant.sensor.bits),

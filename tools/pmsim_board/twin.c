@@ -17,6 +17,7 @@ typedef struct {
     drive_in_t in;
     drive_out_t out;
     hal_slow_t slow;
+    bool swapping;
 } memory_t;
 
 static const od_entry_t *entry_of(uint32_t id)
@@ -130,10 +131,10 @@ static size_t slow(void *before, const void *memory, bool event[FIGURE_EVENTS])
 {
     drive_t *drive = before;
     const memory_t *image = memory;
-    const drive_config_t *now = &image->drive.config;
-    if (!same(&drive->config, now, sizeof *now)) {
-        drive_reconfigure(drive, now);
+    if (image->swapping) {
+        drive_reconfigure(drive, &image->drive.config);
         event[FIGURE_SWAP] = true;
+        return difference(drive, &image->out, image);
     }
     const drive_slow_in_t in = {.temperature_dC = image->slow.temperature_dC};
     drive_slow(drive, &in);

@@ -28,6 +28,7 @@
 #include "firmware/drive/drive.h"
 #include "firmware/drive/procedures/align.h"
 #include "firmware/drive/procedures/calibrate.h"
+#include "firmware/drive/procedures/charge.h"
 #include "firmware/math/pll.h"
 #include "firmware/math/procedure.h"
 #include "injection/four_pulses.h"

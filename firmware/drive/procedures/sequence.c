@@ -8,14 +8,21 @@
     {                                                                                                        \
         PROCEDURE_calibrate, 1, FAULT_ALWAYS                                                                 \
     }
+#define CHARGE                                                                                               \
+    {                                                                                                        \
+        PROCEDURE_charge, 2, FAULT_ALWAYS                                                                    \
+    }
 
 static const sequence_step_t steps[SEQUENCE_COUNT][SEQUENCE_STEPS] = {
-    [SEQUENCE_align] = {CALIBRATE, {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
-    [SEQUENCE_pulses] = {CALIBRATE, {SEQUENCE_FIND, SEQUENCE_RUN, FAULT_ALWAYS}},
+    [SEQUENCE_align] = {CALIBRATE, CHARGE, {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
+    [SEQUENCE_pulses] = {CALIBRATE, CHARGE, {SEQUENCE_FIND, SEQUENCE_RUN, FAULT_ALWAYS}},
     [SEQUENCE_pulses_align] = {CALIBRATE,
-                               {SEQUENCE_FIND, SEQUENCE_RUN, 2, PM_FAILED_POLARITY},
+                               CHARGE,
+                               {SEQUENCE_FIND, SEQUENCE_RUN, 3, PM_FAILED_POLARITY},
                                {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
-    [SEQUENCE_identify] = {CALIBRATE, {PROCEDURE_identify, SEQUENCE_WAIT, SEQUENCE_WAIT, SEQUENCE_ANY}},
+    [SEQUENCE_identify] = {CALIBRATE,
+                           CHARGE,
+                           {PROCEDURE_identify, SEQUENCE_WAIT, SEQUENCE_WAIT, SEQUENCE_ANY}},
 };
 
 const sequence_step_t *sequence_step(sequence_id_t id, uint32_t step)

@@ -1,10 +1,12 @@
 /* What a start consists of: procedures one after the other, and where a refusal leads.
  *
- *   align          calibrate, align
- *   pulses         calibrate, find
- *   pulses_align   calibrate, find; align, if that found no polarity
- *   identify       calibrate, identify
- * find is the procedure of drive_config_t.find. The fall-back is for what alignment can replace: without saliency injection has nothing to go by, and
+ *   align          calibrate, charge, align
+ *   pulses         calibrate, charge, find
+ *   pulses_align   calibrate, charge, find; align, if that found no polarity
+ *   identify       calibrate, charge, identify
+ * find is the procedure of drive_config_t.find. On boards without PM_BOOTSTRAP charge is passed over, without a
+ * period of its own.
+ * The fall-back is for what alignment can replace: without saliency injection has nothing to go by, and
  * without a current nothing is connected; those are faults in all of them.
  * Tests: tests/unit/drive/sequence_test.cpp. */
 #ifndef DRIVE_PROCEDURES_SEQUENCE_H
@@ -27,7 +29,7 @@ typedef enum {
     SEQUENCE_COUNT,
 } sequence_id_t;
 
-#define SEQUENCE_STEPS 3
+#define SEQUENCE_STEPS 4
 
 /* Where a step leads: the number of another, or one of these. */
 enum {

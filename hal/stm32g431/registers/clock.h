@@ -62,14 +62,24 @@ typedef struct {
 #define RCC_CSR_WWDGRSTF      (1U << 30)
 
 /* values of PLLSRC, SW, HPRE and FDCANSEL */
-enum { RCC_PLLSRC_HSI = 2, RCC_PLLSRC_HSE = 3, RCC_SW_PLL = 3, RCC_HPRE_DIV_2 = 8, RCC_FDCANSEL_PCLK1 = 2 };
+enum {
+    RCC_PLLSRC_HSI = 2,
+    RCC_PLLSRC_HSE = 3,
+    RCC_SW_HSI = 1,
+    RCC_SW_PLL = 3,
+    RCC_HPRE_DIV_2 = 8,
+    RCC_FDCANSEL_PCLK1 = 2
+};
 
 typedef struct {
     reg_t CR1;
-    uint32_t reserved_4[31];
+    reg_t CR2;
+    uint32_t reserved_8[30];
     reg_t CR5;
 } pwr_t;
 
+#define PWR_CR2_PVDE   (1U << 0)
+#define PWR_CR2_PLS    (7U << 1)
 #define PWR_CR5_R1MODE (1U << 8) /* set: no boost */
 
 typedef struct {
@@ -130,7 +140,9 @@ typedef struct {
 } syscfg_t;
 
 #define SYSCFG_CFGR2_CLL  (1U << 0) /* lock-up of the processor breaks TIM1 */
-#define SYSCFG_CFGR2_ECCL (1U << 3) /* as does an uncorrectable flash error */
+#define SYSCFG_CFGR2_SPL  (1U << 1) /* as does an error of the memory's parity, */
+#define SYSCFG_CFGR2_PVDL (1U << 2) /* a low supply, whose detector cannot be changed any more, */
+#define SYSCFG_CFGR2_ECCL (1U << 3) /* and an uncorrectable flash error */
 
 typedef struct {
     reg_t IDCODE;

@@ -4,6 +4,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <map>
+
 namespace
 {
 
@@ -81,6 +83,35 @@ TEST(BoardBreak, OfAThousandAtAnyInstantNoneIsArmedAgainAndEachIsReported)
     EXPECT_THAT(seen, testing::ElementsAre(breaks, 0, 0, 0, 0, 0))
         << "stayed off, stayed on, armed again, other fault, not told, broken run";
     EXPECT_TRUE(b.bridge_on());
+}
+
+// From calibration over the pulses and a run to the end of the stop.
+TEST(BoardBreak, OfAThousandInAnyStateNoneIsArmedAgain)
+{
+    plant_config_t config = bench::plant_config();
+    config.mech.locked = false;
+    Bench b(config);
+    b.store(0, bench::params(), 1);
+    b.boot();
+    b.run_ms(5);
+    std::map<int, int> in_state;
+    std::vector<int> seen(BROKEN_RUN + 1);
+    for (int n = 0; n < breaks; n++) {
+        if (n % 200 == 0) {
+            b.command(n < 800, DRIVE_MODE_SPEED, 20000);
+        }
+        b.run_ms(n < 800 ? 0.5 : 0.2);
+        if (!tim1_main_output(&board_inside(b.board)->tim1)) {
+            continue;
+        }
+        in_state[b.watched()->drive.state]++;
+        const double share = static_cast<double>(n * spread % breaks) / breaks;
+        seen[tried(&b, share * board_period_s(b.board), width_s)]++;
+    }
+    EXPECT_THAT(seen, testing::ElementsAre(testing::Gt(breaks * 9 / 10), 0, 0, 0, 0, 0));
+    for (int state : {DRIVE_CALIBRATING, DRIVE_FINDING, DRIVE_RUNNING, DRIVE_STOPPING}) {
+        EXPECT_GT(in_state[state], 30) << state;
+    }
 }
 
 TEST(BoardBreak, ShorterThanTheFilterIsNone)

@@ -80,6 +80,27 @@ TEST(BoardFault, BreakInputOpensAndBarsArming)
     EXPECT_EQ(board_resets(b.board), 0u);
 }
 
+// Its supply sinks below what the converters' reference needs, above what resets the processor.
+TEST(BoardFault, ALowSupplyOfTheProcessorOpensTheBridgeAtOnceAndStaysAFault)
+{
+    Bench b;
+    b.running();
+    board_set_supply(b.board, 3.0);
+    b.run_ms(1);
+    EXPECT_TRUE(b.bridge_on());
+    board_set_supply(b.board, 2.7);
+    EXPECT_FALSE(b.bridge_on()); // without the processor
+    b.run_ms(5);
+    EXPECT_EQ(b.watched()->drive.fault, DRIVE_FAULT_HARDWARE);
+    b.command(false, DRIVE_MODE_CURRENT, 0, 0, true);
+    b.run_ms(5);
+    EXPECT_EQ(b.watched()->drive.fault, DRIVE_FAULT_HARDWARE); // the cause is still there
+    board_set_supply(b.board, 3.3);
+    b.run_ms(100);
+    EXPECT_FALSE(b.bridge_on());
+    EXPECT_EQ(board_resets(b.board), 0u);
+}
+
 TEST(BoardFault, BusOffIsAFaultAndTheBusRecovers)
 {
     Bench b;

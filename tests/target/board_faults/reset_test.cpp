@@ -84,6 +84,42 @@ TEST(BoardReset, ALostCrystalOpensTheBridgeAtOnceAndIsRefusedAfterwards)
     EXPECT_FALSE(b.bridge_on());
 }
 
+// Without the PLL the processor stays at 16 MHz: it says so, keeps off the bus and never arms.
+TEST(BoardReset, APllThatDoesNotLockIsRefused)
+{
+    Bench b;
+    b.store(0, bench::params(), 1);
+    board_fail_pll(b.board, true);
+    b.boot();
+    b.run_ms(100);
+    EXPECT_EQ(board_clock_Hz(b.board), 16000000u);
+    EXPECT_THAT(b.console(), HasSubstr("clock"));
+    b.command(true);
+    b.run_ms(300);
+    EXPECT_FALSE(b.bridge_on());
+    EXPECT_EQ(b.watched()->drive.fault, DRIVE_FAULT_PARAMETERS);
+    board_frame_t frame;
+    EXPECT_FALSE(board_can_receive(b.board, &frame));
+    EXPECT_EQ(board_resets(b.board), 0u);
+}
+
+TEST(BoardReset, AnErrorOfTheMemorysParityOpensTheBridgeAtOnce)
+{
+    for (bool checked : {false, true}) {
+        Bench b;
+        board_check_parity(b.board, checked);
+        b.running();
+        board_flip_ram(b.board);
+        EXPECT_EQ(b.bridge_on(), !checked);
+        b.run_ms(50);
+        EXPECT_EQ(board_resets(b.board), checked ? 1u : 0u);
+        if (checked) {
+            EXPECT_THAT(b.console(), HasSubstr("last run ended by exception 0x00000002"));
+            EXPECT_FALSE(b.bridge_on());
+        }
+    }
+}
+
 // push {r0-r7} without end: the guard below the stack, 32 bytes at the bottom of the memory, stops it.
 TEST(BoardReset, AnOverflowOfTheStackHitsTheGuard)
 {

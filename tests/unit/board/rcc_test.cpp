@@ -147,6 +147,36 @@ TEST(Rcc, ClockSecuritySwitchesToTheInternalClockAndSetsItsFlag)
     EXPECT_EQ(c.read(rig::tim1 + 0x10) & 0x2000u, 0u);
 }
 
+TEST(Rcc, ALowSupplyBreaksTheTimerOnceTheDetectorIsLocked)
+{
+    constexpr uint32_t cr2 = rig::pwr + 0x04, cfgr2 = 0x4001001C;
+    Chip c;
+    c.all();
+    c.write(cr2, 0xD); // 2.90 V
+    c.set(rig::tim1 + 0x44, 0x8000);
+    c.chip->wiring.supply_V = 2.85;
+    tim1_check_break(&c.chip->tim1);
+    EXPECT_TRUE(tim1_main_output(&c.chip->tim1)); // not connected
+    c.write(cfgr2, 0x4);
+    c.write(cr2, 0); // locked
+    EXPECT_EQ(c.read(cr2), 0xDu);
+    EXPECT_FALSE(tim1_main_output(&c.chip->tim1));
+    EXPECT_EQ(c.read(rig::tim1 + 0x10) & 0x2000u, 0x2000u);
+    c.chip->wiring.supply_V = 2.95;
+    c.write(rig::tim1 + 0x10, 0);
+    EXPECT_EQ(c.read(rig::tim1 + 0x10) & 0x2000u, 0u);
+}
+
+TEST(Rcc, APllThatDoesNotLock)
+{
+    Chip c;
+    c.chip->wiring.pll_fails = true;
+    c.write(pllcfgr, 0x01005532);
+    c.set(cr, pll_on);
+    c.run_s(1e-3);
+    EXPECT_EQ(c.read(cr) & pll_ready, 0u);
+}
+
 TEST(Rcc, ACrystalThatStopsWithoutSecurityEndsTheRun)
 {
     Chip c;

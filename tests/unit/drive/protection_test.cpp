@@ -403,7 +403,7 @@ TEST(Protection, StepNamesTheCause)
     }
 }
 
-// A stall is one of speed control with the current at its limit; each condition by itself.
+// A stall is one of a control that wants more than the current's limit gives; each condition by itself.
 TEST(Protection, WhatIsNoStall)
 {
     for (int missing = 0; missing < 5; ++missing) {
@@ -411,15 +411,37 @@ TEST(Protection, WhatIsNoStall)
         x.step();
         x.d.state = missing == 1 ? DRIVE_STOPPING : DRIVE_RUNNING;
         x.d.stage = missing == 2 ? STAGE_OPEN_LOOP : STAGE_VECTOR;
-        x.d.command.mode = missing == 3 ? DRIVE_MODE_TORQUE : DRIVE_MODE_SPEED;
+        x.d.command.mode = DRIVE_MODE_SPEED;
         x.d.i_abc = {0, 0, 0};
         x.d.status.limits = missing == 4 ? uint32_t(DRIVE_LIMIT_VOLTAGE) : uint32_t(DRIVE_LIMIT_CURRENT);
         x.d.position.quality = PM_ONE;
-        x.d.speed.reference = PM_Q(0.5);
+        x.d.speed.reference = missing == 3 ? 0 : PM_Q(0.5);
         for (int ms = 0; ms < 3000; ++ms) {
             protection_slow(&x.d);
         }
         EXPECT_EQ(x.d.fault, missing == 0 ? DRIVE_FAULT_STALL : DRIVE_FAULT_NONE) << missing;
+    }
+}
+
+// More torque than there is, and no speed: also a stall. Torque within the limit may hold a rotor for good.
+TEST(Protection, AStallInTorqueControl)
+{
+    for (const uint32_t limits : {0U, uint32_t(DRIVE_LIMIT_CURRENT)}) {
+        for (const int beyond : {0, 1}) {
+            Drive x;
+            x.step();
+            x.d.state = DRIVE_RUNNING;
+            x.d.stage = STAGE_VECTOR;
+            x.d.command.mode = DRIVE_MODE_TORQUE;
+            x.d.i_abc = {0, 0, 0};
+            x.d.status.limits = limits;
+            x.d.position.quality = PM_ONE;
+            x.d.pll.omega = x.d.config.protection.omega_stall - beyond;
+            for (int ms = 0; ms < 3000; ++ms) {
+                protection_slow(&x.d);
+            }
+            EXPECT_EQ(x.d.fault, limits != 0U && beyond != 0 ? DRIVE_FAULT_STALL : DRIVE_FAULT_NONE);
+        }
     }
 }
 

@@ -27,20 +27,22 @@ TEST(Sequence, LeadsWhereItSays)
         const auto sequence = static_cast<sequence_id_t>(id);
         EXPECT_EQ(sequence_step(sequence, 0)->procedure, PROCEDURE_calibrate);
         EXPECT_EQ(next(sequence, 0, PM_DONE), 1U);
+        EXPECT_EQ(sequence_step(sequence, 1)->procedure, PROCEDURE_charge);
+        EXPECT_EQ(next(sequence, 1, PM_DONE), 2U);
         for (int reason = PM_DONE + 1; reason < PM_PROCEDURE_COUNT; ++reason) {
             const auto result = static_cast<pm_procedure_t>(reason);
             EXPECT_EQ(next(sequence, 0, result), uint32_t(SEQUENCE_FAULT)) << id << ' ' << reason;
             const bool replaced = id == SEQUENCE_pulses_align && reason == PM_FAILED_POLARITY;
             const uint32_t expected = id == SEQUENCE_identify ? uint32_t(SEQUENCE_WAIT)
-                                                              : (replaced ? 2U : uint32_t(SEQUENCE_FAULT));
-            EXPECT_EQ(next(sequence, 1, result), expected) << id << ' ' << reason;
+                                                              : (replaced ? 3U : uint32_t(SEQUENCE_FAULT));
+            EXPECT_EQ(next(sequence, 2, result), expected) << id << ' ' << reason;
         }
-        EXPECT_EQ(next(sequence, 1, PM_DONE),
+        EXPECT_EQ(next(sequence, 2, PM_DONE),
                   uint32_t(id == SEQUENCE_identify ? SEQUENCE_WAIT : SEQUENCE_RUN));
     }
-    EXPECT_EQ(sequence_step(SEQUENCE_pulses_align, 2)->procedure, PROCEDURE_align);
-    EXPECT_EQ(next(SEQUENCE_pulses_align, 2, PM_DONE), uint32_t(SEQUENCE_RUN));
-    EXPECT_EQ(next(SEQUENCE_pulses_align, 2, PM_FAILED_POLARITY), uint32_t(SEQUENCE_FAULT));
+    EXPECT_EQ(sequence_step(SEQUENCE_pulses_align, 3)->procedure, PROCEDURE_align);
+    EXPECT_EQ(next(SEQUENCE_pulses_align, 3, PM_DONE), uint32_t(SEQUENCE_RUN));
+    EXPECT_EQ(next(SEQUENCE_pulses_align, 3, PM_FAILED_POLARITY), uint32_t(SEQUENCE_FAULT));
 }
 
 // Calibrated, with the pulses at work.

@@ -201,7 +201,11 @@ TEST(MathNum, QuotientIsThatOfC)
         nums.push_back(static_cast<int64_t>(random()) >> (k % 60));
     }
     for (const int64_t num : nums) {
-        for (const int32_t den : corners()) {
+        std::vector<int32_t> dens = corners();
+        for (int k = 0; k < 32; ++k) {
+            dens.push_back(static_cast<int32_t>(static_cast<uint32_t>(random()) >> k));
+        }
+        for (const int32_t den : dens) {
             if (den == 0) {
                 EXPECT_EQ(pm_quotient(num, den), 0);
             } else if (den != -1 || num != INT64_MIN) {

@@ -6,6 +6,7 @@ extern "C" {
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdint>
 #include <random>
 #include <vector>
@@ -78,6 +79,61 @@ class GatesWithoutDeadTime : public Gates
     {
     }
 };
+
+class GatesWithBootstrap : public Gates
+{
+  protected:
+    static constexpr double charge_s = 200e-6, hold_s = 1e-3, lockout = 0.7;
+
+    GatesWithBootstrap()
+    {
+        plant_inverter_t inverter{};
+        inverter.f_pwm_Hz = 1.0 / T;
+        inverter.dead_time_s = dead;
+        inverter.timer_counts = counts;
+        inverter.bootstrap_charge_s = charge_s;
+        inverter.bootstrap_hold_s = hold_s;
+        inverter.bootstrap_lockout = lockout;
+        gates_init(&gates, &inverter, 3);
+    }
+};
+
+// Full after ln(1 / 0.3) = 1.204 time constants: 241 us, in the third period with the lower switch on.
+TEST_F(GatesWithBootstrap, TheUpperSwitchStaysOpenUntilItsCapacitorIsCharged)
+{
+    expect(run(500, 500), {{dead, GATE_LOW}, {25e-6, GATE_OFF}, {75e-6 + dead, GATE_LOW}});
+    const double low_s = 25e-6 - dead;
+    const double charge = 1.0 - std::exp(-low_s / charge_s) - (50e-6 + dead) * (1.0 - lockout) / hold_s;
+    EXPECT_NEAR(gates.leg[0].charge, std::fmax(charge, 0.0), 1e-12);
+    run(0, 0);
+    run(0, 0);
+    run(0, 0);
+    EXPECT_GT(gates.leg[0].charge, lockout);
+    expect(run(500, 500),
+           {{25e-6, GATE_OFF}, {25e-6 + dead, GATE_HIGH}, {75e-6, GATE_OFF}, {75e-6 + dead, GATE_LOW}});
+}
+
+// From full it lasts hold_s, at full duty and with the leg off alike.
+TEST_F(GatesWithBootstrap, FullDutyLastsAsLongAsTheCharge)
+{
+    for (int period = 0; period < 50; period++) {
+        run(0, 0);
+    }
+    const double full = gates.leg[0].charge;
+    EXPECT_NEAR(full, 1.0, 1e-6);
+    run(500, counts);
+    const double at_s = 25e-6; // begins to fall
+    int periods = 1;
+    std::vector<Change> changes;
+    for (; changes.empty() && periods < 20; periods++) {
+        changes = run(counts, counts);
+    }
+    ASSERT_EQ(changes.size(), 1u);
+    EXPECT_EQ(changes[0].gate, GATE_OFF);
+    EXPECT_NEAR((periods - 1) * T + changes[0].t - at_s, hold_s, 1e-9);
+    EXPECT_TRUE(run(counts, counts).empty()); // stays open
+    EXPECT_EQ(gates.leg[0].gate, GATE_OFF);
+}
 
 TEST_F(Gates, EdgesOfBothHalvesWithDeadTime)
 {

@@ -143,7 +143,7 @@ TEST_F(Port, AHeldLegFollowsACompareValueOutOfReach)
 
 TEST_F(Port, DeclaresWhatIsWired)
 {
-    EXPECT_EQ(hal_channels(hal), NEEDS_HELD);
+    EXPECT_EQ(hal_channels(hal), NEEDS_HELD | PM_BOOTSTRAP);
 }
 
 TEST_F(Port, CurrentsAreTurned)

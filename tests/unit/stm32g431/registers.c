@@ -21,6 +21,7 @@ fdcan_ram_t FDCANRAM1;
 usart_t USART2;
 flash_t FLASH;
 syscfg_t SYSCFG;
+pwr_t PWR;
 dbgmcu_t DBGMCU;
 
 hal_t port_hal;
