@@ -12,7 +12,7 @@
  * cos 3 x is small where x is large, B errs by at most 0.25 of itself.
  *   margin of saliency = |y| / (2.1 i_noise)
  *   margin of polarity = |D| / (1.4 i_noise)
- * Use as initial_pulses.h; the same reasons. Duration: about 4 (2 n + 5) periods and 2 ms.
+ * Use as initial_pulses.h; the same reasons. Duration: about 4 (2 n + 5) periods and 5 ms.
  * Tests: tests/unit/injection/four_pulses_test.cpp, tests/scenario/four_pulses.yaml. */
 #ifndef INJECTION_FOUR_PULSES_H
 #define INJECTION_FOUR_PULSES_H

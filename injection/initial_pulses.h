@@ -12,7 +12,7 @@
  * Call initial_pulses_step() each period until it is not PM_RUNNING; after PM_DONE initial_pulses_find() each
  * millisecond, outside the control interrupt, which gives the position or the reason why there is none: y too
  * small for this machine, w below five times its noise, or gains that no sensors have. Duration: about
- * 6 (2 n + 5) periods and 2 ms.
+ * 6 (2 n + 5) periods and 5 ms.
  * Tests: tests/unit/injection/initial_pulses_test.cpp, tests/scenario/ipm_start_grid.yaml. */
 #ifndef INJECTION_INITIAL_PULSES_H
 #define INJECTION_INITIAL_PULSES_H

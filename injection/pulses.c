@@ -97,12 +97,9 @@ static bool improve(pulses_t *self)
 
 pm_procedure_t pulses_balance(pulses_t *self)
 {
-    if (!improve(self) || !improve(self)) {
-        return PM_FAILED_UNEVEN;
-    }
-    self->iterations += 2U;
     if (self->iterations < ITERATIONS) {
-        return PM_RUNNING;
+        self->iterations++;
+        return improve(self) ? PM_RUNNING : PM_FAILED_UNEVEN;
     }
     for (uint32_t x = 0; x < PULSES_AXES; x++) {
         for (uint32_t k = 0; k < PULSES_AXES; k++) {

@@ -12,7 +12,7 @@
  * Relative gains of the sensors from the sums of the currents. With gains 1 + g_k what is measured does not
  * sum to zero, though the currents do:
  *   sum_k g_k e_xk = sum_k e_xk        three equations; their common part is not seen: sum_k g_k = 0
- * Solved by iteration, two steps each millisecond; e_xk (1 - g_k) then stands for e_xk. Left alone, 1 % errs by 3.5 degrees where the
+ * Solved by iteration, a step each millisecond; e_xk (1 - g_k) then stands for e_xk. Left alone, 1 % errs by 3.5 degrees where the
  * saliency is a tenth. The gains' noise makes that of y sqrt 2 to 1.5 times as large.
  *
  * A one-shot procedure that owns the bridge; the step costs at most 130 instructions. What follows from the
@@ -75,8 +75,8 @@ pm_procedure_t pulses_step(pulses_t *self, const pulses_config_t *config, uint32
 
 void pulses_add(pulses_t *self, uint32_t axis, bool reverse); /* self->i to e */
 
-/* Two steps of the gains; the last make e that of sensors with equal ones. 700 instructions at most, so that
- * the 1 kHz interrupt leaves its time to control. PM_FAILED_UNEVEN: an eighth and more are no gains, but a
+/* A step of the gains, 350 instructions, so that the 1 kHz interrupt ends within a period of control at 40 kHz;
+ * at last e becomes that of sensors with equal gains. PM_FAILED_UNEVEN: an eighth and more are no gains, but a
  * sensor or a winding that is not what it should be. */
 pm_procedure_t pulses_balance(pulses_t *self);
 pm_ab_t pulses_saliency(const pulses_t *self);

@@ -52,17 +52,22 @@ static void make_open_loop(maker_t *m, open_loop_config_t *c)
 static void make_protection(maker_t *m, protection_config_t *c)
 {
     const drive_params_t *p = m->params;
-    c->i_trip = per_unit(m, DRIVE_PARAM_i_trip, m->base.i);
+    const pm_q_t i_trip = per_unit(m, DRIVE_PARAM_i_trip, m->base.i);
     c->v_dc_max = per_unit(m, DRIVE_PARAM_v_dc_max, m->base.v);
     c->v_dc_min = per_unit(m, DRIVE_PARAM_v_dc_min, m->base.v);
-    c->i_trip_squared = pm_mulh(c->i_trip, c->i_trip);
+    c->i_trip_squared = pm_mulh(i_trip, i_trip);
     c->v_dc_span = c->v_dc_max - c->v_dc_min;
     c->v_dc_derate = per_unit(m, DRIVE_PARAM_v_dc_derate, m->base.v);
     c->i_sum = PM_Q(0.1);
     c->offset_max =
         fixed(m, pm_num_div(si(m, DRIVE_PARAM_offset_max), m->base.i), 15, DRIVE_PARAM_offset_max);
-    c->temp_derate_dC = p->temp_derate;
-    c->temp_trip_dC = p->temp_trip;
+    c->heat_max =
+        fixed(m, square(pm_num_mul(pm_num_ratio(21, 20), pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i))),
+              Q_BITS, DRIVE_PARAM_i_rated);
+    c->k_heat =
+        fixed(m, pm_num_div(m->t_slow, si(m, DRIVE_PARAM_t_winding)), FRAC_BITS, DRIVE_PARAM_t_winding);
+    c->temp_derate_dC = (int16_t)p->temp_derate;
+    c->temp_trip_dC = (int16_t)p->temp_trip;
     c->omega_stall = speed(m, DRIVE_PARAM_speed_max) / 50;
     c->stall_ms = (uint16_t)p->t_stall;
     c->lost_ms = (uint16_t)p->t_lost;

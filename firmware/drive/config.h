@@ -24,11 +24,12 @@ typedef struct {
     int32_t i_trip_squared; /* Q24 */
     pm_q_t v_dc_min;
     int32_t v_dc_span; /* v_dc_max - v_dc_min */
-    pm_q_t i_trip;
     pm_q_t v_dc_max, v_dc_derate;
     pm_q_t i_sum;       /* largest believable sum of the phase currents */
     int32_t offset_max; /* of a 16-bit code */
-    int32_t temp_derate_dC, temp_trip_dC;
+    int16_t temp_derate_dC, temp_trip_dC;
+    pm_q_t heat_max;    /* square of the current that is borne for good, with a margin of 5 % */
+    pm_frac_t k_heat;   /* low-pass of the windings' heat, at 1 kHz */
     pm_q_t omega_stall; /* below: not turning */
     uint16_t stall_ms, lost_ms;
 } protection_config_t;

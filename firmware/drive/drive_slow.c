@@ -269,6 +269,7 @@ void drive_slow(drive_t *drive, const drive_slow_in_t *in)
     drive->status.limits = drive->voltage.limited || drive->modulator.limited != 0 ? DRIVE_LIMIT_VOLTAGE : 0U;
     drive->voltage.limited = false;
     drive->modulator.limited = 0;
+    protection_heat(drive);
     if (drive->fault == DRIVE_FAULT_NONE) {
         if (!drive->references_ready && !is_alone(drive)) {
             reference_take(drive);

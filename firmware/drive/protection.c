@@ -1,5 +1,6 @@
 #include "firmware/drive/drive_parts.h"
 
+#include "firmware/math/filter.h"
 #include "firmware/math/root.h"
 
 void drive_trip(drive_t *drive, drive_fault_t fault)
@@ -89,6 +90,16 @@ void protection_slow(drive_t *drive)
                          (drive->status.limits & DRIVE_LIMIT_CURRENT) != 0U && pm_abs(omega) < c->omega_stall;
     if (lasts(&drive->stall_ms, stalled, c->stall_ms)) {
         drive_trip(drive, DRIVE_FAULT_STALL);
+    }
+}
+
+void protection_heat(drive_t *drive)
+{
+    const protection_config_t *c = &drive->config.protection;
+    const pm_ab_t i = drive->i_ab;
+    const pm_q_t square = is_live(drive) ? pm_mul(i.alpha, i.alpha) + pm_mul(i.beta, i.beta) : 0;
+    if (pm_lp1(&drive->heat, square, c->k_heat) > c->heat_max) {
+        drive_trip(drive, DRIVE_FAULT_OVERLOAD);
     }
 }
 

@@ -15,7 +15,7 @@ int main(void)
                    .break_level = 0,
                    .can_kbit_s = 500},
         .period_us = PM_CONTRACT_PERIOD_US,
-        .channels = PM_CONTRACT_CHANNELS,
+        .channels = PM_CONTRACT_CHANNELS | PM_BOOTSTRAP,
         .idle = hal_idle,
         .cut = PM_CONTRACT_CUT,
     };

@@ -220,7 +220,8 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
         {"i_noise", c.pulses.i_noise, 28, 5e-3 / I},
         {"open-loop i", c.open_loop.i, 28, 2 / I},
         {"open-loop slope", c.open_loop.slope, 28, 50 * P * slow / W},
-        {"i_trip", c.protection.i_trip, 28, 9 / I},
+        {"heat_max", c.protection.heat_max, 28, std::pow(1.05 * 4 / I, 2)},
+        {"k_heat", c.protection.k_heat, 32, slow / 60},
         {"i_trip_squared", c.protection.i_trip_squared, 24, 81 / (I * I)},
         {"v_dc_span", static_cast<int32_t>(c.protection.v_dc_span), 28, (400 - 60) / V},
         {"v_dc_max", c.protection.v_dc_max, 28, 400 / V},
@@ -535,7 +536,9 @@ Names must_be_positive(const drive_config_t &c)
         {"i_max", c.i_max},
         {"omega_max", c.omega_max},
         {"omega_stall", c.protection.omega_stall},
-        {"i_trip", c.protection.i_trip},
+        {"i_trip_squared", c.protection.i_trip_squared},
+        {"heat_max", c.protection.heat_max},
+        {"k_heat", c.protection.k_heat},
     };
     for (const Names &names :
          {observer_must_be_positive(c.position.observer), regulator_must_be_positive(c.regulator)}) {

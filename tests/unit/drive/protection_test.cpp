@@ -341,7 +341,7 @@ TEST(Protection, LimitsThemselvesAreAllowed)
         EXPECT_EQ(calls(x, 10000), quality == 0 ? c.lost_ms + 1 : 10000);
         EXPECT_EQ(x.d.fault, quality == 0 ? DRIVE_FAULT_POSITION_LOST : DRIVE_FAULT_NONE);
     }
-    for (const int32_t dC : {c.temp_trip_dC + 100, c.temp_derate_dC - 1, c.temp_derate_dC}) {
+    for (const int32_t dC : {c.temp_trip_dC + 100, c.temp_derate_dC - 1, int{c.temp_derate_dC}}) {
         Drive x = turning();
         x.d.temperature_dC = static_cast<int16_t>(dC);
         pm_q_t i_min, i_max;
@@ -349,7 +349,7 @@ TEST(Protection, LimitsThemselvesAreAllowed)
         EXPECT_EQ(i_max, dC > c.temp_trip_dC ? 0 : x.d.config.i_max);
         EXPECT_EQ(i_min, -i_max);
     }
-    for (const int32_t dC : {c.temp_trip_dC - 1, c.temp_trip_dC}) {
+    for (const int32_t dC : {c.temp_trip_dC - 1, int{c.temp_trip_dC}}) {
         Drive x = turning();
         x.d.temperature_dC = static_cast<int16_t>(dC);
         calls(x, 10);
@@ -420,6 +420,40 @@ TEST(Protection, WhatIsNoStall)
             protection_slow(&x.d);
         }
         EXPECT_EQ(x.d.fault, missing == 0 ? DRIVE_FAULT_STALL : DRIVE_FAULT_NONE) << missing;
+    }
+}
+
+// i^2 through a low-pass: at twice the current that is borne for good, from cold, after t ln(4 / (4 - 1.1025)).
+TEST(Protection, WindingsAreOverloadedInEveryModeAfterTheirTime)
+{
+    drive_params_t p = direct::params();
+    p.t_winding = 10;
+    p.i_rated = 2000; // full scale is 10 A
+    for (const drive_stage_t stage : {STAGE_PROCEDURE, STAGE_OPEN_LOOP, STAGE_VECTOR}) {
+        for (const double share : {2.0, 1.04}) {
+            Drive x(p);
+            x.d.state = DRIVE_RUNNING;
+            x.d.stage = stage;
+            x.d.i_ab = {static_cast<pm_q_t>(std::lround(0.2 * share * PM_ONE * std::cos(0.7))),
+                        static_cast<pm_q_t>(std::lround(0.2 * share * PM_ONE * std::sin(0.7)))};
+            int ms = 0;
+            for (; ms < 200000 && x.d.fault == DRIVE_FAULT_NONE; ++ms) {
+                protection_heat(&x.d);
+            }
+            const double expected_ms = 1e4 * std::log(share * share / (share * share - 1.05 * 1.05));
+            if (share < 1.05) {
+                EXPECT_EQ(x.d.fault, DRIVE_FAULT_NONE);
+                continue;
+            }
+            EXPECT_EQ(x.d.fault, DRIVE_FAULT_OVERLOAD);
+            EXPECT_NEAR(ms, expected_ms, 0.005 * expected_ms);
+            // cools with the bridge off, also in the fault
+            const pm_q_t hot = x.d.heat;
+            for (ms = 0; ms < 10000; ++ms) {
+                drive_slow(&x.d, &x.slow);
+            }
+            EXPECT_NEAR(x.d.heat, hot * std::exp(-1.0), 0.01 * hot);
+        }
     }
 }
 
