@@ -54,39 +54,50 @@ static pm_q_t saturation(pm_angle_t x)
     return pm_unit(PM_ONE, pm_dir(x).cos) + pm_unit(THIRD, pm_dir(3U * x).cos);
 }
 
-static pm_angle_t correct(pm_ab_t y, pm_q_t D, pm_angle_t axis, pm_angle_t theta)
+/* One of the corrections. */
+static void correct(four_pulses_t *self)
 {
-    pm_angle_t better = theta;
-    for (uint32_t n = 0; n < CORRECTIONS; n++) {
-        const pm_q_t bias = pm_div(pm_abs(D) / 2, pm_abs(saturation(better - axis))); /* 3 B */
-        const pm_ab_t turned = pm_park_inverse((pm_dq_t){.d = bias, .q = 0}, pm_dir(0U - better));
-        better = half_angle((pm_ab_t){.alpha = y.alpha - turned.alpha, .beta = y.beta - turned.beta}, better);
-    }
-    return better;
+    pm_angle_t *theta = &self->train.found.theta;
+    const pm_q_t bias =
+        pm_div(pm_abs(self->D) / 2, pm_abs(saturation(*theta - pulses_axis[self->axis]))); /* 3 B */
+    const pm_ab_t turned = pm_park_inverse((pm_dq_t){.d = bias, .q = 0}, pm_dir(0U - *theta));
+    *theta = half_angle((pm_ab_t){.alpha = self->y.alpha - turned.alpha, .beta = self->y.beta - turned.beta},
+                        *theta);
 }
 
-pm_procedure_t four_pulses_find(four_pulses_t *self, const pulses_config_t *config, pulses_found_t *found)
+static pm_procedure_t locate(four_pulses_t *self, const pulses_config_t *config)
+{
+    pulses_found_t *found = &self->train.found;
+    self->y = pulses_saliency(&self->train);
+    const pm_q_t length = pm_hypot(self->y.alpha, self->y.beta);
+    if (length < config->y_min / 2) {
+        return PM_FAILED_SALIENCY;
+    }
+    const pm_q_t reverse = pulses_leg(&self->train.i, self->axis);
+    self->D = self->train.e[self->axis][self->axis] + reverse - pm_mul(self->train.g[self->axis], reverse);
+    const pm_sigma_t polarity = pulses_margin(pm_abs(self->D), pm_mul(PM_Q(1.414), config->i_noise));
+    if (polarity < PULSES_SURE) {
+        return PM_FAILED_POLARITY;
+    }
+    const pm_angle_t theta = pm_atan2(self->y.beta, self->y.alpha) / 2U;
+    const bool opposite = (self->D < 0) != (pm_dir(theta - pulses_axis[self->axis]).cos < 0);
+    found->theta = theta + (opposite ? PM_TURN(0.5) : 0U);
+    found->margin = pm_min(polarity, pulses_margin(length, pm_mul(PM_Q(2.12), config->i_noise)));
+    return PM_RUNNING;
+}
+
+pm_procedure_t four_pulses_find(four_pulses_t *self, const pulses_config_t *config)
 {
     const pm_procedure_t balanced = pulses_balance(&self->train);
     if (balanced != PM_DONE) {
         return balanced;
     }
-    const pm_ab_t y = pulses_saliency(&self->train);
-    const pm_q_t length = pm_hypot(y.alpha, y.beta);
-    if (length < config->y_min / 2) {
-        return PM_FAILED_SALIENCY;
+    if (self->train.steps == PULSES_BALANCING + 1U) {
+        return locate(self, config);
     }
-    const pm_angle_t axis = pulses_axis[self->axis];
-    const pm_q_t reverse = pulses_leg(&self->train.i, self->axis);
-    const pm_q_t D =
-        self->train.e[self->axis][self->axis] + reverse - pm_mul(self->train.g[self->axis], reverse);
-    const pm_sigma_t polarity = pulses_margin(pm_abs(D), pm_mul(PM_Q(1.414), config->i_noise));
-    if (polarity < PULSES_SURE) {
-        return PM_FAILED_POLARITY;
+    if (self->train.steps > PULSES_BALANCING + 1U + CORRECTIONS) {
+        return PM_DONE;
     }
-    pm_angle_t theta = pm_atan2(y.beta, y.alpha) / 2U;
-    theta += (D < 0) != (pm_dir(theta - axis).cos < 0) ? PM_TURN(0.5) : 0U;
-    found->theta = correct(y, D, axis, theta);
-    found->margin = pm_min(polarity, pulses_margin(length, pm_mul(PM_Q(2.12), config->i_noise)));
-    return PM_DONE;
+    correct(self);
+    return PM_RUNNING;
 }

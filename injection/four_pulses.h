@@ -12,7 +12,7 @@
  * cos 3 x is small where x is large, B errs by at most 0.25 of itself.
  *   margin of saliency = |y| / (2.1 i_noise)
  *   margin of polarity = |D| / (1.4 i_noise)
- * Use as initial_pulses.h; the same reasons. Duration: about 4 (2 n + 5) periods and 5 ms.
+ * Use as initial_pulses.h; the same reasons. Duration: about 4 (2 n + 5) periods and 9 ms.
  * Tests: tests/unit/injection/four_pulses_test.cpp, tests/scenario/four_pulses.yaml. */
 #ifndef INJECTION_FOUR_PULSES_H
 #define INJECTION_FOUR_PULSES_H
@@ -26,12 +26,14 @@ extern "C" {
 typedef struct {
     pulses_t train;
     uint16_t axis; /* nearest to the magnet's */
+    pm_ab_t y;
+    pm_q_t D;
 } four_pulses_t;
 
 void four_pulses_reset(four_pulses_t *self);
 pm_procedure_t four_pulses_step(four_pulses_t *self, const pulses_config_t *config, pm_abc_t i,
                                 pulses_out_t *out);
-pm_procedure_t four_pulses_find(four_pulses_t *self, const pulses_config_t *config, pulses_found_t *found);
+pm_procedure_t four_pulses_find(four_pulses_t *self, const pulses_config_t *config);
 
 #ifdef __cplusplus
 }

@@ -26,13 +26,9 @@ pm_procedure_t initial_pulses_step(initial_pulses_t *self, const pulses_config_t
     return self->train.pulse < PULSES ? PM_RUNNING : PM_DONE;
 }
 
-pm_procedure_t initial_pulses_find(initial_pulses_t *self, const pulses_config_t *config,
-                                   pulses_found_t *found)
+static pm_procedure_t locate(initial_pulses_t *self, const pulses_config_t *config)
 {
-    const pm_procedure_t balanced = pulses_balance(&self->train);
-    if (balanced != PM_DONE) {
-        return balanced;
-    }
+    pulses_found_t *found = &self->train.found;
     const pm_ab_t y = pulses_saliency(&self->train);
     const pm_q_t length = pm_hypot(y.alpha, y.beta);
     if (length < config->y_min) {
@@ -46,5 +42,14 @@ pm_procedure_t initial_pulses_find(initial_pulses_t *self, const pulses_config_t
         return PM_FAILED_POLARITY;
     }
     found->margin = pm_min(polarity, pulses_margin(length, 3 * config->i_noise));
-    return PM_DONE;
+    return PM_RUNNING;
+}
+
+pm_procedure_t initial_pulses_find(initial_pulses_t *self, const pulses_config_t *config)
+{
+    const pm_procedure_t balanced = pulses_balance(&self->train);
+    if (balanced != PM_DONE) {
+        return balanced;
+    }
+    return self->train.steps == PULSES_BALANCING + 1U ? locate(self, config) : PM_DONE;
 }

@@ -12,7 +12,7 @@
  * Call initial_pulses_step() each period until it is not PM_RUNNING; after PM_DONE initial_pulses_find() each
  * millisecond, outside the control interrupt, which gives the position or the reason why there is none: y too
  * small for this machine, w below five times its noise, or gains that no sensors have. Duration: about
- * 6 (2 n + 5) periods and 5 ms.
+ * 6 (2 n + 5) periods and 6 ms.
  * Tests: tests/unit/injection/initial_pulses_test.cpp, tests/scenario/ipm_start_grid.yaml. */
 #ifndef INJECTION_INITIAL_PULSES_H
 #define INJECTION_INITIAL_PULSES_H
@@ -31,8 +31,7 @@ typedef struct {
 void initial_pulses_reset(initial_pulses_t *self);
 pm_procedure_t initial_pulses_step(initial_pulses_t *self, const pulses_config_t *config, pm_abc_t i,
                                    pulses_out_t *out);
-pm_procedure_t initial_pulses_find(initial_pulses_t *self, const pulses_config_t *config,
-                                   pulses_found_t *found);
+pm_procedure_t initial_pulses_find(initial_pulses_t *self, const pulses_config_t *config);
 
 #ifdef __cplusplus
 }

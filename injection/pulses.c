@@ -8,7 +8,7 @@
 /* Of a quotient in Q28, a 64th of it, to PM_SIGMA_BITS. */
 #define PER_SIGMA 16384
 /* Each step leaves the ratio of saliency and mean of the inductances' inverses, 0.3 at most, of what is wrong. */
-#define ITERATIONS 4
+#define ITERATIONS PULSES_BALANCING
 #define GAIN_MAX   PM_Q(0.125)
 
 const pm_angle_t pulses_axis[PULSES_AXES] = {0, 1431655765U, 2863311531U}; /* 0, 120, 240 degrees */
@@ -95,18 +95,28 @@ static bool improve(pulses_t *self)
     return are_gains(self->g);
 }
 
-pm_procedure_t pulses_balance(pulses_t *self)
+static void equalise(pulses_t *self)
 {
-    if (self->iterations < ITERATIONS) {
-        self->iterations++;
-        return improve(self) ? PM_RUNNING : PM_FAILED_UNEVEN;
-    }
     for (uint32_t x = 0; x < PULSES_AXES; x++) {
         for (uint32_t k = 0; k < PULSES_AXES; k++) {
             self->e[x][k] -= pm_mul(self->g[k], self->e[x][k]);
         }
     }
-    return PM_DONE;
+}
+
+pm_procedure_t pulses_balance(pulses_t *self)
+{
+    self->steps++;
+    if (self->steps > ITERATIONS) {
+        return PM_DONE;
+    }
+    if (!improve(self)) {
+        return PM_FAILED_UNEVEN;
+    }
+    if (self->steps == ITERATIONS) {
+        equalise(self);
+    }
+    return PM_RUNNING;
 }
 
 pm_ab_t pulses_saliency(const pulses_t *self)

@@ -29,7 +29,8 @@
 extern "C" {
 #endif
 
-#define PULSES_AXES 3
+#define PULSES_AXES      3
+#define PULSES_BALANCING 4 /* steps for the gains */
 
 typedef struct {
     uint16_t periods; /* length of a pulse */
@@ -41,13 +42,19 @@ typedef struct {
 } pulses_config_t;
 
 typedef struct {
+    pm_angle_t theta;
+    pm_sigma_t margin; /* the smaller of saliency and polarity, at most 2560 */
+} pulses_found_t;
+
+typedef struct {
     pm_q_t e[PULSES_AXES][PULSES_AXES]; /* axis, leg */
     pm_abc_t i;                         /* at the end of the pulse */
     pm_q_t g[PULSES_AXES];              /* of the sensors */
     uint16_t timer, quiet;
     uint16_t pulse; /* how many are done */
-    uint16_t iterations;
+    uint16_t steps; /* of what is computed from them */
     bool decaying;
+    pulses_found_t found;
 } pulses_t;
 
 /* What the legs do in the coming period. */
@@ -55,11 +62,6 @@ typedef struct {
     pm_q_t duty[PULSES_AXES];
     bool driven;
 } pulses_out_t;
-
-typedef struct {
-    pm_angle_t theta;
-    pm_sigma_t margin; /* the smaller of saliency and polarity, at most 2560 */
-} pulses_found_t;
 
 static inline pm_q_t pulses_leg(const pm_abc_t *i, uint32_t leg)
 {
@@ -75,9 +77,10 @@ pm_procedure_t pulses_step(pulses_t *self, const pulses_config_t *config, uint32
 
 void pulses_add(pulses_t *self, uint32_t axis, bool reverse); /* self->i to e */
 
-/* A step of the gains, 350 instructions, so that the 1 kHz interrupt ends within a period of control at 40 kHz;
- * at last e becomes that of sensors with equal gains. PM_FAILED_UNEVEN: an eighth and more are no gains, but a
- * sensor or a winding that is not what it should be. */
+/* The first steps of finding: PM_RUNNING while the gains are sought, 350 instructions each, so that the 1 kHz
+ * interrupt ends within a period of control at 40 kHz; PM_DONE from then on. With the last, e becomes that of
+ * sensors with equal gains. PM_FAILED_UNEVEN: an eighth and more are no gains, but a sensor or a winding that is
+ * not what it should be. */
 pm_procedure_t pulses_balance(pulses_t *self);
 pm_ab_t pulses_saliency(const pulses_t *self);
 

@@ -178,23 +178,33 @@ static void off(drive_out_t *out)
 }
 
 /* Only those that drive the legs themselves have a step. */
-#define STEP(name)                                                                                           \
-    PM_IN_IMAGE(name, case PROCEDURE_##name                                                                  \
-                : drive->procedure.result = procedure_##name##_step(drive, in, out);                         \
-                break;)
-#define STEP_BARE(name)  STEP(name)
-#define STEP_LEGS(name)  STEP(name)
-#define STEP_ALONE(name) STEP(name)
+#define STEP_OF(name)                                                                                        \
+    {                                                                                                        \
+        drive->procedure.result = procedure_##name##_step(drive, in, out);                                   \
+    }
+#define STEP(name)      PM_IN_IMAGE(name, case PROCEDURE_##name : STEP_OF(name) break;)
+#define STEP_BARE(name) STEP(name)
+#define STEP_LEGS(name) STEP(name)
+#define STEP_ALONE(name)
 #define STEP_CONTROL(name)
+#define FIRST_BARE(name)
+#define FIRST_LEGS(name)
+#define FIRST_ALONE(name) PM_IN_IMAGE(name, if (id == (uint8_t)PROCEDURE_##name) STEP_OF(name) else)
+#define FIRST_CONTROL(name)
 
-/* The procedure that has the legs, until it ends. */
+/* The procedure that has the legs, until it ends. What is not part of a start is looked for first: it takes the
+ * most time of a period. */
 static inline void procedure_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
 {
+    const uint8_t id = drive->sequence.procedure;
     if (drive->procedure.result != PM_RUNNING) {
         off(out);
         return;
     }
-    switch (drive->sequence.procedure) {
+#define PM_METHOD(name, help, traits, needs) FIRST_##traits(name)
+#include "firmware/drive/procedures/procedures.def"
+#undef PM_METHOD
+    switch (id) {
 #define PM_METHOD(name, help, traits, needs) STEP_##traits(name)
 #include "firmware/drive/procedures/procedures.def"
 #undef PM_METHOD

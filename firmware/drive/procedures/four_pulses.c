@@ -21,10 +21,9 @@ pm_procedure_t procedure_four_pulses_slow(drive_t *drive)
     if (drive->procedure.result != PM_DONE) {
         return drive->procedure.result;
     }
-    pulses_found_t found;
-    const pm_procedure_t result =
-        four_pulses_find(&drive->procedure.four_pulses, &drive->config.pulses, &found);
-    leave_position(drive, result, &found);
+    four_pulses_t *self = &drive->procedure.four_pulses;
+    const pm_procedure_t result = four_pulses_find(self, &drive->config.pulses);
+    leave_position(drive, result, &self->train.found);
     return result;
 }
 

@@ -21,10 +21,9 @@ pm_procedure_t procedure_initial_pulses_slow(drive_t *drive)
     if (drive->procedure.result != PM_DONE) {
         return drive->procedure.result;
     }
-    pulses_found_t found;
-    const pm_procedure_t result =
-        initial_pulses_find(&drive->procedure.initial_pulses, &drive->config.pulses, &found);
-    leave_position(drive, result, &found);
+    initial_pulses_t *self = &drive->procedure.initial_pulses;
+    const pm_procedure_t result = initial_pulses_find(self, &drive->config.pulses);
+    leave_position(drive, result, &self->train.found);
     return result;
 }
 

@@ -44,16 +44,19 @@ TEST(FourPulses, TakesTwoThirdsOfTheTimeOfSix)
 // What the first three pulses say, with the right pole: the saturation of first order.
 TEST(FourPulses, TwinWithoutTheFourthErrs)
 {
-    const Method<four_pulses_t> twin = {
-        &four_pulses_step, [](four_pulses_t *self, const pulses_config_t *c, pulses_found_t *found) {
-            const pm_procedure_t result = four_pulses_find(self, c, found);
-            const pm_angle_t right = found->theta;
-            const pm_ab_t y = pulses_saliency(&self->train);
-            const double half = std::atan2(y.beta, y.alpha) / 2;
-            const double away = bench::wrapped(half - bench::rad(right));
-            found->theta = bench::turns(std::abs(away) < bench::kPi / 2 ? half : half + bench::kPi);
-            return result;
-        }};
+    const Method<four_pulses_t> twin = {&four_pulses_step, [](four_pulses_t *self, const pulses_config_t *c) {
+                                            const pm_procedure_t result = four_pulses_find(self, c);
+                                            if (result != PM_DONE) {
+                                                return result;
+                                            }
+                                            const pm_angle_t right = self->train.found.theta;
+                                            const pm_ab_t y = pulses_saliency(&self->train);
+                                            const double half = std::atan2(y.beta, y.alpha) / 2;
+                                            const double away = bench::wrapped(half - bench::rad(right));
+                                            self->train.found.theta = bench::turns(
+                                                std::abs(away) < bench::kPi / 2 ? half : half + bench::kPi);
+                                            return result;
+                                        }};
     const Grid ipm_grid = grid(twin, ipm(kGain));
     EXPECT_NEAR(ipm_grid.mean_deg, kIpmTwin_deg, kTwinWithin_deg);
     EXPECT_GE(grid(twin, spm(kGain)).mean_deg, kSpmTwin_deg);

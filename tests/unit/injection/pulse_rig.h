@@ -108,7 +108,7 @@ struct Result {
 // A method: its state and its two functions.
 template <typename State> struct Method {
     pm_procedure_t (*step)(State *, const pulses_config_t *, pm_abc_t, pulses_out_t *);
-    pm_procedure_t (*find)(State *, const pulses_config_t *, pulses_found_t *);
+    pm_procedure_t (*find)(State *, const pulses_config_t *);
 };
 
 template <typename State>
@@ -144,14 +144,13 @@ Result find(const Method<State> &method, const Rig &r, const pulses_config_t &c,
         ++result.periods;
     }
     if (result.state == PM_DONE) {
-        pulses_found_t found = {};
         const int per_ms = static_cast<int>(std::lround(1e-3 / r.base.period_s));
         do {
-            result.state = method.find(&self, &c, &found);
+            result.state = method.find(&self, &c);
             result.computing += per_ms;
         } while (result.state == PM_RUNNING);
-        result.theta_rad = bench::rad(found.theta);
-        result.margin = found.margin / 256.0;
+        result.theta_rad = bench::rad(self.train.found.theta);
+        result.margin = self.train.found.margin / 256.0;
         result.error_deg = bench::wrapped(theta_rad - result.theta_rad) / kDegree;
     }
     return result;
