@@ -5,6 +5,8 @@
 
 /* Injection settles on the position of the pulses, without torque. */
 #define SETTLE_MS 30
+/* More for one whose carrier lies along axes of the stator: it detects I_p first (injection/stationary.h). */
+#define SETTLE_STATOR_MS 46
 /* Standstill that ends a stop. */
 #define STILL_MS 20
 
@@ -107,7 +109,8 @@ PM_RARE static void settle(drive_t *drive)
 {
     position_slow(&drive->position, &drive->config.position, drive->i_ab, drive->status.i);
     drive->i_ref = (pm_dq_t){0, 0};
-    if (drive->state_ms >= SETTLE_MS) {
+    const bool stator = (drive->config.position.traits & SOURCE_STATOR) != 0U;
+    if (drive->state_ms >= (stator ? SETTLE_STATOR_MS : SETTLE_MS)) {
         reference_reset(drive, 0);
         drive->state = DRIVE_RUNNING;
     }
