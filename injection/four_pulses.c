@@ -16,11 +16,10 @@ void four_pulses_reset(four_pulses_t *self)
 static uint16_t nearest(pm_ab_t y)
 {
     const pm_angle_t theta = pm_atan2(y.beta, y.alpha) / 2U; /* 0 ... 180 degrees */
-    const pm_angle_t sixth = theta + PM_TURN(1.0 / 12);
-    if (sixth < PM_TURN(1.0 / 6) || sixth >= PM_TURN(0.5)) {
+    if (theta < PM_TURN(1.0 / 12) || theta >= PM_TURN(5.0 / 12)) {
         return 0; /* 0 and 180 */
     }
-    return sixth < PM_TURN(1.0 / 3) ? 2U : 1U; /* 60 is the opposite of 240, 120 */
+    return theta < PM_TURN(1.0 / 4) ? 2U : 1U; /* 60 is the opposite of 240, 120 */
 }
 
 pm_procedure_t four_pulses_step(four_pulses_t *self, const pulses_config_t *config, pm_abc_t i,
@@ -45,7 +44,7 @@ pm_procedure_t four_pulses_step(four_pulses_t *self, const pulses_config_t *conf
 static pm_angle_t half_angle(pm_ab_t y, pm_angle_t theta)
 {
     const pm_angle_t half = pm_atan2(y.beta, y.alpha) / 2U;
-    return half - theta + PM_TURN(0.25) < PM_TURN(0.5) ? half : half + PM_TURN(0.5);
+    return pm_abs(pm_angle_diff(half, theta)) < (int32_t)PM_TURN(0.25) ? half : half + PM_TURN(0.5);
 }
 
 /* cos x + r cos 3 x */

@@ -189,7 +189,12 @@ static void off(drive_out_t *out)
 #define STEP_CONTROL(name)
 #define FIRST_BARE(name)
 #define FIRST_LEGS(name)
-#define FIRST_ALONE(name) PM_IN_IMAGE(name, if (id == (uint8_t)PROCEDURE_##name) STEP_OF(name) else)
+#define FIRST_ALONE(name)                                                                                    \
+    PM_IN_IMAGE(                                                                                             \
+        name, if (id == (uint8_t)PROCEDURE_##name) {                                                         \
+            STEP_OF(name)                                                                                    \
+            return;                                                                                          \
+        })
 #define FIRST_CONTROL(name)
 
 /* The procedure that has the legs, until it ends. What is not part of a start is looked for first: it takes the
