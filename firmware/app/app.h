@@ -93,6 +93,7 @@ struct app {
     cia402_out_t given; /* to the drive */
     uint16_t alarm;     /* code of the alarm that tripped the drive */
     uint32_t can_lost, can_lost_us;
+    uint32_t saves, saved_us; /* that count against the next one, and since when */
     trace_t trace;
     int16_t trace_ring[APP_TRACE_NUMBERS];
 };
@@ -101,7 +102,7 @@ struct app {
  * counts the stored values that this version does not have. */
 bool app_load(const hal_t *hal, drive_params_t *params, uint32_t *unknown);
 
-/* A page of all parameters, STORE_WORDS; returns the words that are used. */
+/* A page of all parameters, of at most STORE_WORDS; returns the words that are used. */
 uint32_t app_page(const drive_params_t *params, uint32_t sequence, uint32_t words[]);
 
 /* The same to the page that is not the newest. False: not done, the old ones remain. */

@@ -127,18 +127,18 @@ uint32_t node_host_write(void *context, const od_entry_t *entry, uint32_t offset
     return SDO_UNSUPPORTED; /* the dictionary has no domain that is written */
 }
 
-bool node_host_store(void *context, uint32_t group)
+uint32_t node_host_store(void *context, uint32_t group)
 {
     app_t *app = app_of(context);
-    const bool done = app_store_group(app, group, true);
-    if (done && (group == NODE_GROUP_ALL || group == (uint32_t)OD_GROUP_MACHINE)) {
+    const uint32_t code = app_store_group(app, group, true);
+    if (code == 0U && (group == NODE_GROUP_ALL || group == (uint32_t)OD_GROUP_MACHINE)) {
         app->stored = true;
         app_give_parameters(app);
     }
-    return done;
+    return code;
 }
 
-bool node_host_restore(void *context, uint32_t group)
+uint32_t node_host_restore(void *context, uint32_t group)
 {
     return app_store_group(app_of(context), group, false);
 }

@@ -39,7 +39,8 @@ void app_give_parameters(app_t *app); /* the present set again: it may be good f
 
 /* app_store.c */
 bool app_stored_value(const hal_t *hal, uint16_t index, uint8_t sub, int32_t *value);
-bool app_store_group(app_t *app, uint32_t group, bool keep); /* keep: the present values; else none */
+uint32_t app_store_group(app_t *app, uint32_t group,
+                         bool keep); /* keep: the present values; else none. Abort code */
 void app_recall(app_t *app, od_kind_t kind);
 
 #ifdef __cplusplus

@@ -118,7 +118,7 @@ static void put_words(sink_t *sink, const uint32_t words[], uint32_t count)
 }
 
 /* Contents of the new page: the present values of the given groups, and those of the old page for the
- * others. */
+ * others. What this version does not know is another's, and stays until all is forgotten. */
 typedef struct {
     const app_t *app; /* NULL: parameters alone */
     const drive_params_t *params;
@@ -168,20 +168,54 @@ static bool select_value(const selection_t *selection, const od_entry_t *entry, 
     return selection->keep;
 }
 
+/* Pairs that may be in the new page: a row of the dictionary each, then the old page's */
+static uint32_t candidates(const selection_t *selection)
+{
+    return od_count + (selection->old == NULL ? 0U : (uint32_t)store_check(selection->old));
+}
+
+static bool pick(const selection_t *selection, uint32_t candidate, store_pair_t *pair)
+{
+    if (candidate < od_count) {
+        pair->id = id_of(&od_table[candidate]);
+        return select_value(selection, &od_table[candidate], &pair->value);
+    }
+    *pair = store_pair(selection->old, candidate - od_count);
+    return (selection->keep || selection->group != NODE_GROUP_ALL) && entry_of(pair->id) == NULL;
+}
+
+/* How many there will be, and whether they are those of the old page */
+static uint32_t count_pairs(const selection_t *selection, bool *same)
+{
+    const uint32_t most = candidates(selection);
+    const uint32_t before = most - od_count;
+    store_pair_t pair;
+    uint32_t count = 0;
+    *same = selection->old != NULL && store_seals(selection->old) > 0U;
+    for (uint32_t n = 0; n < most; n++) {
+        if (pick(selection, n, &pair)) {
+            const store_pair_t old = *same ? store_pair(selection->old, count) : pair;
+            *same = *same && count < before && pair.id == old.id && pair.value == old.value;
+            count++;
+        }
+    }
+    *same = *same && count == before;
+    return count;
+}
+
+/* All but the seal */
 static void make_page(const selection_t *selection, uint32_t sequence, sink_t *sink)
 {
+    const uint32_t most = candidates(selection);
     store_writer_t writer;
     uint32_t words[STORE_HEADER];
-    int32_t value;
-    uint32_t count = 0;
-    for (uint32_t row = 0; row < od_count; row++) {
-        count += select_value(selection, &od_table[row], &value) ? 1U : 0U;
-    }
-    store_begin(&writer, sequence, od_schema, count, words);
+    bool same;
+    store_begin(&writer, sequence, od_schema, count_pairs(selection, &same), words);
     put_words(sink, words, STORE_HEADER);
-    for (uint32_t row = 0; row < od_count && sink->good; row++) {
-        if (select_value(selection, &od_table[row], &value)) {
-            store_put(&writer, (store_pair_t){.id = id_of(&od_table[row]), .value = value}, words);
+    for (uint32_t n = 0; n < most && sink->good; n++) {
+        store_pair_t pair;
+        if (pick(selection, n, &pair)) {
+            store_put(&writer, pair, words);
             put_words(sink, words, 2);
         }
     }
@@ -189,21 +223,35 @@ static void make_page(const selection_t *selection, uint32_t sequence, sink_t *s
     put_words(sink, words, 2);
 }
 
-static bool write_page(hal_t *hal, selection_t *selection)
+/* Behind the pairs, the CRC and the seals that are there already */
+static bool seal(hal_t *hal, uint32_t page)
 {
-    const int32_t old = newest(hal);
-    uint32_t sequence = 1;
-    sink_t sink = {.hal = hal, .good = true};
-    if (old >= 0) {
-        sink.page = 1U - (uint32_t)old;
-        selection->old = hal_store_page(hal, (uint32_t)old);
-        sequence += store_sequence(selection->old);
-    }
-    if (!hal_store_erase(hal, sink.page)) {
+    const uint32_t *words = hal_store_page(hal, page);
+    const uint32_t seals = store_seals(words);
+    const uint32_t at = STORE_HEADER + 2U * ((uint32_t)store_check(words) + 1U + seals);
+    uint32_t two[2];
+    store_seal(two);
+    return seals >= STORE_SEALS || hal_store_write(hal, page, 4U * at, two, sizeof two);
+}
+
+/* Into the page that is not the newest */
+static bool write_page(hal_t *hal, const selection_t *selection, uint32_t page)
+{
+    sink_t sink = {.hal = hal, .page = page, .good = true};
+    if ((selection->old != NULL && !seal(hal, 1U - page)) || !hal_store_erase(hal, page)) {
         return false;
     }
-    make_page(selection, sequence, &sink);
-    return sink.good && newest(hal) == (int32_t)sink.page;
+    make_page(selection, selection->old == NULL ? 1U : store_sequence(selection->old) + 1U, &sink);
+    const bool whole = sink.good && store_check(hal_store_page(hal, page)) >= 0;
+    return whole && seal(hal, page) && newest(hal) == (int32_t)page;
+}
+
+/* The page to write, and what the selection adds to */
+static uint32_t page_to_write(const hal_t *hal, selection_t *selection)
+{
+    const int32_t old = newest(hal);
+    selection->old = old < 0 ? NULL : hal_store_page(hal, (uint32_t)old);
+    return old < 0 ? 0U : 1U - (uint32_t)old;
 }
 
 uint32_t app_page(const drive_params_t *params, uint32_t sequence, uint32_t words[])
@@ -212,13 +260,15 @@ uint32_t app_page(const drive_params_t *params, uint32_t sequence, uint32_t word
     sink_t sink = {.good = true};
     sink.memory = words;
     make_page(&selection, sequence, &sink);
-    return sink.at;
+    store_seal(&words[sink.at]);
+    return sink.at + 2U;
 }
 
 bool app_save(hal_t *hal, const drive_params_t *params)
 {
     selection_t selection = {.params = params, .group = NODE_GROUP_ALL, .keep = true};
-    return write_page(hal, &selection);
+    const uint32_t page = page_to_write(hal, &selection);
+    return write_page(hal, &selection, page);
 }
 
 /* While flash is written it cannot be read: control comes late, even later than the monitor, and what is left
@@ -232,11 +282,39 @@ static void set_storing(app_t *app, bool storing)
     hal_unlock(app->hal);
 }
 
-bool app_store_group(app_t *app, uint32_t group, bool keep)
+/* Flash wears out: a few saves at once, then one in this time. */
+#define SAVES_AT_ONCE 4U
+#define SAVE_US       30000000U
+
+static bool may_save(app_t *app)
+{
+    const uint32_t due = (hal_time_us(app->hal) - app->saved_us) / SAVE_US;
+    app->saved_us += due * SAVE_US;
+    app->saves = due < app->saves ? app->saves - due : 0U;
+    if (app->saves >= SAVES_AT_ONCE) {
+        return false;
+    }
+    app->saves++;
+    return true;
+}
+
+uint32_t app_store_group(app_t *app, uint32_t group, bool keep)
 {
     selection_t selection = {.app = app, .params = &app->params, .group = group, .keep = keep};
+    const uint32_t page = page_to_write(app->hal, &selection);
+    bool same;
+    const uint32_t count = count_pairs(&selection, &same);
+    if (same) {
+        return 0;
+    }
+    if (count > STORE_PAIRS_MAX) {
+        return SDO_MEMORY;
+    }
+    if (!may_save(app)) {
+        return SDO_STATE;
+    }
     set_storing(app, true);
-    const bool done = write_page(app->hal, &selection);
+    const bool done = write_page(app->hal, &selection, page);
     set_storing(app, false);
-    return done;
+    return done ? 0U : SDO_HARDWARE;
 }

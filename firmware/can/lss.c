@@ -118,7 +118,7 @@ static void configure(node_t *node, const uint8_t data[8])
         } else if (command == (uint8_t)LSS_CONFIGURE_RATE) {
             result = configure_rate(node, data[1], data[2]);
         } else {
-            result = node_host_store(node->context, NODE_GROUP_LSS) ? 0U : ERROR_STORE;
+            result = node_host_store(node->context, NODE_GROUP_LSS) == SDO_OK ? 0U : ERROR_STORE;
         }
     }
     reply(node, command, result);

@@ -68,6 +68,7 @@ typedef enum {
 #define NODE_GROUP_LSS 4U
 
 /* Abort codes that the application may give; 0 is success */
+#define SDO_MEMORY       0x05040005U
 #define SDO_UNSUPPORTED  0x06010000U
 #define SDO_INCOMPATIBLE 0x06040043U /* the cross check refuses the value */
 #define SDO_HARDWARE     0x06060000U
@@ -91,11 +92,11 @@ void node_host_read(void *context, const od_entry_t *entry, uint32_t offset, uin
 uint32_t node_host_write(void *context, const od_entry_t *entry, uint32_t offset, const uint8_t bytes[],
                          uint32_t count, bool last);
 
-bool node_host_store(void *context, uint32_t group);   /* OD_GROUP_..., NODE_GROUP_... */
-bool node_host_restore(void *context, uint32_t group); /* forgets what is stored */
-void node_host_recall(void *context);                  /* give stored communication objects: node_recall() */
-void node_host_alarm(void *context, uint16_t code);    /* torque off; what EMCY says */
-void node_host_reset(void *context);                   /* restart of all; may return before it */
+uint32_t node_host_store(void *context, uint32_t group);   /* OD_GROUP_..., NODE_GROUP_...; abort code */
+uint32_t node_host_restore(void *context, uint32_t group); /* forgets what is stored; abort code */
+void node_host_recall(void *context);               /* give stored communication objects: node_recall() */
+void node_host_alarm(void *context, uint16_t code); /* torque off; what EMCY says */
+void node_host_reset(void *context);                /* restart of all; may return before it */
 
 typedef struct node node_t; /* caller-owned: node_state.h */
 

@@ -131,8 +131,7 @@ static uint32_t put_signature(const node_t *node, const od_entry_t *entry, uint3
     if (value != (store ? SIGNATURE_SAVE : SIGNATURE_LOAD)) {
         return SDO_SIGNATURE;
     }
-    const bool done = store ? node_host_store(node->context, group) : node_host_restore(node->context, group);
-    return done ? SDO_OK : SDO_HARDWARE;
+    return store ? node_host_store(node->context, group) : node_host_restore(node->context, group);
 }
 
 uint32_t object_check_write(const node_t *node, const od_entry_t *entry)

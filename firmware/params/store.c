@@ -1,6 +1,8 @@
 #include "firmware/params/store.h"
 
-#define MAGIC    0x32504D50U /* "PMP2" */
+#define MAGIC    0x33504D50U /* "PMP3" */
+#define SEAL     0x4C414553U /* "SEAL" */
+#define ERASED   UINT32_MAX
 #define CRC_POLY 0xEDB88320U /* CRC-32 of IEEE 802.3, reflected */
 
 enum { WORD_MAGIC, WORD_SEQUENCE, WORD_SCHEMA, WORD_COUNT };
@@ -28,17 +30,37 @@ int32_t store_check(const uint32_t page[STORE_WORDS])
     return (page[end] == ~crc && page[end + 1U] == crc) ? (int32_t)count : -1;
 }
 
-int32_t store_newest(const uint32_t first[STORE_WORDS], const uint32_t second[STORE_WORDS])
+uint32_t store_seals(const uint32_t page[STORE_WORDS])
 {
-    const bool first_valid = store_check(first) >= 0;
-    const bool second_valid = store_check(second) >= 0;
-    if (first_valid && second_valid) {
-        return (int32_t)(second[WORD_SEQUENCE] - first[WORD_SEQUENCE]) > 0 ? 1 : 0;
+    const uint32_t *seal = &page[STORE_HEADER + 2U * page[WORD_COUNT] + 2U];
+    uint32_t words = 2U * STORE_SEALS;
+    while (words > 0U && seal[words - 1U] == ERASED) {
+        words--;
     }
-    if (first_valid) {
+    return (words + 1U) / 2U;
+}
+
+/* The higher the better: void, valid, sealed */
+static uint32_t rank(const uint32_t page[STORE_WORDS])
+{
+    if (store_check(page) < 0) {
         return 0;
     }
-    return second_valid ? 1 : -1;
+    return store_seals(page) > 0U ? 2U : 1U;
+}
+
+int32_t store_newest(const uint32_t first[STORE_WORDS], const uint32_t second[STORE_WORDS])
+{
+    const uint32_t first_rank = rank(first);
+    const uint32_t second_rank = rank(second);
+    if (first_rank == 0U && second_rank == 0U) {
+        return -1;
+    }
+    if (first_rank != second_rank) {
+        return second_rank > first_rank ? 1 : 0;
+    }
+    const bool second_newer = (int32_t)(second[WORD_SEQUENCE] - first[WORD_SEQUENCE]) > 0;
+    return second_newer == (first_rank == 2U) ? 1 : 0;
 }
 
 uint32_t store_sequence(const uint32_t page[STORE_WORDS])
@@ -93,4 +115,10 @@ void store_end(const store_writer_t *writer, uint32_t words[2])
 {
     words[0] = ~writer->crc;
     words[1] = writer->crc;
+}
+
+void store_seal(uint32_t words[2])
+{
+    words[0] = SEAL;
+    words[1] = ~SEAL;
 }

@@ -3,8 +3,8 @@
  * Converter codes go from plant to application and timer counts back unchanged, so the code under test is
  * that of the target. The over-current comparators are the plant's (plant_set_break()): they switch the
  * bridge off at their instant, and the next measurement reports it. The user of the plant sets the
- * temperature; flash is memory; frames go through two queues. If power is lost while a double word is
- * written, it reads as random data; a page that was being erased is half erased. */
+ * temperature; flash is memory; frames go through two queues. Cells that were written or erased when power was
+ * lost have no certain contents: they read as random data, and after sim_store_settle() perhaps as others. */
 #ifndef HAL_SIM_PORT_H
 #define HAL_SIM_PORT_H
 
@@ -22,6 +22,12 @@ typedef struct {
     hal_can_frame_t frame[SIM_FRAMES];
     uint32_t first, count;
 } sim_queue_t;
+
+/* Cells of a page whose writing or erasing was cut */
+typedef struct {
+    uint32_t from, bytes; /* 0 bytes: none */
+    uint8_t was[HAL_STORE_PAGE_SIZE], wanted[HAL_STORE_PAGE_SIZE];
+} sim_cut_t;
 
 struct hal {
     plant_t *plant;
@@ -46,7 +52,8 @@ struct hal {
     hal_can_state_t can_state;
     uint32_t can_lost, watchdog_fed;
     uint32_t store[HAL_STORE_PAGES][HAL_STORE_PAGE_SIZE / sizeof(uint32_t)];
-    uint32_t store_bytes_left;         /* flash loses power after so many bytes; UINT32_MAX: never */
+    uint32_t store_bytes_left; /* flash loses power after so many bytes; UINT32_MAX: never */
+    sim_cut_t store_cut[HAL_STORE_PAGES];
     void (*while_storing)(app_t *app); /* called for each double word, in place of interrupts; NULL: none */
     char console[SIM_CONSOLE];
     bool led, reset;
@@ -57,6 +64,10 @@ void sim_run_period(hal_t *hal);
 
 /* The legs change now, at the plant's present instant, until the next period. */
 void sim_commutate(hal_t *hal, uint16_t legs);
+
+/* Power comes back, whose loss cut cells: they read as what they were, as what they were to be, or each bit as
+ * one or the other; another time otherwise. */
+void sim_store_settle(hal_t *hal, uint32_t seed);
 
 /* A break of an instant, by the break input. */
 void sim_break(hal_t *hal);

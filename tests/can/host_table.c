@@ -10,8 +10,8 @@ typedef struct {
     void (*read)(void *context, const od_entry_t *entry, uint32_t offset, uint8_t bytes[], uint32_t count);
     uint32_t (*write)(void *context, const od_entry_t *entry, uint32_t offset, const uint8_t bytes[],
                       uint32_t count, bool last);
-    bool (*store)(void *context, uint32_t group);
-    bool (*restore)(void *context, uint32_t group);
+    uint32_t (*store)(void *context, uint32_t group);
+    uint32_t (*restore)(void *context, uint32_t group);
     void (*recall)(void *context);
     void (*alarm)(void *context, uint16_t code);
     void (*reset)(void *context);
@@ -58,12 +58,12 @@ uint32_t node_host_write(void *context, const od_entry_t *entry, uint32_t offset
     return table(context)->write(context, entry, offset, bytes, count, last);
 }
 
-bool node_host_store(void *context, uint32_t group)
+uint32_t node_host_store(void *context, uint32_t group)
 {
     return table(context)->store(context, group);
 }
 
-bool node_host_restore(void *context, uint32_t group)
+uint32_t node_host_restore(void *context, uint32_t group)
 {
     return table(context)->restore(context, group);
 }

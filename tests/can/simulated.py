@@ -31,8 +31,8 @@ CALLS = (
     ("size", c.CFUNCTYPE(c.c_uint32, c.c_void_p, ENTRY)),
     ("read", c.CFUNCTYPE(None, c.c_void_p, ENTRY, c.c_uint32, c.POINTER(c.c_uint8), c.c_uint32)),
     ("write", c.CFUNCTYPE(c.c_uint32, c.c_void_p, ENTRY, c.c_uint32, c.POINTER(c.c_uint8), c.c_uint32, c.c_bool)),
-    ("store", c.CFUNCTYPE(c.c_bool, c.c_void_p, c.c_uint32)),
-    ("restore", c.CFUNCTYPE(c.c_bool, c.c_void_p, c.c_uint32)),
+    ("store", c.CFUNCTYPE(c.c_uint32, c.c_void_p, c.c_uint32)),
+    ("restore", c.CFUNCTYPE(c.c_uint32, c.c_void_p, c.c_uint32)),
     ("recall", c.CFUNCTYPE(None, c.c_void_p)),
     ("alarm", c.CFUNCTYPE(None, c.c_void_p, c.c_uint16)),
     ("reset", c.CFUNCTYPE(None, c.c_void_p)),
@@ -197,13 +197,13 @@ class SimulatedNode(threading.Thread):
                 is_node = row.contents.kind == 1
                 self.kept[(e.index, e.sub)] = (self.lib.node_stored(self.node, row) if is_node
                                                else self._get(None, row))
-        return True
+        return 0
 
     def _restore(self, _, group):
         for e in dictionary.ENTRIES:
             if e.stored and e.record != "bus" and group in (ALL, self.row(e).contents.group):
                 self.kept.pop((e.index, e.sub), None)
-        return True
+        return 0
 
     def _recall(self, _):
         for at, value in self.kept.items():

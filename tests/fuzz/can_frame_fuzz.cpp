@@ -175,10 +175,10 @@ uint32_t write(void *context, const od_entry_t *, uint32_t, const uint8_t *bytes
     return 0;
 }
 
-bool store(void *context, uint32_t group)
+uint32_t store(void *context, uint32_t group)
 {
     demand(group <= NODE_GROUP_LSS && !on(context));
-    return !device_of(context).store_fails;
+    return device_of(context).store_fails ? SDO_HARDWARE : 0;
 }
 
 void recall(void *context)
@@ -322,12 +322,12 @@ uint32_t node_host_write(void *context, const od_entry_t *entry, uint32_t offset
     return write(context, entry, offset, bytes, count, last);
 }
 
-bool node_host_store(void *context, uint32_t group)
+uint32_t node_host_store(void *context, uint32_t group)
 {
     return store(context, group);
 }
 
-bool node_host_restore(void *context, uint32_t group)
+uint32_t node_host_restore(void *context, uint32_t group)
 {
     return store(context, group);
 }

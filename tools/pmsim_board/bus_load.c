@@ -47,5 +47,6 @@ uint32_t bus_load_page(const drive_params_t *params, uint32_t kbit_s, uint32_t w
     }
     store_put(&writer, (store_pair_t){.id = BIT_RATE_ID, .value = (int32_t)kbit_s}, &words[at]);
     store_end(&writer, &words[at + 2U]);
-    return at + 4U;
+    store_seal(&words[at + 4U]);
+    return at + 6U;
 }

@@ -288,7 +288,7 @@ class Bench
         return b.on_write();
     }
 
-    static bool store(void *context, uint32_t group)
+    static uint32_t store(void *context, uint32_t group)
     {
         Bench &b = self(context);
         b.groups_stored.push_back(group);
@@ -300,13 +300,13 @@ class Bench
                 }
             }
         }
-        return b.store_works;
+        return b.store_works ? 0 : SDO_HARDWARE;
     }
 
-    static bool restore(void *context, uint32_t group)
+    static uint32_t restore(void *context, uint32_t group)
     {
         self(context).groups_restored.push_back(group);
-        return self(context).store_works;
+        return self(context).store_works ? 0 : SDO_HARDWARE;
     }
 
     static void recall(void *context)
@@ -368,12 +368,12 @@ uint32_t node_host_write(void *context, const od_entry_t *entry, uint32_t offset
     return can::Bench::write(context, entry, offset, bytes, count, last);
 }
 
-bool node_host_store(void *context, uint32_t group)
+uint32_t node_host_store(void *context, uint32_t group)
 {
     return can::Bench::store(context, group);
 }
 
-bool node_host_restore(void *context, uint32_t group)
+uint32_t node_host_restore(void *context, uint32_t group)
 {
     return can::Bench::restore(context, group);
 }

@@ -34,6 +34,7 @@ std::vector<store_pair_t> some_pairs(uint32_t count, uint32_t seed = 1)
     return pairs;
 }
 
+// Without the seal
 uint32_t words_of(uint32_t count)
 {
     return STORE_HEADER + 2 * count + 2;
@@ -50,6 +51,14 @@ Page page_of(uint32_t sequence, uint32_t count, uint32_t seed = 1)
         at += 2;
     }
     store_end(&writer, &page[at]);
+    store_seal(&page[at + 2]);
+    return page;
+}
+
+Page unsealed(Page page, uint32_t count)
+{
+    const uint32_t end = words_of(count);
+    page[end] = page[end + 1] = UINT32_MAX;
     return page;
 }
 
@@ -148,7 +157,7 @@ TEST(Store, EveryUnfinishedPageIsVoid)
     for (size_t written = 0; written < 4 * words_of(count); ++written) {
         for (const uint8_t mixed : {uint8_t(0), uint8_t(0x0F), uint8_t(0x5A), uint8_t(0xFF)}) {
             const Page page = cut(whole, erased(), written, mixed);
-            if (page == whole) { /* what was left is the same erased */
+            if (unsealed(page, count) == unsealed(whole, count)) { // what was left is the same erased
                 continue;
             }
             ASSERT_EQ(store_check(page.data()), -1) << written;
@@ -177,6 +186,54 @@ TEST(Store, NewerSequenceWinsAlsoWhereItWraps)
         EXPECT_EQ(store_newest(page_of(old + 1, 2).data(), page_of(old, 2).data()), 0);
     }
     EXPECT_EQ(store_newest(erased().data(), erased().data()), -1);
+}
+
+// Whose check sum may be one that is cut and seems whole
+TEST(Store, WithoutASealAPageGivesWayToASealedOne)
+{
+    const Page older = page_of(8, 20);
+    const Page newer = page_of(9, 20);
+    EXPECT_EQ(store_seals(newer.data()), 1U);
+    EXPECT_EQ(store_seals(unsealed(newer, 20).data()), 0U);
+    EXPECT_EQ(store_newest(older.data(), unsealed(newer, 20).data()), 0);
+    EXPECT_EQ(store_newest(unsealed(newer, 20).data(), older.data()), 1);
+    EXPECT_EQ(store_newest(unsealed(older, 20).data(), unsealed(newer, 20).data()), 0);
+    EXPECT_EQ(store_newest(unsealed(newer, 20).data(), unsealed(older, 20).data()), 1);
+    EXPECT_EQ(store_newest(unsealed(newer, 20).data(), erased().data()), 0);
+    EXPECT_EQ(store_newest(erased().data(), unsealed(newer, 20).data()), 1);
+}
+
+// One that is cut itself shows that the check sum was finished.
+TEST(Store, AnyBitOfASealIsOne)
+{
+    const Page older = page_of(8, 20);
+    Page newer = unsealed(page_of(9, 20), 20);
+    ASSERT_EQ(store_newest(older.data(), newer.data()), 0);
+    for (uint32_t word = words_of(20); word < words_of(20) + 2 * STORE_SEALS; ++word) {
+        for (int bit = 0; bit < 32; ++bit) {
+            newer[word] ^= 1U << bit;
+            EXPECT_EQ(store_newest(older.data(), newer.data()), 1);
+            newer[word] ^= 1U << bit;
+        }
+    }
+}
+
+// There is room for all behind the fullest page.
+TEST(Store, SealsAreCountedToTheLast)
+{
+    for (const uint32_t count : {0U, 20U, STORE_PAIRS_MAX}) {
+        Page page = unsealed(page_of(9, count), count);
+        for (uint32_t n = 0; n < STORE_SEALS; ++n) {
+            ASSERT_LE(words_of(count) + 2 * n + 2, STORE_WORDS);
+            store_seal(&page[words_of(count) + 2 * n]);
+            ASSERT_EQ(store_seals(page.data()), n + 1);
+            if (n > 0) { // an older one that can no longer be seen counts all the same
+                Page torn = page;
+                torn[words_of(count)] = torn[words_of(count) + 1] = UINT32_MAX;
+                ASSERT_EQ(store_seals(torn.data()), n + 1);
+            }
+        }
+    }
 }
 
 } // namespace
