@@ -8,6 +8,8 @@
 #define COB_EXTENDED 0x20000000U
 #define COB_ID       0x000007FFU
 
+#define SIGNATURE_OPEN 0x6E65706FU
+
 typedef struct {
     uint16_t first, last;
 } id_range_t;
@@ -112,6 +114,9 @@ static uint32_t check(const node_t *node, const od_entry_t *entry, uint32_t valu
     if (is_pdo(index, OD_RPDO_MAP) || is_pdo(index, OD_TPDO_MAP)) {
         return check_map(node, entry, value, is_pdo(index, OD_RPDO_MAP));
     }
+    if (entry->slot == (uint16_t)OD_NODE_PARAMETERS_OPEN) {
+        return (value == 0U || value == SIGNATURE_OPEN) ? SDO_OK : SDO_SIGNATURE;
+    }
     if (entry->slot == (uint16_t)OD_NODE_CAN_BIT_RATE) {
         const bool known = value == 125U || value == 250U || value == 500U || value == 1000U;
         return known ? SDO_OK : SDO_INVALID;
@@ -138,7 +143,8 @@ static void follow(node_t *node, uint16_t index)
 static void set_word(node_t *node, const od_entry_t *entry, uint32_t value)
 {
     const bool of_tpdo = is_pdo(entry->index, OD_TPDO) && entry->sub == 1U;
-    object_set_node_word(node, entry, of_tpdo ? value | COB_BIT_30 : value);
+    const bool of_lock = entry->slot == (uint16_t)OD_NODE_PARAMETERS_OPEN && value != 0U;
+    object_set_node_word(node, entry, of_tpdo ? value | COB_BIT_30 : (of_lock ? 1U : value));
 }
 
 uint32_t communication_put(node_t *node, const od_entry_t *entry, uint32_t value)

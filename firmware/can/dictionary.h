@@ -61,6 +61,7 @@ typedef struct {
     unsigned group : 2; /* od_group_t */
     unsigned slot : 10;
     unsigned values : 10; /* place in od_values or od_presets; parameters have theirs elsewhere */
+    unsigned locked : 1;  /* refused while the lock is closed: 0800 0021h */
 } od_entry_t;
 
 /* Generated: dictionary_table.c, and the names of slots in dictionary_slots.h */

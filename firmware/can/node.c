@@ -60,6 +60,7 @@ void node_alarm(node_t *node, node_error_t source, uint16_t code)
 void node_lose_master(node_t *node)
 {
     const uint32_t behaviour = object_word(node, OD_ERROR_BEHAVIOUR, 1);
+    node_lock(node);
     if (behaviour == 2U) {
         node->nmt = NODE_STOPPED;
     } else if (behaviour == 0U && node->nmt == NODE_OPERATIONAL) {
@@ -104,6 +105,9 @@ static void leave(node_t *node, node_nmt_t next)
     if (loses && node_host_on(node->context)) {
         node_alarm(node, NODE_ERROR_NMT, CODE_NMT);
         emcy_run(node); /* in STOPPED there is none */
+    }
+    if (next == NODE_STOPPED) {
+        node_lock(node);
     }
     node->nmt = next;
 }

@@ -16,8 +16,10 @@
  * Reactions: heartbeat of a master lost, RPDO time-out, bus-off, and leaving OPERATIONAL or a reset while the
  * application is on, call node_host_alarm(). After a lost heartbeat or bus-off the node goes from OPERATIONAL
  * to PRE-OPERATIONAL as 1029h says. Another node that is heard with this node id is an error; while the
- * application is off the node then stays out of OPERATIONAL until communication is reset. Tests:
- * tests/unit/can. */
+ * application is off the node then stays out of OPERATIONAL until communication is reset.
+ *
+ * Objects with `locked` can be written while 2010h:5 is open: "open" written to it opens; it is closed after a
+ * reset, and 0, NMT stop and a lost master close it. Tests: tests/unit/can. */
 #ifndef CAN_NODE_H
 #define CAN_NODE_H
 
@@ -73,12 +75,13 @@ typedef enum {
 #define SDO_INCOMPATIBLE 0x06040043U /* the cross check refuses the value */
 #define SDO_HARDWARE     0x06060000U
 #define SDO_INVALID      0x06090030U /* not one of the values that there are */
+#define SDO_LOCKED       0x08000021U
 #define SDO_STATE        0x08000022U /* not in the present state of the device */
 #define SDO_NO_DATA      0x08000024U
 
 /* Functions that the application defines for the node: called directly, so that the depth of the stack can be
  * computed. Numbers of 8 and 16 bits are passed as the value they mean; unsigned 32 bits as their bit
- * pattern. Ranges have been checked, and for OD_ONLY_OFF that the bridge is off. */
+ * pattern. Ranges have been checked, for OD_ONLY_OFF that the bridge is off, and the lock. */
 bool node_host_send(void *context, const node_frame_t *frame); /* false: no room */
 bool node_host_on(void *context);                              /* the bridge is on, or about to be */
 int32_t node_host_get(void *context, const od_entry_t *entry); /* OD_PARAMETER, OD_LIVE */

@@ -61,6 +61,11 @@ void node_alarm(node_t *node, node_error_t source, uint16_t code); /* the error,
 void node_lose_master(node_t *node);                               /* as 1029h says */
 void node_boot_up(node_t *node);                                   /* communication anew */
 
+static inline void node_lock(node_t *node)
+{
+    node->word[OD_NODE_PARAMETERS_OPEN] = 0;
+}
+
 static inline void node_hear(node_t *node) /* a valid frame for it */
 {
     node->heard_us = node->now_us;

@@ -140,7 +140,10 @@ uint32_t object_check_write(const node_t *node, const od_entry_t *entry)
         return SDO_READ_ONLY;
     }
     const bool only_off = (entry->flags & (uint32_t)OD_ONLY_OFF) != 0U;
-    return (only_off && node_host_on(node->context)) ? SDO_STATE : SDO_OK;
+    if (only_off && node_host_on(node->context)) {
+        return SDO_STATE;
+    }
+    return (entry->locked != 0U && node->word[OD_NODE_PARAMETERS_OPEN] == 0U) ? SDO_LOCKED : SDO_OK;
 }
 
 uint32_t object_put(node_t *node, const od_entry_t *entry, int32_t value)

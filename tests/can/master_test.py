@@ -88,6 +88,7 @@ class Master(unittest.TestCase):
 
     def test_profile_velocity_by_names(self):
         machine = self.node.sdo["machine"]
+        self.node.sdo["parameter_set"]["parameters_open"].raw = int.from_bytes(b"open", "little")
         machine["R_s"].phys = 6.2
         self.assertEqual(machine["R_s"].raw, 6200000)
         self.assertEqual(self.node.sdo["supported_modes"].raw, 0x3000C)

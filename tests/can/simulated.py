@@ -19,7 +19,7 @@ class Frame(c.Structure):
 
 class OdEntry(c.Structure):
     _fields_ = [("index", c.c_uint16), ("sub", c.c_uint8), ("flags", c.c_uint8), ("type", c.c_uint, 4),
-                ("kind", c.c_uint, 2), ("group", c.c_uint, 2), ("slot", c.c_uint, 10), ("values", c.c_uint, 10)]
+                ("kind", c.c_uint, 2), ("group", c.c_uint, 2), ("slot", c.c_uint, 10), ("values", c.c_uint, 10), ("locked", c.c_uint, 1)]
 
 
 ENTRY = c.POINTER(OdEntry)

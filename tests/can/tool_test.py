@@ -27,6 +27,7 @@ LIBRARY = None
 NODE = 5
 SILENT = 127  # nobody has this id
 TOO_HIGH, TOO_LOW, NOT_NOW, READ_ONLY, NO_SUCH = 0x06090031, 0x06090032, 0x08000022, 0x06010002, 0x06020000
+LOCKED = 0x08000021
 
 
 class Bench(unittest.TestCase):
@@ -118,11 +119,25 @@ class WholeDictionary(Bench):
     def test_while_running(self):
         with self.connect() as drive, motion.Motion(drive, "speed", speed=1000):
             for entry in dictionary.ENTRIES:
-                if entry.writable and entry.access == "off":
+                if entry.writable and entry.access in ("off", "locked"):
                     with self.subTest(entry.name):
                         self.refused(NOT_NOW, drive.write, entry, entry.preset)
-            drive.set("R_s", "6.1")
+            drive.set("speed_bandwidth", "6")
             self.assertEqual(drive.state(), "operation enabled")
+
+    def test_what_is_locked_is_opened_and_closed_again(self):
+        with self.connect() as drive:
+            self.refused(LOCKED, drive.download, 0x2100, 2, (6_100_000).to_bytes(4, "little"))
+            drive.set("R_s", "6.1")
+            drive.load({names.find("R_s"): 6_200_000, names.find("L_d"): 42_000_000})
+            drive.save()
+            self.assertEqual(drive.read("R_s"), 6_200_000)
+            self.assertEqual(drive.read("parameters_open"), 0)
+            with drive.open():
+                self.refused(TOO_HIGH, drive.write, "R_s", 2**31 - 1)
+                self.assertEqual(drive.read("parameters_open"), 1)
+            self.assertEqual(drive.read("parameters_open"), 0)
+            self.refused(LOCKED, drive.download, 0x1011, 1, b"load")
 
     def test_no_such_object(self):
         with self.connect() as drive:

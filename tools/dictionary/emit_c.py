@@ -37,7 +37,7 @@ def c_flags(entry):
         flags.append("OD_MAP_RX")
     if entry.stored:
         flags.append("OD_STORED")
-    if entry.access == "off":
+    if entry.access in ("off", "locked"):
         flags.append("OD_ONLY_OFF")
     if entry.node_id:
         flags.append("OD_NODE_ID")
@@ -105,6 +105,7 @@ FILTERS = {
     "c_text": c_text,
     "c_name": c_name,
     "c_flags": c_flags,
+    "c_locked": lambda e: "1U" if e.access == "locked" else "0U",
     "c_type": lambda e: f"OD_{e.type.upper()}",
     "c_kind": lambda e: KINDS[e.lives],
     "c_group": lambda e: f"OD_GROUP_{e.group.upper()}",

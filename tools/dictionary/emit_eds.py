@@ -4,7 +4,7 @@ import lzma
 from .model import TYPES
 
 MANDATORY = (0x1000, 0x1001, 0x1018)
-ACCESS = {"live": "rw", "off": "rw", "read": "ro", "write": "wo", "const": "const"}
+ACCESS = {"live": "rw", "off": "rw", "locked": "rw", "read": "ro", "write": "wo", "const": "const"}
 # What every reader of .lzma files can do without more memory than it needs: 64 KiB of window.
 FILTERS = [{"id": lzma.FILTER_LZMA1, "preset": 9 | lzma.PRESET_EXTREME, "dict_size": 65536, "lc": 2, "lp": 0, "pb": 0}]
 

@@ -17,7 +17,7 @@ TYPES = {
     "domain": (0x0F, 0, 0, 0),
 }
 LIVES = ("constant", "node", "parameter", "live")
-ACCESS = ("live", "off", "read", "write", "const")
+ACCESS = ("live", "off", "locked", "read", "write", "const")
 GROUPS = ("none", "communication", "application", "machine")
 MAPS = ("none", "tx", "rx", "both")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -77,7 +77,7 @@ class Entry:
 
     @property
     def writable(self):
-        return self.access in ("live", "off", "write")
+        return self.access in ("live", "off", "locked", "write")
 
     @property
     def readable(self):

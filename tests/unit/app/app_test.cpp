@@ -363,7 +363,7 @@ TEST(App, SlowRestsWhileFlashIsWritten)
     x.run_ms(10);
     x.loop.hal.while_storing = app_control;
     x.loop.hal.temperature_dC = 612;
-    EXPECT_EQ(x.sdo({0x23, 0x10, 0x10, 1, 's', 'a', 'v', 'e'}), 0U);
+    EXPECT_EQ(x.set(0x1010, 1, 0x65766173), 0U);
     EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
     x.run_ms(2);
     EXPECT_EQ(x.loop.app.slow.temperature_dC, 612);
@@ -379,7 +379,7 @@ TEST(App, ControlThatWaitsForFlashHasNotCeased)
     x.run_ms(10);
     x.loop.hal.while_storing = app_monitor;
     app_monitor(&x.loop.app);
-    EXPECT_EQ(x.sdo({0x23, 0x10, 0x10, 1, 's', 'a', 'v', 'e'}), 0U);
+    EXPECT_EQ(x.set(0x1010, 1, 0x65766173), 0U);
     x.run_ms(2);
     EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
     app_monitor(&x.loop.app);

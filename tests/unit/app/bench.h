@@ -15,6 +15,8 @@
 namespace app_test
 {
 
+const uint32_t signature_open = 0x6E65706F;
+
 class Bench
 {
   public:
@@ -109,7 +111,19 @@ class Bench
         return 1;
     }
 
+    // What is locked is opened first.
     uint32_t set(uint16_t index, uint8_t sub, uint32_t value)
+    {
+        bool has;
+        const od_entry_t *entry = od_find(index, sub, &has);
+        if (entry->locked != 0 && loop.app.node.word[OD_NODE_PARAMETERS_OPEN] == 0) {
+            EXPECT_EQ(set(0x2010, 5, signature_open), 0U);
+        }
+        return set_as_it_is(index, sub, value);
+    }
+
+    // Without a key
+    uint32_t set_as_it_is(uint16_t index, uint8_t sub, uint32_t value)
     {
         bool has;
         const uint32_t size = od_size(od_find(index, sub, &has));

@@ -111,6 +111,11 @@ bool is_signature(const od_entry_t &entry)
     return entry.index == 0x1010 || entry.index == 0x1011;
 }
 
+bool is_lock(const od_entry_t &entry)
+{
+    return entry.index == 0x2010 && entry.sub == 5;
+}
+
 // Writing it moves the motor: its limits are the business of its own tests.
 bool is_routine(const od_entry_t &entry)
 {
@@ -141,6 +146,9 @@ uint32_t expected(const od_entry_t &entry, int64_t value)
     }
     if (entry.index == 0x3100 && entry.sub == 1) {
         return low ? DONE : STATE; // no signals yet that could be recorded at once
+    }
+    if (is_lock(entry)) {
+        return low ? DONE : SIGNATURE;
     }
     if (entry.index == 0x3101) {
         return low ? DONE : NOT_MAPPABLE;
@@ -269,6 +277,9 @@ uint32_t expected_running(const od_entry_t &entry, const Bench &x)
     const uint16_t comm = is_map(entry) ? uint16_t(entry.index - 0x200) : entry.index;
     if ((entry.flags & OD_ONLY_OFF) != 0) {
         return STATE;
+    }
+    if (is_lock(entry)) { // it is open, and 1 is not the signature
+        return SIGNATURE;
     }
     if (is_map(entry)) { // in use, or its number of objects is not zero
         bool has;

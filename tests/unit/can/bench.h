@@ -199,9 +199,17 @@ class Bench
         return code;
     }
 
-    // With the size that the dictionary gives
+    void open()
+    {
+        EXPECT_EQ(download(0x2010, 5, bytes_of(0x6E65706F, 4)), 0U);
+    }
+
+    // With the size that the dictionary gives; what is locked is opened first
     uint32_t set(uint16_t index, uint8_t sub, uint32_t word)
     {
+        if (entry(index, sub)->locked != 0 && node.word[OD_NODE_PARAMETERS_OPEN] == 0) {
+            open();
+        }
         return download(index, sub, bytes_of(word, od_size(entry(index, sub))));
     }
 

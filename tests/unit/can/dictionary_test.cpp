@@ -163,6 +163,7 @@ TEST(Dictionary, WhatIsOnlyForOffIsRefusedWhileOn)
 TEST(Dictionary, WrongSizesAreRefused)
 {
     Bench x;
+    x.open();
     for (const od_entry_t *e : numbers()) {
         if ((e->flags & OD_WRITE) != 0) {
             for (size_t size = 1; size <= 4; ++size) {

@@ -10,10 +10,10 @@ enum { RW = OD_READ | OD_WRITE };
 extern const od_values_t od_values[] = {{0, 0, 0}};
 extern const int32_t od_presets[] = {0, 5};
 extern const od_entry_t od_table[] = {
-    {0x1F50, 1, OD_WRITE | OD_ONLY_OFF, OD_DOMAIN, OD_LIVE, OD_GROUP_NONE, 0, 0},
-    {0x2000, 0, RW, OD_DOMAIN, OD_LIVE, OD_GROUP_NONE, 1, 0},
-    {0x2080, 1, RW, OD_U8, OD_NODE, OD_GROUP_COMMUNICATION, OD_NODE_CAN_NODE_ID, 1},
-    {0x2081, 0, OD_WRITE, OD_U8, OD_LIVE, OD_GROUP_NONE, 2, 0},
+    {0x1F50, 1, OD_WRITE | OD_ONLY_OFF, OD_DOMAIN, OD_LIVE, OD_GROUP_NONE, 0, 0, 0},
+    {0x2000, 0, RW, OD_DOMAIN, OD_LIVE, OD_GROUP_NONE, 1, 0, 0},
+    {0x2080, 1, RW, OD_U8, OD_NODE, OD_GROUP_COMMUNICATION, OD_NODE_CAN_NODE_ID, 1, 0},
+    {0x2081, 0, OD_WRITE, OD_U8, OD_LIVE, OD_GROUP_NONE, 2, 0, 0},
 };
 extern const uint16_t od_count = 4;
 extern const uint32_t od_schema = 0;

@@ -1,4 +1,5 @@
 """One drive on the bus: its values, what it keeps, its faults. Motion is in motion.py, the oscilloscope in trace.py."""
+import contextlib
 import random
 import time
 
@@ -12,6 +13,7 @@ from .errors import BusError, Disturbed, FaultError, NoAnswer, NotDone, NotInIma
 
 SAVE = int.from_bytes(b"save", "little")
 LOAD = int.from_bytes(b"load", "little")
+OPEN = int.from_bytes(b"open", "little")
 TOGETHER = 0x06040043  # abort code of the check of all parameters together
 STORE_S = 5.0  # most that flash takes
 TRIES = 10  # where another client of the drive is answered in between
@@ -52,6 +54,7 @@ class Drive:
         network.add_node(self.node)
         self.node.sdo.RESPONSE_TIMEOUT = 0.5
         self.node.sdo.MAX_RETRIES = 2
+        self.opened = 0  # depth of open()
 
     def __enter__(self):
         return self
@@ -108,6 +111,27 @@ class Drive:
         entry = self.entry(name)
         if not entry.writable or not entry.number:
             raise UsageError(f"{entry.label} cannot be set", entry.help)
+        with self.open(entry.access == "locked"):
+            self._write(entry, raw)
+
+    @contextlib.contextmanager
+    def open(self, needed=True):
+        """What is locked can be written meanwhile. A drive that does not answer closes by itself when it is reset."""
+        if not needed:
+            yield
+            return
+        if not self.opened:
+            self._write(names.find("parameters_open"), OPEN)
+        self.opened += 1
+        try:
+            yield
+        finally:
+            self.opened -= 1
+            if not self.opened:
+                with contextlib.suppress(NoAnswer, Disturbed, BusError):
+                    self._write(names.find("parameters_open"), 0)
+
+    def _write(self, entry, raw):
         try:
             self.download(entry.index, entry.sub, entry.encode(raw), entry.label)
         except Refused as error:
@@ -164,6 +188,16 @@ class Drive:
         if dry_run or not changes:
             return changes
         together = [e for e, _, _ in changes if e.record in names.DRIVE_RECORDS]
+        with self.open(any(entry.access == "locked" for entry, _, _ in changes)):
+            self._load(changes, together, progress)
+        wrong = self.diff({entry: raw for entry, _, raw in changes})
+        if wrong:
+            lost = ", ".join(f"{entry.name} is {entry.text(here)}" for entry, here, _ in wrong[:5])
+            raise NotDone(f"{len(wrong)} of {len(changes)} values were not taken: {lost}",
+                          "the drive has refused them when it checked all together")
+        return changes
+
+    def _load(self, changes, together, progress):
         if together:
             self.write("parameter_batch", 1)
         try:
@@ -174,12 +208,6 @@ class Drive:
         finally:
             if together:
                 self.write("parameter_batch", 0)
-        wrong = self.diff({entry: raw for entry, _, raw in changes})
-        if wrong:
-            lost = ", ".join(f"{entry.name} is {entry.text(here)}" for entry, here, _ in wrong[:5])
-            raise NotDone(f"{len(wrong)} of {len(changes)} values were not taken: {lost}",
-                          "the drive has refused them when it checked all together")
-        return changes
 
     def save(self, group="all"):
         self._store(0x1010, group, SAVE)
@@ -195,7 +223,8 @@ class Drive:
         sdo = self.node.sdo
         usual, sdo.RESPONSE_TIMEOUT = sdo.RESPONSE_TIMEOUT, STORE_S
         try:
-            self.download(index, GROUPS.index(group) + 1, signature.to_bytes(4, "little"), f"{name}.{group}")
+            with self.open(names.find(f"{name}.{group}").access == "locked"):
+                self.download(index, GROUPS.index(group) + 1, signature.to_bytes(4, "little"), f"{name}.{group}")
         finally:
             sdo.RESPONSE_TIMEOUT = usual
 

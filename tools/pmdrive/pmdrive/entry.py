@@ -72,7 +72,7 @@ class Entry:
 
     @property
     def writable(self):
-        return self.access in ("live", "off", "write")
+        return self.access in ("live", "off", "locked", "write")
 
     @property
     def scale(self):

@@ -31,8 +31,9 @@ ABORTS = {
     0x06090036: ("most is below least", "change the other limit first"),
     0x08000000: ("general error in the device", "try again"),
     0x08000020: ("data cannot be stored or transferred", "the signature was wrong, or the store is not ready"),
-    0x08000021: ("data cannot be stored or transferred: local control", "end the local control first"),
-    0x08000022: ("not in the present state of the device", "switch the bridge off first: `pmdrive stop`"),
+    0x08000021: ("locked in the device", "open it first: parameters_open, 6E65 706Fh; NMT stop and a reset close it"),
+    0x08000022: ("not in the present state of the device",
+                 "switch the bridge off first: `pmdrive stop`; after four saves there is one every 30 s"),
     0x08000023: ("no object dictionary", "the firmware is broken: flash it again"),
     0x08000024: ("no data available", "nothing has been recorded yet"),
 }
