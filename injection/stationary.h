@@ -47,7 +47,7 @@ static inline bool stationary_finding(const stationary_t *self)
     return self->finding > 0U;
 }
 
-#define STATIONARY_VALUES 32U /* a power of two */
+#define STATIONARY_VALUES 64U /* a power of two */
 
 static inline bool stationary_on_beta(const stationary_t *self)
 {

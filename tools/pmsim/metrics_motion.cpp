@@ -95,8 +95,28 @@ class Travel : public Metric
     double pole_pairs_, start_ = nan, farthest_ = 0.0;
 };
 
-// Position error at the instant the drive begins to run: what the initial position search found.
-class FoundAngleError : public Metric
+// Position error at an instant that may come more than once.
+class AngleErrorAt : public Metric
+{
+  public:
+    MetricValue value() const override
+    {
+        return {worst_, ""};
+    }
+
+  protected:
+    void take(const Sample &s)
+    {
+        const double error = s.rig.angle_error_rad * to_deg;
+        worst_ = std::isnan(worst_) || std::fabs(error) > std::fabs(worst_) ? error : worst_;
+    }
+
+  private:
+    double worst_ = nan;
+};
+
+// When the drive begins to run: after what the search has found injection has settled.
+class FoundAngleError : public AngleErrorAt
 {
   public:
     FoundAngleError(const Expectation &, const Setup &)
@@ -106,20 +126,33 @@ class FoundAngleError : public Metric
     void add(const Sample &s) override
     {
         if (s.rig.state == RIG_RUNNING && last_state_ != RIG_RUNNING) {
-            const double error = s.rig.angle_error_rad * to_deg;
-            worst_ = std::isnan(worst_) || std::fabs(error) > std::fabs(worst_) ? error : worst_;
+            take(s);
         }
         last_state_ = s.rig.state;
     }
 
-    MetricValue value() const override
+  private:
+    int last_state_ = RIG_RUNNING; // a window that begins while running has found nothing
+};
+
+// When injection begins to settle: what the pulses have found.
+class PulsesAngleError : public AngleErrorAt
+{
+  public:
+    PulsesAngleError(const Expectation &, const Setup &)
     {
-        return {worst_, ""};
+    }
+
+    void add(const Sample &s) override
+    {
+        settled_ = s.rig.settles ? settled_ + 1 : 0;
+        if (settled_ == 2) { // the first is from before its first period
+            take(s);
+        }
     }
 
   private:
-    int last_state_ = RIG_RUNNING; // a window that begins while running has found nothing
-    double worst_ = nan;
+    int settled_ = 0;
 };
 
 } // namespace
@@ -155,6 +188,13 @@ std::vector<SpecialMetric> motion_metrics()
           false,
           {}},
          make_special<FoundAngleError>},
+        {{"pulses_angle_error_deg",
+          "deg",
+          "position error that injection begins with, as the pulses have found it, worst of the window",
+          false,
+          false,
+          {}},
+         make_special<PulsesAngleError>},
     };
 }
 

@@ -50,7 +50,8 @@ typedef struct {
     double v_alpha_V, v_beta_V; /* the drive's idea of the voltage it applies */
     double v_dc_hat_V;
     double weight, quality;
-    bool driven; /* any leg, in the output of this period */
+    bool settles; /* injection, on the position that the search has found */
+    bool driven;  /* any leg, in the output of this period */
     rig_identified_t identified;
 } rig_sample_t;
 

@@ -107,6 +107,7 @@ void rig_fill_sample(rig_scale_t *scale, const drive_t *drive, const drive_out_t
     sample->v_dc_hat_V = scale->v_V * status->v_dc;
     sample->weight = (double)status->weight / PM_ONE;
     sample->quality = (double)status->quality / PM_ONE;
+    sample->settles = status->state == DRIVE_FINDING && drive->stage == STAGE_VECTOR;
     sample->driven = out->legs != PM_LEGS_OFF;
     sample->identified = identified(scale, &drive->commissioning_report);
 }
