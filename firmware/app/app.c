@@ -62,6 +62,14 @@ app_ready_t app_ready(const app_t *app)
     return app->stored ? APP_READY : APP_NOT_STORED;
 }
 
+bool app_may_run(const app_t *app)
+{
+    const app_ready_t ready = app_ready(app);
+    const cia402_t *profile = &app->cia402;
+    const int16_t mode = cia402_on(profile) ? profile->active_mode : profile->mode;
+    return ready == APP_READY || (ready == APP_NOT_STORED && mode == CIA402_MODE_IDENTIFY);
+}
+
 drive_result_t app_configure(app_t *app, hal_t *hal, const drive_params_t *params, bool stored)
 {
     (void)memset(app, 0, sizeof *app);
@@ -77,9 +85,7 @@ drive_result_t app_configure(app_t *app, hal_t *hal, const drive_params_t *param
     app->refused = !result.ok || (app->hardware && !carrier_agrees(hal, params));
     if (result.ok) {
         app->slow_divider = app->drive.config.slow_divider;
-        if (app_ready(app) != APP_READY) {
-            drive_trip(&app->drive, DRIVE_FAULT_PARAMETERS);
-        }
+        app_judge_parameters(app);
     }
     app_bus_init(app);
     app->round_us = hal_time_us(hal) - ROUND_US;
@@ -99,7 +105,7 @@ static void follow_state(app_t *app)
 {
     const drive_state_t state = app->drive.state;
     const bool wanted = state != DRIVE_OFF && state != DRIVE_FAULT && app->drive.fault == DRIVE_FAULT_NONE;
-    if (!wanted || app_ready(app) != APP_READY) {
+    if (!wanted || !app_may_run(app)) {
         hal_bridge_off(app->hal);
         app->armed = false;
     } else if (app->armed ? !hal_bridge_armed(app->hal) : !hal_bridge_arm(app->hal)) {

@@ -14,14 +14,20 @@ static bool needs_restart(const app_t *app)
            now.dead_time_ns != app->hal_config.dead_time_ns || now.break_level != app->hal_config.break_level;
 }
 
+void app_judge_parameters(app_t *app)
+{
+    const app_ready_t ready = app_ready(app);
+    if (ready != APP_READY && ready != APP_NOT_STORED) {
+        drive_trip(&app->drive, DRIVE_FAULT_PARAMETERS);
+    }
+}
+
 void app_take_parameters(app_t *app)
 {
     drive_reconfigure(&app->drive, &app->next);
     app->next_ready = false;
     app->slow_divider = app->drive.config.slow_divider;
-    if (app_ready(app) != APP_READY) {
-        drive_trip(&app->drive, DRIVE_FAULT_PARAMETERS);
-    }
+    app_judge_parameters(app);
 }
 
 /* The slow interrupt takes `next` only while it is marked ready, and is not interrupted by us. */

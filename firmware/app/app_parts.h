@@ -11,6 +11,7 @@ extern "C" {
 /* app.c */
 hal_config_t app_hal_config(const drive_params_t *params, uint16_t can_kbit_s);
 void app_trip(app_t *app, drive_fault_t fault);
+bool app_may_run(const app_t *app); /* in this mode: a machine that is not known may be identified alone */
 
 /* app_bus.c: the node and the drive profile */
 void app_bus_init(app_t *app);
@@ -34,6 +35,7 @@ void app_identify_command(const app_t *app, drive_command_t *command); /* with w
 uint32_t app_put_parameter(app_t *app, drive_param_id_t id, int32_t value);
 uint32_t app_put_batch(app_t *app, bool open);
 uint32_t app_refused_object(const app_t *app);
+void app_judge_parameters(app_t *app); /* a fault where nothing may run with them */
 void app_take_parameters(app_t *app); /* slow, when next_ready is set */
 void app_give_parameters(app_t *app); /* the present set again: it may be good for something now */
 

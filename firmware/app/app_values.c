@@ -291,7 +291,7 @@ cia402_in_t app_drive_facts(const app_t *app)
     const uint32_t derated = (uint32_t)DRIVE_LIMIT_TEMPERATURE | (uint32_t)DRIVE_LIMIT_DC_VOLTAGE;
     const unit_t unit = unit_of(app, IN_SPEED_MECH);
     return (cia402_in_t){
-        .ready = app_ready(app) == APP_READY,
+        .ready = app_may_run(app),
         .fault = drive->fault != DRIVE_FAULT_NONE,
         .off = (drive->state == DRIVE_OFF || drive->fault != DRIVE_FAULT_NONE) && !hal_bridge_armed(app->hal),
         .following = drive->fault == DRIVE_FAULT_NONE && drive->state == DRIVE_RUNNING,

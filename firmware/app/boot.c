@@ -72,7 +72,7 @@ void app_boot(app_t *app, hal_t *hal)
     say(hal, "pmdrive on ", hal_board_name(hal));
     say(hal, "reset: ", reset_text(hal_reset_cause(hal)));
     say_last_words(hal);
-    say(hal, "parameters: ", stored ? "stored" : "none stored, the bridge stays off");
+    say(hal, "parameters: ", stored ? "stored" : "none stored, the machine may be identified and no more");
     if (unknown > 0U) {
         say_hex(hal, "  of another version, left out: ", unknown);
     }

@@ -33,12 +33,12 @@ TEST(App, WithoutStoredParametersNothingIsArmed)
     Bench x;
     x.boot(nullptr);
     EXPECT_NE(x.console().find("none stored"), std::string::npos);
-    EXPECT_EQ(x.fault(), DRIVE_FAULT_PARAMETERS);
     x.run_enabled_ms(300);
     EXPECT_FALSE(x.loop.hal.armed);
     x.send(false, true);
     x.run_ms(10);
-    EXPECT_EQ(x.fault(), DRIVE_FAULT_PARAMETERS); // no way around it
+    x.run_enabled_ms(300); // no way around it
+    EXPECT_FALSE(x.loop.hal.armed);
 }
 
 TEST(App, RefusesParametersThatTheDriveRefuses)

@@ -55,4 +55,44 @@ TEST(BusIdentification, ItsStateIsNeverThatOfTheOneBefore)
     EXPECT_EQ(x.get(0x3000, 4) & 0xFF, uint32_t(COMMISSIONING_NO_REASON));
 }
 
+// A drive that is new: nothing stored, and no motor that anyone knows
+TEST(BusIdentification, AnUnknownMachineIsIdentifiedAndNothingElse)
+{
+    Bench x;
+    x.boot(nullptr);
+    x.run_ms(5);
+    const auto enable = [&](int8_t mode) {
+        x.give(0, {1, 0});
+        for (const int word : {0x06, 0x07, 0x0F}) {
+            x.control(uint16_t(word), mode, 0);
+        }
+    };
+    for (const auto mode : {int8_t(3), int8_t(4), int8_t(-1)}) {
+        enable(mode);
+        x.run_ms(50);
+        EXPECT_FALSE(x.loop.hal.armed) << int(mode);
+        EXPECT_EQ(x.statusword() & 0x4F, 0x40) << int(mode);
+    }
+    ASSERT_EQ(x.set(0x3000, 1, COMMISSIONING_RESISTANCE), 0U);
+    enable(-2);
+    for (int done = 0; done < 10000 && (x.get(0x3000, 2) & 0xFF) != uint32_t(COMMISSIONING_DONE);
+         done += 100) {
+        x.run_ms(100);
+        x.control(0x0F, done < 500 ? -2 : 3, 0); // another mode is for the next time
+        EXPECT_EQ(x.loop.app.drive.command.mode, DRIVE_MODE_IDENTIFY);
+    }
+    EXPECT_EQ(x.get(0x3000, 2) & 0xFF, uint32_t(COMMISSIONING_DONE));
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    x.control(0x06, 3, 0);
+    x.run_ms(20);
+    enable(3);
+    x.run_ms(50);
+    EXPECT_FALSE(x.loop.hal.armed);
+    EXPECT_EQ(x.get(0x2010, 3) & 0xFF, uint32_t(APP_NOT_STORED));
+    EXPECT_EQ(x.set(0x1010, 4, 0x65766173), 0U); // what was found is the user's now
+    enable(3);
+    x.run_ms(50);
+    EXPECT_TRUE(x.loop.hal.armed);
+}
+
 } // namespace

@@ -3,6 +3,8 @@ from . import attend, identify, names, tune
 from .errors import NotDone, UsageError
 from .output import show, show_changes
 
+RESTART = 3  # parameters_ready
+
 
 def add(command):
     sub = command("identify", "measure the machine: the motor turns; shows what would change, asks, writes", identify_machine)
@@ -45,9 +47,13 @@ def _name_plate(arguments, drive, out):
     current, pole_pairs, speed, dc_link = numbers
     out.line("to begin with, from the name plate; what is not written there is a guess:")
     values = identify.name_plate(drive, current, int(pole_pairs), speed, dc_link)
-    if _take(arguments, drive, out, values, "name plate") and drive.read("parameters_ready") in (1, 3):
-        drive.save()  # over-current comparators take their level at the start
+    if _take(arguments, drive, out, values, "name plate") and drive.read("parameters_ready") == RESTART:
+        # Over-current comparators take their level at the start. The guesses are not stored as the machine's values.
+        drive.save("application")
         drive.reset()
+        drive.load(values)
+        if "fault" in drive.state():  # the limits alone were not right with the machine that it had
+            drive.clear_fault()
 
 
 def _entry_or_zero(name, text):

@@ -176,7 +176,7 @@ ENTRIES = (
     Entry(0x2010, 1, "parameter_batch", "parameter_set", "u8", "off", "", 0, 0, 0, 1, 0, False, False, "none", "none", {0: 'every write is checked against all others', 1: 'writes wait until 0 checks them together'}, 'to change several that depend on each other; refused together, all are undone', ""),
     Entry(0x2010, 2, "parameter_refused", "parameter_set", "u32", "read", "", 0, 0, None, None, None, False, False, "none", "none", {}, ('index * 256 + sub-index of what the last check of all together refused, 0: '
  'none'), ""),
-    Entry(0x2010, 3, "parameters_ready", "parameter_set", "u8", "read", "", 0, 0, None, None, None, False, False, "none", "none", {0: 'ready', 1: 'nothing stored yet', 2: 'refused', 3: 'store and restart are needed', 4: 'a batch is open'}, 'whether the bridge may be switched on', ""),
+    Entry(0x2010, 3, "parameters_ready", "parameter_set", "u8", "read", "", 0, 0, None, None, None, False, False, "none", "none", {0: 'ready', 1: 'no machine stored: it may be identified', 2: 'refused', 3: 'store and restart are needed', 4: 'a batch is open'}, 'whether the bridge may be switched on', ""),
     Entry(0x2010, 4, "stored_dropped", "parameter_set", "u16", "read", "", 0, 0, None, None, None, False, False, "none", "none", {}, 'stored values that another version left and this one does not know', ""),
     Entry(0x2010, 5, "parameters_open", "parameter_set", "u32", "live", "", 0, 0, None, None, 0, False, False, "none", "none", {}, ('write "open" (6E65 706Fh) before objects with access locked; 0, NMT stop, a '
  'lost master or a reset close: 1 open, 0 closed'), ""),
