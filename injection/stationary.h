@@ -6,7 +6,7 @@
  * frame:
  *   c   = I_p e^{j g} + I_n e^{j (2 theta + theta_m - g)},  I_p = F L_sa / D,  I_n = F K / D
  * Only I_n shows the position; an error of I_p moves it by (dI_p / 2 I_n) sin 2 theta. So I_p is detected
- * first, on alpha and then on beta, eight values at 1 kHz each; I_n cancels, but for what the rotor turns by
+ * first, on alpha and then on beta, sixteen values at 1 kHz each; I_n cancels, but for what the rotor turns by
  * in the time t between:
  *   found = mean of (c along g - I_n omega t sin 2 theta^) / I_p(i_q)
  * Not I_n cos 2 theta^ of each: the estimate moves with the error that I_p makes, and would hide all of it at
@@ -47,7 +47,7 @@ static inline bool stationary_finding(const stationary_t *self)
     return self->finding > 0U;
 }
 
-#define STATIONARY_VALUES 64U /* a power of two */
+#define STATIONARY_VALUES 32U /* a power of two */
 
 static inline bool stationary_on_beta(const stationary_t *self)
 {
