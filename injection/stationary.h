@@ -6,8 +6,8 @@
  * frame:
  *   c   = I_p e^{j g} + I_n e^{j (2 theta + theta_m - g)},  I_p = F L_sa / D,  I_n = F K / D
  * Only I_n shows the position; an error of I_p moves it by (dI_p / 2 I_n) sin 2 theta. So I_p is detected
- * first, on alpha and then on beta, sixteen values at 1 kHz each; I_n cancels, but for what the rotor turns by
- * in the time t between:
+ * first, on alpha, on beta and on both once more, eight values at 1 kHz each; I_n cancels, but for what the
+ * rotor turns by in the time t between:
  *   found = mean of (c along g - I_n omega t sin 2 theta^) / I_p(i_q)
  * Not I_n cos 2 theta^ of each: the estimate moves with the error that I_p makes, and would hide all of it at
  * 45 degrees. Then the carrier stays on alpha, and I_p follows the load as the saliency map does:
@@ -32,7 +32,7 @@ typedef struct {
 
 typedef struct {
     pm_q_t found;     /* a sum while it is found */
-    uint16_t finding; /* values left: the first half on alpha, the second on beta; 0: found */
+    uint16_t finding; /* values left; 0: found */
 } stationary_t;
 
 void stationary_reset(stationary_t *self, const stationary_config_t *config);
@@ -47,11 +47,12 @@ static inline bool stationary_finding(const stationary_t *self)
     return self->finding > 0U;
 }
 
-#define STATIONARY_VALUES 32U /* a power of two */
+#define STATIONARY_VALUES 32U
+#define STATIONARY_ON_ONE 8U /* axis, then on the other; both powers of two */
 
 static inline bool stationary_on_beta(const stationary_t *self)
 {
-    return self->finding > 0U && self->finding <= STATIONARY_VALUES / 2U;
+    return self->finding > 0U && ((self->finding - 1U) & STATIONARY_ON_ONE) == 0U;
 }
 
 /* x along the axis. */

@@ -6,7 +6,7 @@
 /* Injection settles on the position of the pulses, without torque. */
 #define SETTLE_MS 30
 /* More for one whose carrier lies along axes of the stator: it detects I_p first (injection/stationary.h). */
-#define SETTLE_STATOR_MS 46
+#define SETTLE_STATOR_MS 60
 /* Standstill that ends a stop. */
 #define STILL_MS 20
 
