@@ -26,7 +26,8 @@ static bool is_zero(const pulses_config_t *config, pm_abc_t i)
     return pm_abs(i.a) < config->i_zero && pm_abs(i.b) < config->i_zero && pm_abs(i.c) < config->i_zero;
 }
 
-/* The output of a step acts over the next period, so a pulse commanded in n steps ends at step n + 1. */
+/* The output of a step acts over the next period, so a pulse commanded in n steps ends at step n + 2. A zero vector
+ * follows it: with all low switches on, shunts below them see the current at that instant. */
 static pm_procedure_t drive_pulse(pulses_t *self, const pulses_config_t *config, uint32_t axis, bool reverse,
                                   pm_abc_t i, pulses_out_t *out)
 {
@@ -41,7 +42,7 @@ static pm_procedure_t drive_pulse(pulses_t *self, const pulses_config_t *config,
         self->timer = 0;
         self->quiet = 0;
     } else {
-        /* the last period is running */
+        out->driven = true;
     }
     return PM_RUNNING;
 }

@@ -2,8 +2,8 @@
  * 9.2 to 9.4.2): what the methods that find the initial position by pulses share.
  *
  * A pulse along the axis g_x of a leg, + (this leg high against the two others) or - (low against them), is n
- * periods at a duty cycle from zero current; then all switches are off and the diodes drive the current back
- * to zero. i is measured at its end in all three legs.
+ * periods at a duty cycle from zero current; then, after a period of the zero vector, all switches are off and the
+ * diodes drive the current back to zero. i is measured at the pulse's end in all three legs.
  *
  * Two values or one of each axis stand in e, row x: of + minus -, or of + alone.
  *   y = sum_x e_x e^{j g_x}

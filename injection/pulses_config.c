@@ -1,7 +1,7 @@
 #include "firmware/params/maker.h"
 #include "injection/pulses.h"
 
-/* Flux that gives i_pulse along the d-axis, by whole periods at a duty <= 1. */
+/* Flux that gives i_pulse along the d-axis, by whole periods at a duty at which the currents are seen. */
 void make_pulses(maker_t *m, pulses_config_t *c)
 {
     const pm_num_t L_d = si(m, DRIVE_PARAM_L_d);
@@ -9,16 +9,17 @@ void make_pulses(maker_t *m, pulses_config_t *c)
     const pm_num_t flux = pm_num_mul(si(m, DRIVE_PARAM_i_pulse), L_d);
     const pm_num_t per_period = mul3(pm_num_ratio(2, 3), si(m, DRIVE_PARAM_v_dc_nominal), m->base.t_s);
     const pm_num_t exact = pm_num_div(flux, per_period);
+    const pm_num_t most = pm_num_ratio(seen_on_time(m), PM_SHARE_ONE);
     int32_t whole;
-    if (!pm_num_to_fixed(pm_num_add(exact, pm_num_ratio(1, 2)), 0, &whole) || whole > 10000) {
+    if (!pm_num_to_fixed(pm_num_add(pm_num_div(exact, most), pm_num_ratio(1, 2)), 0, &whole) ||
+        whole > 10000) {
         refuse(m, DRIVE_PARAM_i_pulse, "pulse longer than 10000 periods");
         return;
     }
     whole = whole < 1 ? 1 : whole;
     c->periods = (uint16_t)whole;
     c->timeout = (uint16_t)(8 * whole + 50);
-    const pm_num_t duty = pm_num_div(exact, pm_num(whole));
-    c->duty = fixed(m, least(duty, pm_num(1)), Q_BITS, DRIVE_PARAM_i_pulse);
+    c->duty = fixed(m, least(pm_num_div(exact, pm_num(whole)), most), Q_BITS, DRIVE_PARAM_i_pulse);
     const pm_num_t noise = pm_num_div(si(m, DRIVE_PARAM_i_noise), m->base.i);
     /* five times the noise, and no less than four steps of a 12-bit converter */
     c->i_zero = fixed(m, pm_num_mul(pm_num(5), noise), Q_BITS, DRIVE_PARAM_i_noise);

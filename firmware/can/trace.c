@@ -34,31 +34,52 @@ static inline void put(const trace_t *trace, int16_t *sample, uint32_t n)
     sample[n] = (int16_t)limited(*trace->source[n]);
 }
 
-/* Straight-line code, entered at the number of signals. */
-static inline void take(const trace_t *trace, int16_t *sample)
+/* n and the next: two sources come with one load. */
+static inline void put_two(const trace_t *trace, int16_t *sample, uint32_t n)
 {
-    switch (trace->count) {
+    const volatile int32_t *first = trace->source[n];
+    const volatile int32_t *second = trace->source[n + 1U];
+    sample[n] = (int16_t)limited(*first);
+    sample[n + 1U] = (int16_t)limited(*second);
+}
+
+static inline void put_four(const trace_t *trace, int16_t *sample, uint32_t n)
+{
+    put_two(trace, sample, n + 2U);
+    put_two(trace, sample, n);
+}
+
+/* Straight-line code for each number of signals. */
+static inline void take(const trace_t *trace, int16_t *sample, uint32_t count)
+{
+    switch (count) {
     case 8:
-        put(trace, sample, 7);
-        __attribute__((fallthrough));
+        put_four(trace, sample, 4);
+        put_four(trace, sample, 0);
+        break;
     case 7:
         put(trace, sample, 6);
-        __attribute__((fallthrough));
+        put_two(trace, sample, 4);
+        put_four(trace, sample, 0);
+        break;
     case 6:
-        put(trace, sample, 5);
-        __attribute__((fallthrough));
+        put_two(trace, sample, 4);
+        put_four(trace, sample, 0);
+        break;
     case 5:
         put(trace, sample, 4);
-        __attribute__((fallthrough));
+        put_four(trace, sample, 0);
+        break;
     case 4:
-        put(trace, sample, 3);
-        __attribute__((fallthrough));
+        put_four(trace, sample, 0);
+        break;
     case 3:
         put(trace, sample, 2);
-        __attribute__((fallthrough));
+        put_two(trace, sample, 0);
+        break;
     case 2:
-        put(trace, sample, 1);
-        __attribute__((fallthrough));
+        put_two(trace, sample, 0);
+        break;
     case 1:
         put(trace, sample, 0);
         break;
@@ -66,18 +87,19 @@ static inline void take(const trace_t *trace, int16_t *sample)
         pm_assume(false);
         break;
     }
-    if (trace->angle != NULL) {
-        sample[trace->angle_at] = *trace->angle;
+    const volatile int16_t *angle = trace->angle;
+    const uint32_t angle_at = trace->angle_at;
+    if (angle != NULL) {
+        sample[angle_at] = *angle;
     }
 }
 
 /* The trigger signal against the level: negative when the edge has come, between the last sample and this one. */
-static inline int32_t edge(trace_t *trace, const int16_t *sample)
+static inline int32_t edge(trace_t *trace, const int16_t *sample, int32_t before)
 {
     const pm_pair_t at = pm_pair(&trace->trigger, &trace->level);
     const pm_pair_t edges = pm_pair(&trace->falling, &trace->either);
     const int32_t now = (sample[at.first] - at.second) ^ edges.first;
-    const int32_t before = trace->before;
     trace->before = now;
     return (before ^ now) & (before | edges.second);
 }
@@ -87,14 +109,15 @@ static inline void fill(trace_t *trace, const int16_t *sample)
 {
     trace->before_left--;
     if (pm_rarely(trace->before_left == 0U)) {
-        (void)edge(trace, sample);
+        (void)edge(trace, sample, 0);
         trace->state = TRACE_WAITING;
     }
 }
 
 static inline void await(trace_t *trace, const int16_t *sample)
 {
-    if ((edge(trace, sample) | trace->forced) < 0) {
+    const pm_pair_t last = pm_pair(&trace->before, &trace->forced);
+    if ((edge(trace, sample, last.first) | last.second) < 0) {
         trace->state = TRACE_TRIGGERED;
     }
 }
@@ -111,10 +134,12 @@ static inline void finish(trace_t *trace)
 void trace_record(trace_t *given)
 {
     trace_t *trace = near(given);
+    const uint32_t divider = trace->divider;
+    const uint32_t count = trace->count;
     int16_t *sample = trace->next;
-    trace->countdown = trace->divider;
-    take(trace, sample);
-    int16_t *next = &sample[trace->count];
+    trace->countdown = divider;
+    take(trace, sample, count);
+    int16_t *next = &sample[count];
     trace->next = next == trace->end ? trace->ring : next;
     const trace_state_t state = trace->state;
     if (state == TRACE_WAITING) {

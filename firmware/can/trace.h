@@ -59,15 +59,15 @@ typedef struct {
     const volatile int16_t *angle; /* the upper half of the one that is an angle; NULL: there is none */
     uint32_t angle_at;             /* its place */
     volatile trace_state_t state;
-    uint32_t before_left;    /* samples up to WAITING, */
-    uint32_t after_left;     /* and after the trigger's, up to COMPLETE */
-    int32_t trigger;         /* place of the signal */
-    int32_t level;           /* raw */
-    int32_t falling;         /* -1: the edge that counts is falling */
-    int32_t either;          /* -1: both count */
-    int32_t before;          /* the last sample: negative, the edge can come */
-    volatile int32_t forced; /* -1: trigger as soon as there is enough before */
-    uint32_t place;          /* of the trigger's sample */
+    uint32_t before_left; /* samples up to WAITING, */
+    uint32_t after_left;  /* and after the trigger's, up to COMPLETE */
+    int32_t trigger;      /* place of the signal */
+    int32_t level;        /* raw */
+    int32_t falling;      /* -1: the edge that counts is falling */
+    int32_t either;       /* -1: both count */
+    int32_t before;       /* the last sample: negative, the edge can come */
+    int32_t forced;       /* -1: trigger as soon as there is enough before */
+    uint32_t place;       /* of the trigger's sample */
 
     /* as set */
     uint32_t size; /* of the ring */

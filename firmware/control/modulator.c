@@ -15,6 +15,15 @@ void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t 
     const int32_t all = config->compensate ? pm_shl(pm_sat(lost, PM_SHARE_BITS - 2), PM_HEIGHT_BITS) : 0;
     self->far = pm_frac(all, config->far);
     self->near = all - self->far;
+    self->room = PM_UNIT_MAX;
+    if (config->top != PM_SHARE_ONE) {
+        const int32_t may_lose = pm_sat(lost, PM_SHARE_BITS - 2);
+        self->lowest = config->dead + may_lose;
+        self->seen = config->top - may_lose - MODULATOR_ROUNDING;
+        self->room = pm_share_to_unit(2 * self->seen - PM_SHARE_ONE);
+        const int32_t all_seen = self->seen - self->lowest - MODULATOR_ROUNDING;
+        self->per_seen = self->all ? pm_div(PM_ONE, pm_shl(all_seen, PM_Q_BITS - PM_SHARE_BITS)) : PM_ONE;
+    }
 }
 
 /* The common part of the legs is free. Here it is that of phase A with b = -c: then the mean of the smallest
@@ -53,28 +62,69 @@ static inline int32_t zones_sub(int32_t sum, int32_t x, pm_pair_t height)
     return pm_mulh_sub(near, pm_shl_sat(x, PM_ZONE_LIFT - 3, PM_ZONE_BITS + PM_ZONE_LIFT), height.second);
 }
 
+/* A bit: 1, 2 or 4. */
+static inline int32_t largest(const pm_abc_t *leg)
+{
+    const bool b = leg->b > leg->a;
+    const bool c = -leg->c > pm_max(leg->a, leg->b);
+    return c ? 4 : b ? 2 : 1;
+}
+
+/* Legs as shares of the period, around `centre`, with what they lose. */
+static inline void write_shares(const modulator_t *self, const modulator_config_t *config, const centred_t *u,
+                                int32_t centre, int32_t per_volt, pm_ab_t i_quarter, modulator_out_t *out)
+{
+    const pm_abc_t i = lost_by(config, i_quarter);
+    const int32_t whole = config->whole;
+    const pm_pair_t lost = pm_pair(&self->near, &self->far);
+    const int32_t a = zones_add(pm_mulh_add(centre, u->leg.a, per_volt), i.a, lost);
+    const int32_t b = zones_add(pm_mulh_add(centre, u->leg.b, per_volt), i.b, lost);
+    const int32_t c = zones_sub(pm_mulh_sub(centre, u->leg.c, per_volt), i.c, lost);
+    out->on[0] = pm_share_of(a, whole);
+    out->on[1] = pm_share_of(b, whole);
+    out->on[2] = pm_share_of(c, whole);
+}
+
+/* Beyond the hexagon the span becomes the whole period: the vector is shortened along its own direction. */
+static inline pm_ab_t shorten(modulator_t *self, pm_ab_t v, pm_q_t v_dc, int32_t per_volt)
+{
+    const int32_t ratio = pm_mulh(v_dc, per_volt); /* 1 and a little when the span is just too large */
+    self->limited = ratio;
+    return (pm_ab_t){.alpha = pm_times_share(v.alpha, ratio), .beta = pm_times_share(v.beta, ratio)};
+}
+
+/* Where a low-side shunt would not see the largest leg, the legs are as low as they can be. */
+static inline void lower(modulator_t *self, const modulator_config_t *config, const centred_t *u, pm_q_t v_dc,
+                         pm_ab_t i_quarter, modulator_out_t *out)
+{
+    const pm_q_t needed = pm_mul_sat(u->span, self->per_seen);
+    const int32_t per_volt = pm_per_volt(pm_max(needed, v_dc));
+    if (needed > v_dc) {
+        out->v = shorten(self, out->v, v_dc, per_volt);
+    }
+    const int32_t half = pm_mulh(pm_half(u->span), per_volt);
+    const int32_t centre = pm_min(self->lowest + half, PM_SHARE_HALF);
+    if (centre + half > self->seen) {
+        self->hidden += MODULATOR_NEXT * largest(&u->leg);
+    }
+    write_shares(self, config, u, centre, per_volt, i_quarter, out);
+}
+
 void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
                     pm_ab_t i_quarter, modulator_out_t *out)
 {
     const centred_t u = centred(v);
-    /* beyond the hexagon the span becomes the whole period: the vector is shortened along its own direction */
-    const int32_t per_volt = pm_per_volt(pm_max(u.span, v_dc));
-    out->limited = u.span > v_dc;
-    if (pm_rarely(out->limited)) {
-        const int32_t ratio = pm_mulh(v_dc, per_volt); /* 1 and a little when the span is just too large */
-        v = (pm_ab_t){.alpha = pm_times_share(v.alpha, ratio), .beta = pm_times_share(v.beta, ratio)};
-        self->limited = ratio;
-    }
-    const pm_abc_t i = lost_by(config, i_quarter);
-    const int32_t counts = config->counts;
-    const pm_pair_t lost = pm_pair(&self->near, &self->far);
-    const int32_t a = zones_add(pm_mulh_add(PM_SHARE_HALF, u.leg.a, per_volt), i.a, lost);
-    const int32_t b = zones_add(pm_mulh_add(PM_SHARE_HALF, u.leg.b, per_volt), i.b, lost);
-    const int32_t c = zones_sub(pm_mulh_sub(PM_SHARE_HALF, u.leg.c, per_volt), i.c, lost);
-    out->on[0] = pm_share_of(a, counts);
-    out->on[1] = pm_share_of(b, counts);
-    out->on[2] = pm_share_of(c, counts);
+    pm_q_t link = v_dc;
     out->v = v;
+    if (pm_rarely(pm_half(u.span) > pm_mulh(v_dc, self->room))) {
+        if (pm_rarely(config->top != PM_SHARE_ONE)) {
+            lower(self, config, &u, v_dc, i_quarter, out);
+            return;
+        }
+        link = u.span;
+        out->v = shorten(self, v, v_dc, pm_per_volt(link));
+    }
+    write_shares(self, config, &u, PM_SHARE_HALF, pm_per_volt(link), i_quarter, out);
 }
 
 #if PM_CARRIES(NEEDS_HALVES)

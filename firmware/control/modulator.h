@@ -15,6 +15,18 @@
  * The returned vector is the one without compensation, which is what the motor then receives. Legs are
  * shares of the period up to the last step, where one saturation keeps each within the timer's counts.
  *
+ * Low-side shunts see currents while the lower switch conducts, from dead time and `t_settle` after the last
+ * edge until the sample at the centre of the zero vector: a leg is hidden when its on-time is above
+ *   top = 1 - 2 f_pwm (T_dt + t_settle)
+ * Where the largest of the centred legs would be, all are moved down until the lowest is on for just the dead
+ * time and what it may lose, which the motor does not see. If that leg is hidden all the same, two currents are
+ * measured and the third follows. The middle leg is seen as long as the vector stays within
+ *   2/3 top' v_dc,   top' = top - T_dt f_pwm - 2 lost
+ * which is part of the voltage limit, modulator_reach(): all of v_dc/sqrt(3) from top' = 0.866 on. While `all` is
+ * set the vector is shortened further, so that the largest leg stays below top': the leg that a carrier hides
+ * would be another in each period.
+ * With t_settle = 0, shunts in the lines, nothing of this happens.
+ *
  * modulator_step() once per period; the output holds over the next one, so i is the current expected there.
  * One division. modulator_slow() at 1 kHz with the link voltage, and once before the first step. Range:
  * |v| < 4, v_dc >= 1/16, timer_counts < 2^15. Tests: tests/unit/control/modulator_test.cpp,
@@ -33,6 +45,8 @@ extern "C" {
 
 typedef struct {
     int32_t counts;     /* timer counts of half a period */
+    int32_t whole;      /* the same for pm_share_of() */
+    int32_t top;        /* on-time above which the current of a leg is hidden, Q20; one: never */
     int32_t zone_alpha; /* pm_mulh(zone / 4, zone_alpha) = 2^PM_ZONE_BITS */
     int32_t zone_beta;  /* sqrt(3)/2 zone_alpha */
     pm_frac_t far;      /* share of the second part: 1/4 or 0 */
@@ -42,14 +56,20 @@ typedef struct {
 } modulator_config_t;
 
 typedef struct {
+    int32_t hidden;    /* legs of the last period's output in bits 8 to 10, of the one before in 0 to 2 */
     int32_t near, far; /* share that dead time and drops take, in two parts, Q33; together below a quarter */
     int32_t limited;   /* not 0 when the vector was shortened: the share of it; the reader clears it */
+    pm_unit_t room;    /* share of v_dc up to which the span of centred legs hides none */
+    /* of low-side shunts, on-times without compensation, Q20: */
+    int32_t seen;    /* the largest leg's up to which its current is seen */
+    int32_t lowest;  /* the lowest leg's when they are moved down */
+    pm_q_t per_seen; /* with `all`, 1 over the on-time of a vector that hides none; else 1 */
+    bool all;        /* hide none: the user's choice, before modulator_slow() */
 } modulator_t;
 
 typedef struct {
     int32_t on[3]; /* 0 ... counts */
     pm_ab_t v;     /* realised */
-    bool limited;  /* the vector was shortened */
 } modulator_out_t;
 
 void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t v_dc);
@@ -57,6 +77,22 @@ void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t 
 /* i_quarter: a quarter of the current, Q26. */
 void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
                     pm_ab_t i_quarter, modulator_out_t *out);
+
+/* A period in `hidden`. */
+#define MODULATOR_NEXT 256
+
+/* Of a share: what pm_per_volt() may be too large by. */
+#define MODULATOR_ROUNDING (PM_SHARE_ONE / 2048)
+
+/* Legs whose current is not valid in the sample between the last two outputs that have begun: a bit each.
+ * Once a period, before modulator_step(), while `hidden` is not zero. */
+static inline uint32_t modulator_take_hidden(modulator_t *self)
+{
+    const uint32_t hidden = (uint32_t)self->hidden;
+    const uint32_t last = hidden / (uint32_t)MODULATOR_NEXT;
+    self->hidden = (int32_t)last;
+    return (hidden | last) & 7U;
+}
 
 #if PM_CARRIES(NEEDS_HALVES)
 /* Compare values of both halves, in counts: the first half is given `split` more of voltage and the second as
@@ -67,6 +103,10 @@ void modulator_split(modulator_t *self, const modulator_config_t *config, pm_ab_
 #endif
 
 void make_modulator(maker_t *m, modulator_config_t *c);
+
+/* Share of v_dc within which low-side shunts see two currents in every direction, at the smallest link voltage;
+ * PM_UNIT_MAX with shunts in the lines. */
+pm_unit_t modulator_reach(maker_t *m, const modulator_config_t *c);
 
 #ifdef __cplusplus
 }

@@ -21,6 +21,11 @@ void make_modulator(maker_t *m, modulator_config_t *c)
     const pm_num_t zone = pm_num_div(two_parts ? by_capacitance : least_zone, m->base.i);
     c->far = two_parts ? PM_FRAC(0.25) : 0;
     c->counts = m->params->timer_counts;
+    c->whole = pm_share_whole(c->counts);
+    c->top = seen_on_time(m);
+    if (c->top < PM_SHARE_HALF) { /* more would be no use */
+        refuse(m, DRIVE_PARAM_t_settle, "leaves less than half of a period at f_pwm");
+    }
     c->dead = fixed(m, duty, PM_SHARE_BITS, DRIVE_PARAM_dead_time);
     c->drop = per_unit(m, DRIVE_PARAM_device_drop, m->base.v);
     const pm_num_t per_zone = pm_num_div(pm_num(1), zone);
@@ -29,4 +34,15 @@ void make_modulator(maker_t *m, modulator_config_t *c)
     c->zone_beta =
         fixed(m, pm_num_mul(per_zone, pm_num_sqrt(pm_num_ratio(3, 4))), bits, DRIVE_PARAM_comp_zone);
     c->compensate = m->params->dead_time_comp != 0;
+}
+
+pm_unit_t modulator_reach(maker_t *m, const modulator_config_t *c)
+{
+    if (c->top == PM_SHARE_ONE) {
+        return PM_UNIT_MAX;
+    }
+    const pm_q_t v_dc = per_unit(m, DRIVE_PARAM_v_dc_min, m->base.v);
+    const int32_t lost = c->dead + pm_mulh(c->drop, pm_per_volt(pm_max(v_dc, PM_Q(0.0625))));
+    const int32_t top = c->top - c->dead - 2 * lost - MODULATOR_ROUNDING;
+    return pm_unit(pm_share_to_unit(top), PM_UNIT(2.0 / 3.0));
 }

@@ -126,6 +126,7 @@ static void make_limits(maker_t *m, drive_config_t *config)
     config->omega_max = speed(m, DRIVE_PARAM_speed_max);
     config->v_share = fixed(m, pm_num_mul(si(m, DRIVE_PARAM_voltage_limit), pm_num_sqrt(pm_num_ratio(1, 3))),
                             UNIT_BITS, DRIVE_PARAM_voltage_limit);
+    config->v_share = pm_min(config->v_share, modulator_reach(m, &config->modulator));
     config->machine.R_s = per_unit(m, DRIVE_PARAM_R_s, m->impedance);
     config->machine.L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
     config->machine.L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);
@@ -174,6 +175,9 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     make_regulator(&m, &config->regulator);
     if (config->injection && (regulator_traits(config->regulator.id) & REGULATOR_SWITCHES) != 0U) {
         refuse(&m, DRIVE_PARAM_regulator, "cannot add an injected voltage: start_method 2");
+    }
+    if (params->t_settle != 0 && (regulator_traits(config->regulator.id) & REGULATOR_SWITCHES) != 0U) {
+        refuse(&m, DRIVE_PARAM_regulator, "hides currents from low-side shunts");
     }
     make_speed_control(&m, &config->speed);
     make_mtpa(&m, &config->mtpa);

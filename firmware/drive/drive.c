@@ -99,38 +99,32 @@ const drive_fault_record_t *drive_fault_record(const drive_t *drive)
     return &drive->record;
 }
 
-#if PM_CARRIES(NEEDS_CURRENT_MASK)
 /* The currents sum to zero, so one that is missing follows from the others; with fewer than two those of the
  * period before stand. */
-PM_RARE static pm_abc_t complete(const drive_t *drive, pm_abc_t i, uint32_t missing)
+static inline pm_abc_t complete(const drive_t *drive, pm_abc_t i, uint32_t missing)
 {
-    pm_abc_t whole = i;
     switch (missing) {
+    case 0U:
+        return i;
     case 1U:
-        whole.a = -(i.b + i.c);
-        break;
+        return (pm_abc_t){.a = -(i.b + i.c), .b = i.b, .c = i.c};
     case 2U:
-        whole.b = -(i.c + i.a);
-        break;
+        return (pm_abc_t){.a = i.a, .b = -(i.c + i.a), .c = i.c};
     case 4U:
-        whole.c = -(i.a + i.b);
-        break;
+        return (pm_abc_t){.a = i.a, .b = i.b, .c = -(i.a + i.b)};
     default:
-        whole = drive->i_abc;
-        break;
+        return drive->i_abc;
     }
-    return whole;
 }
-#endif
 
-static inline pm_abc_t currents(const drive_t *drive, const uint16_t code[DRIVE_LEGS])
+static inline pm_abc_t currents(const drive_t *drive, const uint16_t code[DRIVE_LEGS], pm_q_t zero_c)
 {
     const pm_q_t *zero = drive->zero;
     const pm_pair_t zero_ab = pm_pair(&zero[0], &zero[1]);
     return (pm_abc_t){
         .a = pm_shl(code[0], CURRENT_BITS) - zero_ab.first,
         .b = pm_shl(code[1], CURRENT_BITS) - zero_ab.second,
-        .c = pm_shl(code[2], CURRENT_BITS) - zero[2],
+        .c = pm_shl(code[2], CURRENT_BITS) - zero_c,
     };
 }
 
@@ -141,7 +135,7 @@ static inline obs_more_t measure_more(const drive_t *drive, const drive_in_t *in
 #if PM_CARRIES(NEEDS_SECOND_SAMPLE)
     for (uint32_t n = 0; n < PM_SAMPLES; n++) {
         if (pm_sampled(&in->more, n)) {
-            more.i_sample[n] = pm_clarke(currents(drive, in->more.i_sample[n]));
+            more.i_sample[n] = pm_clarke(currents(drive, in->more.i_sample[n], drive->zero[2]));
         }
     }
 #endif
@@ -151,9 +145,15 @@ static inline obs_more_t measure_more(const drive_t *drive, const drive_in_t *in
 
 static inline void measure(drive_t *drive, const drive_in_t *in)
 {
-    pm_abc_t i = currents(drive, in->i_leg);
+    const pm_pair_t zero_c = pm_pair(&drive->zero[2], &drive->modulator.hidden);
+    pm_abc_t i = currents(drive, in->i_leg, zero_c.first);
+    if (pm_rarely(zero_c.second != 0)) {
+        drive->completed = drive->period;
+        i = complete(drive, i, modulator_take_hidden(&drive->modulator));
+    }
 #if PM_CARRIES(NEEDS_CURRENT_MASK)
     if (pm_rarely(in->more.missing != 0U)) {
+        drive->completed = drive->period;
         i = complete(drive, i, in->more.missing);
     }
 #endif
@@ -386,5 +386,6 @@ PM_RARE void drive_prepare(drive_t *drive)
         drive->v_share = pm_max(c->v_share - reserved, c->v_share / 4);
     }
     prepare_current_control(drive);
+    drive->modulator.all = drive->carrier;
     modulator_slow(&drive->modulator, &c->modulator, pm_max(v_dc, V_DC_LEAST));
 }

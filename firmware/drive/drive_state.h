@@ -16,7 +16,6 @@ typedef enum {
 
 struct drive {
     drive_config_t config;
-    drive_status_t status;
 
     drive_fault_t fault; /* latched; while it is set, the stage is STAGE_OFF */
     drive_state_t state;
@@ -24,6 +23,7 @@ struct drive {
     uint32_t period;
 
     pm_q_t zero[DRIVE_LEGS]; /* code of the current channels at zero current, one being full scale */
+    modulator_t modulator;   /* begins with what is hidden of the currents */
     pm_abc_t i_abc;
     pm_ab_t i_ab;
     bool hw_fault;
@@ -35,7 +35,6 @@ struct drive {
     pm_unit_t v_share;     /* share of v_dc for current control */
     pm_ab_t v_acting;      /* commanded at k-1: acts over [k, k+1) */
     pm_ab_t v_next;        /* commanded at k: acts over [k+1, k+2) */
-    modulator_t modulator;
 
     regulator_out_t voltage; /* of the current control, without carrier */
     regulator_t regulator;
@@ -51,6 +50,9 @@ struct drive {
         position_t position;   /* from STAGE_OPEN_LOOP on */
         procedure_t procedure; /* in STAGE_PROCEDURE */
     };
+
+    drive_status_t status;
+    uint32_t completed; /* the last period with a current that followed from the others */
 
     /* of 1 kHz */
     speed_control_t speed;

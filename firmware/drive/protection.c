@@ -69,7 +69,8 @@ void protection_slow(drive_t *drive)
         return;
     }
     const pm_q_t sum = drive->i_abc.a + drive->i_abc.b + drive->i_abc.c;
-    if (lasts(&drive->sum_ms, pm_abs(sum) > c->i_sum, 2)) {
+    const bool all_measured = drive->completed != drive->period; /* else their sum is zero or an old one */
+    if (all_measured && lasts(&drive->sum_ms, pm_abs(sum) > c->i_sum, 2)) {
         drive_trip(drive, DRIVE_FAULT_SENSOR_SUM);
     }
     const pm_q_t omega = drive->pll.omega;

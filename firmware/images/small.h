@@ -5,7 +5,7 @@
 
 /* clang-format off */
 #define PM_IMAGE_NAME "small"
-#define PM_IMAGE_TRACE_NUMBERS 3740U
+#define PM_IMAGE_TRACE_NUMBERS 3724U
 #define PM_CHANNELS 0x0000U
 
 #define PM_WITHOUT_deadbeat 1
@@ -15,6 +15,7 @@
 #define PM_WITHOUT_back_emf 1
 #define PM_WITHOUT_extended_emf 1
 #define PM_WITHOUT_extended_emf_ab 1
+#define PM_WITHOUT_flux_linkage 1
 #define PM_WITHOUT_sliding_mode 1
 #define PM_WITHOUT_ekf_full 1
 #define PM_WITHOUT_ekf_reduced 1

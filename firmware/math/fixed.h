@@ -158,6 +158,12 @@ static inline int32_t pm_abs(int32_t x) /* INT32_MIN -> INT32_MAX */
     return x < 0 ? pm_sub_sat(0, x) : x;
 }
 
+/* 1 where x > top, without a branch; top - x within 32 bits. */
+static inline int32_t pm_above(int32_t x, int32_t top)
+{
+    return (int32_t)((uint32_t)(top - x) >> 31);
+}
+
 /* |x| without a branch, but INT32_MIN stays. */
 static inline int32_t pm_magnitude(int32_t x)
 {
@@ -248,6 +254,7 @@ static inline int32_t pm_zone_sub(int32_t sum, int32_t x, int32_t height)
  * are clamped. */
 #define PM_SHARE_BITS 20
 #define PM_SHARE_HALF ((int32_t)1 << (PM_SHARE_BITS - 1))
+#define PM_SHARE_ONE  (2 * PM_SHARE_HALF)
 
 static inline pm_unit_t pm_share_to_unit(int32_t share)
 {
@@ -260,9 +267,15 @@ static inline int32_t pm_times_share(int32_t x, int32_t share)
     return pm_shl(pm_mulh(x, pm_shl(share, 30 - PM_SHARE_BITS)), 2);
 }
 
+/* As pm_share_of() takes it. */
+static inline int32_t pm_share_whole(int32_t whole)
+{
+    return pm_shl(whole, 32 - PM_SHARE_BITS);
+}
+
 static inline int32_t pm_share_of(int32_t share, int32_t whole)
 {
-    return pm_mulh(pm_sat_positive(share, PM_SHARE_BITS), pm_shl(whole, 32 - PM_SHARE_BITS));
+    return pm_mulh(pm_sat_positive(share, PM_SHARE_BITS), whole);
 }
 
 /* A small signal: Q32, +-0.5, saturating; for carrier currents, whose gains exceed pm_gain(). */

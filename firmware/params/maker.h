@@ -53,6 +53,15 @@ static inline pm_num_t si(const maker_t *m, drive_param_id_t id)
     return pm_num_dec(drive_param_get(m->params, id), drive_param_exp10[id]);
 }
 
+/* On-time of a leg up to which a shunt below its low switch sees its current, Q20; all of it with shunts in the
+ * lines. */
+static inline int32_t seen_on_time(const maker_t *m)
+{
+    const drive_params_t *p = m->params;
+    const int32_t blind = p->t_settle == 0 ? 0 : (p->dead_time + p->t_settle) * p->f_pwm; /* 10^-9 */
+    return PM_SHARE_ONE - pm_mulh(blind, PM_FRAC(2e-9 * PM_SHARE_ONE));
+}
+
 static inline int32_t fixed(maker_t *m, pm_num_t x, int bits, drive_param_id_t blame)
 {
     int32_t out;

@@ -11,8 +11,8 @@ uint32_t hal_channels(const hal_t *hal)
     const plant_sensor_t *sensor = plant_sensor(hal->plant);
     const bool terminals = sensor->v_leg_full_scale_V > 0.0;
     const bool neutral = terminals || sensor->v_zero_full_scale_V > 0.0;
-    const uint32_t all = NEEDS_SECOND_SAMPLE | NEEDS_CURRENT_MASK | NEEDS_HALVES | NEEDS_HELD |
-                         NEEDS_ONE_SWITCH | NEEDS_COMMUTATE | (terminals ? NEEDS_TERMINALS : 0U) |
+    const uint32_t all = NEEDS_SECOND_SAMPLE | NEEDS_HALVES | NEEDS_HELD | NEEDS_ONE_SWITCH |
+                         NEEDS_COMMUTATE | (terminals ? NEEDS_TERMINALS : 0U) |
                          (neutral ? NEEDS_NEUTRAL : 0U) |
                          (sensor->i_dc_full_scale_A > 0.0 ? NEEDS_DC_CURRENT : 0U) |
                          (sensor->capture_s > 0.0 ? NEEDS_CAPTURES : 0U) |
@@ -100,9 +100,6 @@ static void fill_more(const hal_t *hal, pm_measure_t *more)
 {
     const uint32_t channels = hal_channels(hal);
     *more = (pm_measure_t){0};
-    if ((channels & NEEDS_CURRENT_MASK) != 0U) {
-        more->missing = (uint16_t)(~hal->adc.settled & 7U);
-    }
     if ((channels & NEEDS_DC_CURRENT) != 0U) {
         more->i_dc = hal->adc.i_dc;
     }

@@ -161,20 +161,6 @@ TEST(SimChannels, CapturesOfEdges)
     EXPECT_EQ(seen[1], 1);
 }
 
-// With a low-side shunt and an upper switch that is closed all the time there is no current to measure.
-TEST(SimChannels, ACurrentThatCannotBeMeasuredIsMarked)
-{
-    plant_config_t config = machine();
-    config.sensor.shunt = PLANT_LOW_SIDE;
-    Port port(config);
-    ASSERT_TRUE(hal_bridge_arm(&port.hal));
-    port.out.legs = pm_legs_of(PM_LEG_LOW, PM_LEG_HIGH, PM_LEG_LOW);
-    for (int k = 0; k < 3; ++k) {
-        port.step();
-    }
-    EXPECT_EQ(port.in.more.missing, 2);
-}
-
 // The differential amplifier alone: its own range, and no terminals.
 TEST(SimChannels, NeutralOfTheDifferentialAmplifier)
 {

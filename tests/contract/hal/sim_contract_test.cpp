@@ -47,7 +47,7 @@ void keeps_contract(const plant_config_t &config, uint32_t without, uint32_t cha
 }
 
 constexpr uint32_t kAlways =
-    NEEDS_SECOND_SAMPLE | NEEDS_CURRENT_MASK | NEEDS_HALVES | NEEDS_HELD | NEEDS_ONE_SWITCH | NEEDS_COMMUTATE;
+    NEEDS_SECOND_SAMPLE | NEEDS_HALVES | NEEDS_HELD | NEEDS_ONE_SWITCH | NEEDS_COMMUTATE;
 
 TEST(HalContract, Sim)
 {

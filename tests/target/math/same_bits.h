@@ -60,7 +60,7 @@ static inline void same_bits_products(same_bits_t *b)
     same_bits_add(b, pm_magnitude(x));
     same_bits_add(b, pm_zone_add(y, x, z));
     same_bits_add(b, pm_zone_sub(y, x, z));
-    same_bits_add(b, pm_share_of(x, 4250));
+    same_bits_add(b, pm_share_of(x, pm_share_whole(4250)));
     same_bits_add(b, pm_rad_to_angle(x));
     same_bits_add(b, pm_angle_to_rad(x));
 }

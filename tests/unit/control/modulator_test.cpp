@@ -33,6 +33,8 @@ modulator_config_t plain(int counts = kCounts)
 {
     modulator_config_t c = {};
     c.counts = counts;
+    c.whole = pm_share_whole(counts);
+    c.top = PM_SHARE_ONE;
     return c;
 }
 
@@ -90,13 +92,17 @@ Complex realised(const modulator_out_t &out, int counts, double v_dc)
     return {(2 * u[0] - u[1] - u[2]) / 3, (u[1] - u[2]) / std::sqrt(3.0)};
 }
 
-modulator_out_t step(const modulator_config_t &c, Complex v, double v_dc, Complex i = 0)
+struct Out : modulator_out_t {
+    bool limited;
+};
+
+Out step(const modulator_config_t &c, Complex v, double v_dc, Complex i = 0)
 {
     modulator_t self = {};
-    modulator_out_t out;
+    Out out;
     modulator_slow(&self, &c, fixed(v_dc, 28));
     modulator_step(&self, &c, bench::ab(v), fixed(v_dc, 28), bench::ab(i / 4.0), &out);
-    EXPECT_EQ(self.limited != 0, out.limited);
+    out.limited = self.limited != 0;
     return out;
 }
 
@@ -108,7 +114,7 @@ TEST(Modulator, DutyIsThatOfTheTextbook)
             for (int a = 0; a < 360; a += 3) {
                 for (const double share : {0.0, 0.01, 0.3, 0.7, 1.0 - 1e-6}) {
                     const Complex v = std::polar(share * v_dc / std::sqrt(3.0), a * kDegree);
-                    const modulator_out_t out = step(c, v, v_dc);
+                    const Out out = step(c, v, v_dc);
                     const Legs duty = reference(v, v_dc);
                     const double scale = (v_dc + 1 / v_dc) * 0x1p-16 * counts / 2;
                     for (int leg = 0; leg < 3; ++leg) {
@@ -145,7 +151,7 @@ TEST(Modulator, LinearUpToTheInscribedCircleExactly)
     int limited = 0;
     for (double angle = 0; angle < 360; angle += 0.25) {
         const Complex inside = std::polar(limit * (1 - 1e-7), angle * kDegree);
-        const modulator_out_t out = step(c, inside, kLink);
+        const Out out = step(c, inside, kLink);
         ASSERT_FALSE(out.limited) << angle;
         ASSERT_EQ(out.v.alpha, bench::ab(inside).alpha);
         ASSERT_EQ(out.v.beta, bench::ab(inside).beta);
@@ -161,8 +167,7 @@ TEST(Modulator, LinearUpToTheCorners)
 {
     const modulator_config_t c = plain();
     for (int k = 0; k < 6; ++k) {
-        const modulator_out_t out =
-            step(c, std::polar(2.0 / 3 * kLink * (1 - 1e-6), k * 60 * kDegree), kLink);
+        const Out out = step(c, std::polar(2.0 / 3 * kLink * (1 - 1e-6), k * 60 * kDegree), kLink);
         EXPECT_FALSE(out.limited);
         EXPECT_NEAR(std::abs(realised(out, c.counts, kLink)), 2.0 / 3 * kLink, 1.5 * kLink / c.counts);
     }
@@ -176,7 +181,7 @@ TEST(Modulator, OvermodulationKeepsTheAngleOnTheHexagon)
         for (const double times : {1.16, 1.3, 2.0, 5.0}) {
             const double angle = a * 0.5 * kDegree;
             const Complex v = std::polar(times * kLink / std::sqrt(3.0), angle);
-            const modulator_out_t out = step(c, v, kLink);
+            const Out out = step(c, v, kLink);
             ASSERT_TRUE(out.limited);
             const Complex real_v = realised(out, c.counts, kLink);
             ASSERT_LE(std::abs(std::arg(real_v * std::polar(1.0, -angle))), kAngle_deg * kDegree) << a;
@@ -211,8 +216,9 @@ TEST(Modulator, NoVectorIsTurnedRoundAtTheLimit)
                 const pm_ab_t asked = bench::ab(amplitude * v);
                 modulator_t self = {};
                 modulator_out_t out;
+                modulator_slow(&self, &c, link);
                 modulator_step(&self, &c, asked, link, {0, 0}, &out);
-                limited += out.limited ? 1 : 0;
+                limited += self.limited != 0 ? 1 : 0;
                 const Complex ratio = bench::complex(out.v) / bench::complex(asked);
                 ASSERT_NEAR(ratio.real(), std::min(1.0, real(link) / (u.top() - u.bottom()) / amplitude),
                             3e-4)
@@ -224,6 +230,108 @@ TEST(Modulator, NoVectorIsTurnedRoundAtTheLimit)
     EXPECT_GT(limited, 1000000);
 }
 
+// Teknic's board: 0.5 us and 1.3 us of half a period of 25 us.
+modulator_config_t low_side(bool compensates)
+{
+    modulator_config_t c = compensates ? compensating(4250) : plain(4250);
+    c.dead = fixed(0.01, PM_SHARE_BITS);
+    c.top = fixed(1 - 1.8 / 25, PM_SHARE_BITS);
+    return c;
+}
+
+constexpr double kTop = 1 - 1.8 / 25, kLost = 0.01 + kDrop / kLink;
+// Two currents in every direction, relative to v_dc/sqrt(3).
+const double kReach = 2.0 / 3 * (kTop - 0.01 - 2 * kLost - 0x1p-11) * std::sqrt(3.0);
+
+// A leg above the limit is marked, and none that is not near it; two are always below it. What the motor receives is the
+// vector that is returned. At the limit a count is a leg's.
+TEST(Modulator, LowSideShuntsSeeTwoLegsUpToTheirReach)
+{
+    ASSERT_GT(kReach, 1.0);
+    for (const bool compensates : {false, true}) {
+        const modulator_config_t c = low_side(compensates);
+        const double least = kTop - 2 * kLost - 0x1p-10;
+        int marked = 0;
+        for (double size = 0.05; size < kReach; size += 0.01) {
+            for (int angle = 0; angle < 360; angle += 3) {
+                const Complex v = std::polar(size * kLink / std::sqrt(3.0), angle * kDegree);
+                modulator_t self = {};
+                modulator_out_t out;
+                modulator_slow(&self, &c, fixed(kLink, 28));
+                modulator_step(&self, &c, bench::ab(v), fixed(kLink, 28), bench::ab(v / 8.0), &out);
+                int hidden = 0;
+                for (int leg = 0; leg < 3; ++leg) {
+                    const bool mark = (self.hidden >> (8 + leg) & 1) != 0;
+                    ASSERT_TRUE(mark ? out.on[leg] > 4250 * least - 1 : out.on[leg] < 4250 * kTop + 1)
+                        << size << ' ' << angle;
+                    hidden += mark ? 1 : 0;
+                }
+                ASSERT_LE(hidden, 1) << size << ' ' << angle;
+                marked += hidden;
+                if (!compensates) {
+                    const Complex got(real(out.v.alpha, 28), real(out.v.beta, 28));
+                    ASSERT_LT(std::abs(realised(out, 4250, kLink) - got), 2 * kLink / 4250)
+                        << size << ' ' << angle;
+                    ASSERT_EQ(self.limited != 0, std::abs(got - v) > 1e-6) << size << ' ' << angle;
+                }
+            }
+        }
+        EXPECT_GT(marked, 1000);
+    }
+}
+
+// With `all`, a carrier's, none is hidden at any voltage: the vector is shortened.
+TEST(Modulator, LowSideShuntsSeeAllLegsOfACarrier)
+{
+    for (const bool compensates : {false, true}) {
+        const modulator_config_t c = low_side(compensates);
+        int limited = 0;
+        for (double size = 0.05; size < 3; size += 0.05) {
+            for (int angle = 0; angle < 360; ++angle) {
+                const Complex v = std::polar(size * kLink / std::sqrt(3.0), angle * kDegree);
+                modulator_t self = {};
+                modulator_out_t out;
+                self.all = true;
+                modulator_slow(&self, &c, fixed(kLink, 28));
+                modulator_step(&self, &c, bench::ab(v), fixed(kLink, 28), bench::ab(v / 8.0), &out);
+                ASSERT_EQ(self.hidden, 0) << size << ' ' << angle;
+                ASSERT_LT(*std::max_element(out.on, out.on + 3), 4250 * kTop + 1) << size << ' ' << angle;
+                const Complex got(real(out.v.alpha, 28), real(out.v.beta, 28));
+                ASSERT_GT((got * std::conj(v)).real(), 0.999 * std::abs(got) * std::abs(v));
+                ASSERT_GE(std::abs(got),
+                          0.999 * std::min(std::abs(v), 1.5 * kReach / 2 * kLink / std::sqrt(3.0)));
+                limited += self.limited != 0 ? 1 : 0;
+            }
+        }
+        EXPECT_GT(limited, 10000);
+    }
+}
+
+// Beyond, only one current may be left.
+TEST(Modulator, BeyondTheirReachLowSideShuntsDoNot)
+{
+    const modulator_config_t c = low_side(false);
+    modulator_t self = {};
+    modulator_out_t out;
+    modulator_slow(&self, &c, fixed(kLink, 28));
+    const Complex v = std::polar(1.06 * kReach * kLink / std::sqrt(3.0), 60 * kDegree);
+    modulator_step(&self, &c, bench::ab(v), fixed(kLink, 28), {0, 0}, &out);
+    EXPECT_GT(out.on[0], 4250 * kTop);
+    EXPECT_GT(out.on[1], 4250 * kTop);
+}
+
+// An output is at work when it has begun and until it has ended: the samples at both ends are marked.
+TEST(Modulator, AHiddenLegCountsForBothEndsOfItsPeriod)
+{
+    modulator_t self = {};
+    self.hidden = 2 * MODULATOR_NEXT;
+    EXPECT_EQ(modulator_take_hidden(&self), 2U);
+    self.hidden += 4 * MODULATOR_NEXT;
+    EXPECT_EQ(modulator_take_hidden(&self), 6U);
+    EXPECT_EQ(modulator_take_hidden(&self), 4U);
+    EXPECT_EQ(self.hidden, 0);
+}
+
 TEST(Modulator, CountsStayWithinTheTimer)
 {
     samples::Random random;
@@ -233,7 +341,7 @@ TEST(Modulator, CountsStayWithinTheTimer)
         c.compensate = (n & 1) != 0;
         const Complex v = std::polar(random.within(0, 3.99), random.within(-4, 4));
         const Complex i = std::polar(random.within(0, 2), random.within(-4, 4));
-        const modulator_out_t out = step(c, v, random.within(1.0 / 16, 1), i);
+        const Out out = step(c, v, random.within(1.0 / 16, 1), i);
         for (const int32_t on : out.on) {
             ASSERT_GE(on, 0) << n;
             ASSERT_LE(on, counts) << n;
@@ -278,7 +386,7 @@ TEST(Modulator, CompensationIsLinearInItsZone)
     for (double i = -1.5 * kZone; i <= 1.5 * kZone; i += kZone / 50) {
         const double expected = full * std::clamp(i / kZone, -1.0, 1.0);
         // i along phase A: the others carry half of it, reversed
-        const modulator_out_t out = step(c, 0, kLink, i);
+        const Out out = step(c, 0, kLink, i);
         EXPECT_NEAR(out.on[0] - centre, expected, kCompensation_counts) << i;
         const double other = full * std::clamp(-0.5 * i / kZone, -1.0, 1.0);
         EXPECT_NEAR(out.on[1] - centre, other, kCompensation_counts) << i;
@@ -311,7 +419,7 @@ TEST(Modulator, CapacitanceOfALegIsFollowedWithinItsError)
     const double full = c.modulator.counts * 2e-6 * 1e4;
     double largest = 0;
     for (double x = 0; x < 40; x += 0.05) {
-        const modulator_out_t out = step(c.modulator, 0, v_dc, x * I_1);
+        const Out out = step(c.modulator, 0, v_dc, x * I_1);
         const double given = (out.on[0] - c.modulator.counts / 2) / full;
         largest = std::max(largest, std::abs(given - lost_with_capacitance(x)));
     }
@@ -327,7 +435,7 @@ TEST(Modulator, CompensationSwitchedOffIsNone)
     for (int a = 0; a < 360; a += 5) {
         const Complex i = std::polar(0.5, a * kDegree);
         const Complex v = std::polar(0.2, 3 * a * kDegree);
-        const modulator_out_t out = step(c, v, kLink, i);
+        const Out out = step(c, v, kLink, i);
         const modulator_out_t expected = step(none, v, kLink, i);
         for (int x = 0; x < 3; ++x) {
             ASSERT_EQ(out.on[x], expected.on[x]);
@@ -353,7 +461,7 @@ struct Split {
 Split split(Complex v, Complex more, double v_dc)
 {
     const modulator_config_t c = plain();
-    const modulator_out_t out = step(c, v, v_dc);
+    const Out out = step(c, v, v_dc);
     Split s = {};
     for (int leg = 0; leg < 3; ++leg) {
         s.compare[leg][0] = s.compare[leg][1] = static_cast<uint16_t>(out.on[leg]);

@@ -113,6 +113,14 @@ const std::vector<Cross> kCrosses = {
     {"open-loop current above i_max", {{DRIVE_PARAM_i_open_loop, 5.1}}, DRIVE_PARAM_i_open_loop},
     {"pulses above the trip", {{DRIVE_PARAM_i_pulse, 9.1}}, DRIVE_PARAM_i_pulse},
     {"carrier leaves no voltage", {{DRIVE_PARAM_v_injection, 150}}, DRIVE_PARAM_v_injection},
+    {"amplifiers that settle longer than half a period",
+     {{DRIVE_PARAM_t_settle, 8e-6}, {DRIVE_PARAM_f_pwm, 30000}, {DRIVE_PARAM_timer_counts, 2833}},
+     DRIVE_PARAM_t_settle},
+    {"switches held above low-side shunts",
+     {{DRIVE_PARAM_regulator, REGULATOR_finite_set},
+      {DRIVE_PARAM_start_method, 2},
+      {DRIVE_PARAM_t_settle, 1.3e-6}},
+     DRIVE_PARAM_regulator},
 };
 
 TEST(Config, RefusesWhatCannotBeTogether)
@@ -406,6 +414,40 @@ TEST(Config, NothingIsLeftOfTheOneBefore)
     ASSERT_TRUE(drive_configure(&c, &plain, PM_CHANNELS).ok);
     EXPECT_EQ(c.position.observer.active_flux.model.L_q2, 0);
     EXPECT_EQ(c.mtpa.h, 0);
+}
+
+// 1.3.2.1: legs at the bottom, the middle one still seen: 2/3 of the share of the period that is left.
+TEST(Config, LowSideShuntsBoundTheVoltage)
+{
+    for (const double f_pwm : {10e3, 20e3, 40e3}) {
+        const drive_params_t in_line =
+            changed({{DRIVE_PARAM_voltage_limit, 1.1547}, {DRIVE_PARAM_f_pwm, f_pwm}});
+        drive_params_t below = in_line;
+        drive_param_set(&below, DRIVE_PARAM_t_settle, 1300);
+        const double dead = 2e-6 * f_pwm;
+        const double lost = dead + 1.0 / 60; // the device drop at the smallest link voltage
+        const double top = 1 - 2 * f_pwm * 3.3e-6 - dead - 2 * lost - 0x1p-11;
+        EXPECT_NEAR(std::ldexp(configure(in_line).v_share, -31), 2.0 / 3, 1e-4);
+        EXPECT_NEAR(std::ldexp(configure(below).v_share, -31), 2.0 / 3 * top, 3e-5) << f_pwm;
+    }
+}
+
+// The flux of a pulse is that asked for, at a duty that leaves the currents to be seen.
+TEST(Config, PulsesAreAsLongAsTheirFluxAsks)
+{
+    for (const double t_settle : {0.0, 1.3e-6, 5e-6}) {
+        for (double i_pulse = 0.4; i_pulse < 4; i_pulse *= 1.07) {
+            const drive_params_t p = changed({{DRIVE_PARAM_t_settle, t_settle},
+                                              {DRIVE_PARAM_i_pulse, i_pulse},
+                                              {DRIVE_PARAM_start_method, 1},
+                                              {DRIVE_PARAM_f_pwm, 20e3}});
+            const pulses_config_t c = configure(p).pulses;
+            const double whole = p.i_pulse * 1e-3 * p.L_d * 1e-9 / (2.0 / 3 * p.v_dc_nominal * 1e-3 / 20e3);
+            const double top = t_settle > 0 ? 1 - 2 * 20e3 * (2e-6 + t_settle) : 1;
+            ASSERT_LE(real(c.duty), top + 1e-5) << t_settle << ' ' << i_pulse;
+            ASSERT_NEAR(real(c.duty) * c.periods, whole, 3e-4 * whole) << t_settle << ' ' << i_pulse;
+        }
+    }
 }
 
 // Without dead time there is nothing that the capacitance of a leg could give back.

@@ -114,6 +114,23 @@ TEST_F(CurrentMask, TheMissingOneFollowsFromTheOthers)
     }
 }
 
+TEST_F(CurrentMask, AHiddenOneFollowsFromTheOthersForTwoPeriods)
+{
+    for (uint16_t leg = 0; leg < 3; ++leg) {
+        drive_in_t in = x.in;
+        in.i_leg[leg] = 0x8000;
+        x.d.modulator.hidden = MODULATOR_NEXT << leg;
+        for (int period = 0; period < 2; ++period) {
+            drive_step(&x.d, &in, &x.out);
+            expect_currents();
+            EXPECT_EQ(x.d.completed, x.d.period);
+        }
+        drive_step(&x.d, &in, &x.out);
+        EXPECT_NE(x.d.completed, x.d.period);
+        EXPECT_GT(std::abs(x.d.i_ab.alpha - 67108864) + std::abs(x.d.i_ab.beta), 1000000) << leg;
+    }
+}
+
 TEST_F(CurrentMask, WithFewerThanTwoTheLastStand)
 {
     drive_step(&x.d, &x.in, &x.out);

@@ -317,6 +317,17 @@ TEST(Protection, LimitsThemselvesAreAllowed)
             EXPECT_EQ(calls(x, 100), beyond ? 3 : 100);
             EXPECT_EQ(x.d.fault, beyond ? DRIVE_FAULT_SENSOR_SUM : DRIVE_FAULT_NONE);
 
+            // A current that follows from the others makes the sum zero: it neither counts nor starts anew.
+            x = turning();
+            x.d.i_abc = {sign * c.i_sum, 0, sign * beyond};
+            EXPECT_EQ(calls(x, 2), 2);
+            x.d.i_abc = {0, 0, 0};
+            x.d.completed = x.d.period;
+            EXPECT_EQ(calls(x, 5), 5);
+            x.d.i_abc = {sign * c.i_sum, 0, sign * beyond};
+            x.d.completed = x.d.period - 1;
+            EXPECT_EQ(calls(x, 100), beyond ? 1 : 100);
+
             x = turning();
             x.d.pll.omega = sign * (PM_ONE + beyond);
             EXPECT_EQ(calls(x, 100), beyond ? 1 : 100);

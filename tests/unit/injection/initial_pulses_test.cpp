@@ -116,7 +116,9 @@ TEST(InitialPulses, SequenceIsSixPulsesInPairs)
         state = initial_pulses_step(&self, &c, {current, -current / 2, -current / 2}, &out);
         was_driven[1] = was_driven[0];
         was_driven[0] = out.driven;
-        if (!out.driven) {
+        const bool zero_vector = out.driven && out.duty[0] == 0 && out.duty[1] == 0 && out.duty[2] == 0;
+        if (!out.driven || zero_vector) {
+            EXPECT_EQ(zero_vector, driven > 0); // one behind each pulse
             driven = 0;
             continue;
         }
@@ -135,7 +137,8 @@ TEST(InitialPulses, SequenceIsSixPulsesInPairs)
     EXPECT_EQ(patterns, (std::vector<int>{1, 6, 2, 5, 4, 3}));
 }
 
-// Commanded in n calls, a pulse acts from the second on and ends at the call after the last one's period.
+// Commanded in n calls, a pulse acts from the second on and ends at the call after the last one's period, when a zero
+// vector begins.
 TEST(InitialPulses, TakesTheCurrentAtTheEndOfThePulse)
 {
     const pulses_config_t c = config(ipm(0.01));
@@ -146,7 +149,8 @@ TEST(InitialPulses, TakesTheCurrentAtTheEndOfThePulse)
         pulses_out_t out;
         EXPECT_FALSE(self.train.decaying) << call;
         initial_pulses_step(&self, &c, {kStep * call, -kStep * call, 0}, &out);
-        EXPECT_EQ(out.driven, call < c.periods) << call;
+        EXPECT_EQ(out.driven, call <= c.periods) << call;
+        EXPECT_EQ(out.duty[0], call < c.periods ? c.duty : 0) << call;
     }
     EXPECT_TRUE(self.train.decaying);
     EXPECT_EQ(self.train.i.a, kStep * (c.periods + 1));
