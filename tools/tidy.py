@@ -75,7 +75,9 @@ def main():
     parser.add_argument("--all", action="store_true", help="also the files that were clean and have not changed")
     parser.add_argument("--tests", action="store_true",
                         help="also tests/, which take most of the time and are read by two compilers")
-    parser.add_argument("files", nargs="*", type=Path, help="only these (default: all but tests)")
+    parser.add_argument("--tools", action="store_true",
+                        help="also the C++ of the host tools, which take two thirds of the time of the others")
+    parser.add_argument("files", nargs="*", type=Path, help="only these (default: all that is flashed, and the plant)")
     options = parser.parse_args()
 
     commands = read_commands(options.build)
@@ -85,7 +87,8 @@ def main():
     memory = options.build / "tidy_clean.json"
     clean = set(json.loads(memory.read_text())) if memory.exists() else set()
 
-    sources = sorted(file for file in commands if options.tests or not file.is_relative_to(ROOT / "tests"))
+    left_out = [ROOT / folder for folder in ("tests", "tools") if not getattr(options, folder)]
+    sources = sorted(file for file in commands if not any(file.is_relative_to(folder) for folder in left_out))
     files = [file.resolve() for file in options.files] or sources
     common = version + configuration + str(options.nodes).encode()
     prints = {file: fingerprint(common, command, [*dependencies[obj], file])
