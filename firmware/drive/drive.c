@@ -103,18 +103,24 @@ const drive_fault_record_t *drive_fault_record(const drive_t *drive)
  * period before stand. */
 static inline pm_abc_t complete(const drive_t *drive, pm_abc_t i, uint32_t missing)
 {
+    pm_abc_t whole = i;
     switch (missing) {
     case 0U:
-        return i;
+        break;
     case 1U:
-        return (pm_abc_t){.a = -(i.b + i.c), .b = i.b, .c = i.c};
+        whole.a = -(i.b + i.c);
+        break;
     case 2U:
-        return (pm_abc_t){.a = i.a, .b = -(i.c + i.a), .c = i.c};
+        whole.b = -(i.c + i.a);
+        break;
     case 4U:
-        return (pm_abc_t){.a = i.a, .b = i.b, .c = -(i.a + i.b)};
+        whole.c = -(i.a + i.b);
+        break;
     default:
-        return drive->i_abc;
+        whole = drive->i_abc;
+        break;
     }
+    return whole;
 }
 
 static inline pm_abc_t currents(const drive_t *drive, const uint16_t code[DRIVE_LEGS], pm_q_t zero_c)
