@@ -54,6 +54,7 @@ typedef enum {
     HAL_BREAK_LEVEL,
     HAL_CAN_BIT_RATE,
     HAL_CLOCK, /* oscillator or PLL has not started: the port runs on, but the bridge cannot be armed */
+    HAL_IMAGE, /* flash does not hold what was built: likewise */
 } hal_status_t;
 
 /* Why the last run ended, preserved over the reset by the fault handlers. */

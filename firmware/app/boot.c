@@ -80,7 +80,7 @@ void app_boot(app_t *app, hal_t *hal)
         say(hal, "  refused: ", drive_param_table[result.param].name);
         say(hal, "  ", result.reason);
     } else if (stored && app_ready(app) != APP_READY) {
-        say(hal, "  ", "timer, dead time or clock are not what this board can do");
+        say(hal, "  ", "timer, dead time or clock are not what this board can do, or the image is damaged");
     } else {
         /* no further message */
     }

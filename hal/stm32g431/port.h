@@ -32,6 +32,7 @@ struct hal {
     app_t *app;
     bool up, crystal;
     bool slow;       /* the PLL has failed: the clock after reset, too slow for the bus */
+    bool sound;      /* flash holds what was built */
     uint32_t legs;   /* CCER of the coming period */
     uint32_t bridge; /* BDTR with everything but the main output enable */
     bool refused;    /* the bridge cannot be armed */

@@ -1,6 +1,7 @@
 /* From reset to main(), and the last-resort handlers. No other file runs before memory is ready. */
 #include <stddef.h>
 
+#include "firmware/math/crc.h"
 #include "hal/stm32g431/internal.h"
 #include "hal/stm32g431/processor.h"
 #include "hal/stm32g431/registers/clock.h"
@@ -23,7 +24,7 @@ extern uint32_t port_stack_guard[], port_stack_bottom[], port_stack_top[];
 extern uint32_t port_data[], port_data_end[], port_data_load[];
 extern uint32_t port_bss[], port_bss_end[];
 extern uint32_t port_ccm[], port_ccm_begin[], port_ccm_end[], port_ccm_load[];
-extern uint32_t port_flash[], port_ram[];
+extern uint32_t port_flash[], port_seal[], port_ram[];
 
 int main(void);
 
@@ -125,6 +126,15 @@ static void fill(volatile uint32_t *to, const uint32_t *end, uint32_t value)
     for (uint32_t n = 0; n < words_between(to, end); ++n) {
         to[n] = value;
     }
+}
+
+bool port_image_sound(void)
+{
+    uint32_t crc = UINT32_MAX;
+    for (uint32_t n = 0; n < words_between(port_flash, port_seal); ++n) {
+        crc = pm_crc32(crc, port_flash[n]);
+    }
+    return port_seal[0] == ~crc && port_seal[1] == crc;
 }
 
 enum { NO_ACCESS = 0, READ_WRITE = 1, READ_ONLY = 5 };

@@ -47,6 +47,7 @@ static void start_once(hal_t *hal)
         hal->up = true;
         const uint32_t clock_Hz = clock_start(&hal->crystal);
         hal->slow = clock_Hz != PORT_CLOCK_HZ;
+        hal->sound = port_image_sound();
         hal->reset = take_reset_cause();
         pins_start();
         measure_start();
@@ -64,6 +65,9 @@ hal_status_t hal_init(hal_t *hal, const hal_config_t *config)
     }
     if (!hal->crystal || hal->slow) {
         status = HAL_CLOCK;
+    }
+    if (!hal->sound) {
+        status = HAL_IMAGE;
     }
     hal->refused = status != HAL_OK;
     return status;

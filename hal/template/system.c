@@ -29,7 +29,8 @@ void port_slow(void)
     app_slow(the_hal.app);
 }
 
-/* 1. clocks: the crystal, with a time limit and an internal oscillator instead (HAL_CLOCK); its failure later
+/* 0. whether flash holds what was built (HAL_IMAGE; hal/stm32g431/startup.c, tools/seal_image.py)
+ * 1. clocks: the crystal, with a time limit and an internal oscillator instead (HAL_CLOCK); its failure later
  * has to switch the bridge off
  * 2. pins: gate pins first, pulled to "off"
  * 3. each peripheral, stopped; check the configuration against what the timer has

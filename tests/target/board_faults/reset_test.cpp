@@ -103,6 +103,27 @@ TEST(BoardReset, APllThatDoesNotLockIsRefused)
     EXPECT_EQ(board_resets(b.board), 0u);
 }
 
+// One bit of flash where the program does not come at the start: the console says so, and the bridge stays off.
+TEST(BoardReset, ADamagedImageNeverArms)
+{
+    for (const uint32_t address : {0x0800F000u, 0x0800F200u, 0x0800F800u}) {
+        Bench b;
+        b.store(0, bench::params(), 1);
+        uint16_t word = 0;
+        board_read_flash(b.board, address, &word, sizeof word);
+        word ^= 0x0400;
+        board_program(b.board, address, &word, sizeof word);
+        b.boot();
+        b.run_ms(100);
+        EXPECT_THAT(b.console(), HasSubstr("the image is damaged")) << std::hex << address;
+        b.command(true);
+        b.run_ms(300);
+        EXPECT_FALSE(b.bridge_on()) << std::hex << address;
+        EXPECT_EQ(b.watched()->drive.fault, DRIVE_FAULT_PARAMETERS);
+        EXPECT_EQ(board_resets(b.board), 0u);
+    }
+}
+
 TEST(BoardReset, AnErrorOfTheMemorysParityOpensTheBridgeAtOnce)
 {
     for (bool checked : {false, true}) {

@@ -27,6 +27,11 @@ dbgmcu_t DBGMCU;
 hal_t port_hal;
 uint32_t port_store[HAL_STORE_PAGES][HAL_STORE_PAGE_SIZE / 4U];
 
+bool port_image_sound(void)
+{
+    return true;
+}
+
 void processor_lock(void)
 {
 }
