@@ -74,7 +74,6 @@ static void renew(app_t *app)
     if (app->next_lost && make_next(app).ok) {
         hand_over(app);
     }
-    app->next_lost = false;
 }
 
 uint32_t app_put_parameter(app_t *app, drive_param_id_t id, int32_t value)

@@ -144,6 +144,29 @@ TEST(StoreWear, SavesOfAMasterGoneWildAreFew)
     EXPECT_EQ(saves_in(20, 50), 1);
 }
 
+// CiA 305, "store configuration": node id and bit rate, and nothing else of their group.
+TEST(StoreLss, KeepsNodeIdAndBitRateAlone)
+{
+    Bench x;
+    x.boot(nullptr);
+    x.run_ms(5);
+    ASSERT_EQ(x.set(0x1017, 0, 333), 0U);
+    ASSERT_EQ(node_host_store(&x.loop.app, NODE_GROUP_LSS), 0U);
+    std::set<uint32_t> expected, kept;
+    for (uint32_t row = 0; row < od_count; ++row) {
+        const od_entry_t &entry = od_table[row];
+        if (entry.kind == OD_NODE &&
+            (entry.slot == OD_NODE_CAN_NODE_ID || entry.slot == OD_NODE_CAN_BIT_RATE)) {
+            expected.insert(entry.index * 256U + entry.sub);
+        }
+    }
+    for (const auto &pair : stored(x.loop.hal)) {
+        kept.insert(pair.first);
+    }
+    EXPECT_EQ(expected.size(), 2U);
+    EXPECT_EQ(kept, expected);
+}
+
 // Pairs that this image does not know are those of another one, which finds them again.
 class Foreign : public Bench
 {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "firmware/params/parameters.h"
+#include "injection/saliency.h"
 #include "tests/contract/bench.h"
 
 namespace
@@ -130,6 +131,26 @@ TEST(InjectionConfig, AnswerOfThePulsatingSquareIsItsFormula)
         drive_configure(&c, &p, PM_CHANNELS);
         EXPECT_EQ(c.injection, share < 1) << share;
     }
+}
+
+// 5.4: the saliency of the negative sequence leads the magnets by half of atan(-L_dq / L_sd), at half and full rated current.
+TEST(InjectionConfig, ShiftIsHalfTheAngleOfTheCoupling)
+{
+    drive_params_t p = with(INJECTION_rotating_sine);
+    const double unit = std::pow(10, drive_param_exp10[DRIVE_PARAM_cross_half]);
+    p.cross_half = static_cast<int32_t>(std::lround(-0.02 / unit));
+    const saliency_config_t c = configure(p).position.injection.rotating_sine.saliency;
+    const auto shift = [](double L_d, double L_q, double L_dq) {
+        return std::atan2(-L_dq, (L_q - L_d) / 2) / 2;
+    };
+    const double i_rated = p.i_rated * 1e-3 / (p.i_full_scale * 1e-3);
+    const double L_d = p.L_d + (p.L_dh_rated - p.L_d) / 4.0, L_q = p.L_q + (p.L_qh_rated - p.L_q) / 4.0;
+    const auto of = [&](double share) {
+        return real(saliency_shift(&c, static_cast<pm_q_t>(std::lround(share * i_rated * PM_ONE))));
+    };
+    EXPECT_NEAR(of(1), shift(p.L_dh_rated, p.L_qh_rated, p.L_dqh_rated), 1e-4);
+    EXPECT_NEAR(of(0.5), shift(L_d, L_q, -0.02 * L_q), 1e-4);
+    EXPECT_NEAR(of(-1), -of(1), 1e-6);
 }
 
 TEST(InjectionConfig, NoSaliencyAtRatedCurrentIsRefused)

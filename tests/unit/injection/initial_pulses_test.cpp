@@ -157,6 +157,24 @@ TEST(InitialPulses, TakesTheCurrentAtTheEndOfThePulse)
     EXPECT_EQ(self.train.i.b, -kStep * (c.periods + 1));
 }
 
+// The next pulse waits for three samples without current in a row.
+TEST(InitialPulses, ACurrentBeginsTheQuietAnew)
+{
+    const pulses_config_t c = config(ipm(0.01));
+    pulses_t train = {};
+    pulses_out_t out;
+    const pm_abc_t flows = {PM_ONE / 10, -PM_ONE / 20, -PM_ONE / 20}, none = {0, 0, 0};
+    for (int call = 0; call <= c.periods + 1; ++call) {
+        ASSERT_EQ(pulses_step(&train, &c, 0, false, flows, &out), PM_RUNNING);
+    }
+    ASSERT_TRUE(train.decaying);
+    for (const pm_abc_t &i : {none, none, flows, none, none}) {
+        EXPECT_EQ(pulses_step(&train, &c, 0, false, i, &out), PM_RUNNING);
+        EXPECT_FALSE(out.driven);
+    }
+    EXPECT_EQ(pulses_step(&train, &c, 0, false, none, &out), PM_DONE);
+}
+
 // Each of the three rows, with the sign of its pulse, and the sum of the vectors.
 TEST(InitialPulses, AddsWhatThePulsesSay)
 {
