@@ -89,7 +89,7 @@ static bool improve(pulses_t *self)
         }
         change[x] = pm_div(left, self->e[x][x]) / 3 * 2;
     }
-    const pm_q_t mean = (change[0] + change[1] + change[2]) / 3;
+    const pm_q_t mean = change[0] / 3 + change[1] / 3 + change[2] / 3;
     for (uint32_t k = 0; k < PULSES_AXES; k++) {
         self->g[k] += change[k] - mean;
     }
