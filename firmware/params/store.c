@@ -1,12 +1,20 @@
 #include "firmware/params/store.h"
 
-#include "firmware/math/crc.h"
-
-#define MAGIC  0x33504D50U /* "PMP3" */
-#define SEAL   0x4C414553U /* "SEAL" */
-#define ERASED UINT32_MAX
+#define MAGIC    0x33504D50U /* "PMP3" */
+#define SEAL     0x4C414553U /* "SEAL" */
+#define ERASED   UINT32_MAX
+#define CRC_POLY 0xEDB88320U /* CRC-32 of IEEE 802.3, reflected */
 
 enum { WORD_MAGIC, WORD_SEQUENCE, WORD_SCHEMA, WORD_COUNT };
+
+static uint32_t crc_word(uint32_t crc, uint32_t word)
+{
+    uint32_t rest = crc ^ word;
+    for (uint32_t bit = 0; bit < 32U; bit++) {
+        rest = (rest >> 1) ^ ((rest & 1U) != 0U ? CRC_POLY : 0U);
+    }
+    return rest;
+}
 
 int32_t store_check(const uint32_t page[STORE_WORDS])
 {
@@ -17,7 +25,7 @@ int32_t store_check(const uint32_t page[STORE_WORDS])
     const uint32_t end = STORE_HEADER + 2U * count;
     uint32_t crc = UINT32_MAX;
     for (uint32_t n = 0; n < end; n++) {
-        crc = pm_crc32(crc, page[n]);
+        crc = crc_word(crc, page[n]);
     }
     return (page[end] == ~crc && page[end + 1U] == crc) ? (int32_t)count : -1;
 }
@@ -92,7 +100,7 @@ void store_begin(store_writer_t *writer, uint32_t sequence, uint32_t schema, uin
     words[WORD_COUNT] = count;
     writer->crc = UINT32_MAX;
     for (uint32_t n = 0; n < STORE_HEADER; n++) {
-        writer->crc = pm_crc32(writer->crc, words[n]);
+        writer->crc = crc_word(writer->crc, words[n]);
     }
 }
 
@@ -100,7 +108,7 @@ void store_put(store_writer_t *writer, store_pair_t pair, uint32_t words[2])
 {
     words[0] = pair.id;
     words[1] = (uint32_t)pair.value;
-    writer->crc = pm_crc32(pm_crc32(writer->crc, words[0]), words[1]);
+    writer->crc = crc_word(crc_word(writer->crc, words[0]), words[1]);
 }
 
 void store_end(const store_writer_t *writer, uint32_t words[2])
