@@ -53,7 +53,7 @@ void port_slow(void);
 void port_can_received(void);
 void port_console_sent(void);
 
-/* --- startup.c: whether flash holds what was built, 6 ms */
+/* --- startup.c: whether flash holds what was built; about 10 ms */
 bool port_image_sound(void);
 
 /* --- startup.c: faults, with the frame that the exception has stacked */

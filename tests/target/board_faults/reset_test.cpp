@@ -165,7 +165,7 @@ TEST(BoardReset, AnOverflowOfTheStackHitsTheGuard)
     EXPECT_GE(until(&b, 1000, [&] { return board_resets(b.board) == 1; }), 0);
     EXPECT_FALSE(b.bridge_on());
     b.put_back(before);
-    b.run_ms(50);
+    b.run_ms(80); // 10 of them for the CRC of the image
     EXPECT_THAT(b.console(), HasSubstr("last run ended by exception 0x00000004"));
     EXPECT_THAT(b.console(), HasSubstr("address 0x200000"));
     EXPECT_FALSE(b.bridge_on());
@@ -179,7 +179,7 @@ TEST(BoardReset, ANullPointerIsAFaultWithItsAddress)
     EXPECT_GE(until(&b, 1000, [&] { return board_resets(b.board) == 1; }), 0);
     EXPECT_FALSE(b.bridge_on());
     b.put_back(before);
-    b.run_ms(50);
+    b.run_ms(80); // 10 of them for the CRC of the image
     EXPECT_THAT(b.console(), HasSubstr("last run ended by exception 0x00000004"));
     EXPECT_THAT(b.console(), HasSubstr("address 0x00000004"));
 }
