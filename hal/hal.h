@@ -127,6 +127,7 @@ typedef struct {
     uint16_t dial;            /* potentiometer, left-aligned; 0 where there is none */
     bool button;              /* pressed */
     bool temperature_missing; /* the sensor is broken off or shorted */
+    bool reference_off; /* the converters' reference is off by 5 % or more: so is all that is measured */
 } hal_slow_t;
 
 void hal_measure_slow(hal_t *hal, hal_slow_t *slow); /* slow */

@@ -41,6 +41,9 @@ void app_slow(app_t *app)
     if (app->slow.temperature_missing) {
         drive_trip(&app->drive, DRIVE_FAULT_TEMPERATURE_SENSOR);
     }
+    if (app->slow.reference_off) {
+        drive_trip(&app->drive, DRIVE_FAULT_SENSOR_REFERENCE);
+    }
     const drive_slow_in_t in = {.temperature_dC = app->slow.temperature_dC};
     drive_slow(&app->drive, &in);
     app->slow_at += app->slow_divider - 1U;

@@ -5,12 +5,13 @@
 
 /* clang-format off */
 #define PM_IMAGE_NAME "small"
-#define PM_IMAGE_TRACE_NUMBERS 3724U
+#define PM_IMAGE_TRACE_NUMBERS 3600U
 #define PM_CHANNELS 0x0000U
 
 #define PM_WITHOUT_deadbeat 1
 #define PM_WITHOUT_finite_set 1
 #define PM_WITHOUT_four_pulses 1
+#define PM_WITHOUT_stored_eds 1
 #define PM_WITHOUT_mismatch 1
 #define PM_WITHOUT_back_emf 1
 #define PM_WITHOUT_extended_emf 1

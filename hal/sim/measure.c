@@ -133,6 +133,7 @@ void hal_measure(hal_t *hal, drive_in_t *in)
 
 void hal_measure_slow(hal_t *hal, hal_slow_t *slow)
 {
-    *slow =
-        (hal_slow_t){.temperature_dC = hal->temperature_dC, .temperature_missing = hal->temperature_missing};
+    *slow = (hal_slow_t){.temperature_dC = hal->temperature_dC,
+                         .temperature_missing = hal->temperature_missing,
+                         .reference_off = hal->reference_off};
 }

@@ -48,6 +48,7 @@ struct hal {
     int32_t temperature_dC; /* what the sensor says */
     bool hw_fault;          /* held break input */
     bool temperature_missing;
+    bool reference_off;
     sim_queue_t received, sent; /* seen from the application */
     hal_can_state_t can_state;
     uint32_t can_lost, watchdog_fed;

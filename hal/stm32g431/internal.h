@@ -41,7 +41,7 @@ void system_watchdog_period(uint32_t time_ms);
 hal_status_t bridge_start(hal_t *hal, const hal_config_t *config);
 void bridge_run(void);
 void measure_start(void);
-void measure_run(void);
+void measure_run(hal_t *hal);
 hal_status_t can_start(const hal_config_t *config);
 void can_take_element(port_can_t *can, const fdcan_element_t *element); /* into the ring */
 void console_start(uint32_t clock_Hz);

@@ -9,11 +9,16 @@ enum {
     ADC1_PHASE_W = 12,
     ADC1_TEMPERATURE = 5,
     ADC1_DIAL = 11,
+    ADC1_REFERENCE = 18,
     ADC2_PHASE_V = 3,
     ADC2_V_BUS = 1,
 };
 
 #define BREAKS (TIM_SR_BIF | TIM_SR_SBIF)
+
+/* Regular conversions take turns, one per ms. */
+static const uint8_t TURN[PORT_TURNS] = {
+    [PORT_TEMPERATURE] = ADC1_TEMPERATURE, [PORT_DIAL] = ADC1_DIAL, [PORT_REFERENCE] = ADC1_REFERENCE};
 
 static void start_converter(adc_t *adc)
 {
@@ -47,18 +52,26 @@ void measure_start(void)
     start_amplifier(&OPAMP1);
     start_amplifier(&OPAMP2);
     start_amplifier(&OPAMP3);
-    ADC12_COMMON.CCR = reg_field(ADC_CCR_CKMODE, ADC_CKMODE_DIV_4); /* 42.5 MHz */
+    ADC12_COMMON.CCR = reg_field(ADC_CCR_CKMODE, ADC_CKMODE_DIV_4) | ADC_CCR_VREFEN; /* 42.5 MHz */
     start_converter(&ADC1);
     start_converter(&ADC2);
     ADC1.SMPR1 = reg_field(ADC_SMPR1_SMP3, ADC_SMP_6_5) | reg_field(ADC_SMPR1_SMP5, ADC_SMP_247_5);
-    ADC1.SMPR2 = reg_field(ADC_SMPR2_SMP11, ADC_SMP_247_5) | reg_field(ADC_SMPR2_SMP12, ADC_SMP_6_5);
+    ADC1.SMPR2 = reg_field(ADC_SMPR2_SMP11, ADC_SMP_247_5) | reg_field(ADC_SMPR2_SMP12, ADC_SMP_6_5) |
+                 reg_field(ADC_SMPR2_SMP18, ADC_SMP_247_5);
     ADC2.SMPR1 = reg_field(ADC_SMPR1_SMP1, ADC_SMP_6_5) | reg_field(ADC_SMPR1_SMP3, ADC_SMP_6_5);
     ADC1.JSQR = sequence_of(ADC1_PHASE_U, ADC1_PHASE_W);
     ADC2.JSQR = sequence_of(ADC2_PHASE_V, ADC2_V_BUS);
 }
 
-void measure_run(void)
+/* The internal reference at 3.3 V, by its value at 3.0. */
+static uint16_t expected_reference(void)
 {
+    return (uint16_t)(VREFINT.CAL * 10U / 11U);
+}
+
+void measure_run(hal_t *hal)
+{
+    hal->code[PORT_REFERENCE] = expected_reference();
     ADC1.ISR = ADC_ISR_JEOS;
     ADC1.IER = ADC_IER_JEOSIE;
     ADC2.CR = ADC_CR_ADVREGEN | ADC_CR_JADSTART;
@@ -112,21 +125,18 @@ void hal_measure(hal_t *hal, drive_in_t *in)
     }
 }
 
-/* One regular conversion per call, of the two inputs in turn; the injected ones interrupt it. */
+/* One regular conversion per call; the injected ones interrupt it. */
 void hal_measure_slow(hal_t *hal, hal_slow_t *slow)
 {
     if ((ADC1.ISR & ADC_ISR_EOC) != 0U) {
-        const uint16_t code = (uint16_t)ADC1.DR; /* clears the flag */
-        if (hal->dial_next) {
-            hal->dial = code;
-        } else {
-            hal->temperature = code;
-        }
-        hal->dial_next = !hal->dial_next;
-        ADC1.SQR1 = reg_field(ADC_SQR1_SQ1, hal->dial_next ? ADC1_DIAL : ADC1_TEMPERATURE);
+        hal->code[hal->turn] = (uint16_t)ADC1.DR; /* clears the flag */
+        hal->turn = (uint8_t)((hal->turn + 1U) % PORT_TURNS);
+        ADC1.SQR1 = reg_field(ADC_SQR1_SQ1, TURN[hal->turn]);
         ADC1.CR = ADC_CR_ADVREGEN | ADC_CR_ADSTART;
     }
-    slow->temperature_missing = !ntc_temperature(hal->temperature, &slow->temperature_dC);
-    slow->dial = (uint16_t)(hal->dial * 16U);
+    const uint32_t expected = expected_reference();
+    slow->temperature_missing = !ntc_temperature(hal->code[PORT_TEMPERATURE], &slow->temperature_dC);
+    slow->dial = (uint16_t)(hal->code[PORT_DIAL] * 16U);
     slow->button = pins_button();
+    slow->reference_off = hal->code[PORT_REFERENCE] - (expected - expected / 20U) > expected / 10U;
 }

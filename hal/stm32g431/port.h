@@ -28,6 +28,8 @@ typedef struct {
     volatile uint32_t lost;
 } port_can_t;
 
+enum { PORT_TEMPERATURE, PORT_DIAL, PORT_REFERENCE, PORT_TURNS };
+
 struct hal {
     app_t *app;
     bool up, crystal;
@@ -37,8 +39,8 @@ struct hal {
     uint32_t bridge; /* BDTR with everything but the main output enable */
     bool refused;    /* the bridge cannot be armed */
     hal_reset_t reset;
-    uint16_t temperature, dial; /* last codes of 12 bits */
-    bool dial_next;             /* the running conversion is the dial's */
+    uint16_t code[PORT_TURNS]; /* last conversions of what is slow, 12 bits */
+    uint8_t turn;              /* of them, the one that runs */
     port_can_t can;
     port_console_t console;
 };

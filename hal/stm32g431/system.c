@@ -99,7 +99,7 @@ void hal_start(hal_t *hal, app_t *app)
     SCB.SHPR[SCB_SHPR_PENDSV] = PORT_PRIO_SLOW;
     system_interrupt(IRQ_ADC1_2, PORT_PRIO_CONTROL);
     start_milliseconds();
-    measure_run();
+    measure_run(hal);
     bridge_run();
 }
 

@@ -21,7 +21,7 @@ void hal_measure(hal_t *hal, drive_in_t *in)
 }
 
 /* The last conversion of each, and the start of the next; never waits. temperature_missing beyond what the
- * sensor can give: a broken wire must not look cold. */
+ * sensor can give: a broken wire must not look cold. reference_off: by a second reference, as processors have it. */
 void hal_measure_slow(hal_t *hal, hal_slow_t *slow)
 {
     (void)hal;

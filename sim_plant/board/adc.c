@@ -36,7 +36,7 @@ static const board_register_t list[] = {
     {ADC_JDR1 + 8, "JDR3", 0, 0, 0xFFFFu},
     {ADC_JDR1 + 12, "JDR4", 0, 0, 0xFFFFu},
 };
-static const board_register_t common_list[] = {{CCR, "CCR", 0, 0x00030000u, 0}};
+static const board_register_t common_list[] = {{CCR, "CCR", 0, 0x00430000u, 0}};
 
 static void due(void *owner, uint64_t cycle);
 

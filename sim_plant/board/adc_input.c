@@ -11,6 +11,11 @@
 #define KELVIN     273.15
 #define TOP_CODE   4095u
 
+/* Internal reference; it takes 4 us of sampling: DS12589 5.3.4 */
+#define REFERENCE_CHANNEL 18u
+#define REFERENCE_S       4e-6
+#define CCR_VREFEN        0x00400000u
+
 typedef enum { LEG_U, LEG_V, LEG_W, LINK_VOLTAGE, TEMPERATURE, DIAL } source_t;
 
 static const struct {
@@ -37,12 +42,33 @@ static uint32_t temperature_code(const board_wiring_t *wiring)
     return share_code(NTC_LOW / (NTC_LOW + R_ohm));
 }
 
-/* A current into the motor comes up through the shunt: the code falls. */
+/* The supply is the converters' reference. */
+static double per_supply(const adc_converter_t *c)
+{
+    return BOARD_SUPPLY_V / c->chip->wiring.supply_V;
+}
+
+static uint32_t reference_code(const adc_converter_t *c)
+{
+    if ((c->chip->adc.common.value[2] & CCR_VREFEN) == 0u) {
+        cpu_fail(c->chip->cpu, "ADC12_CCR: the internal reference is off (VREFEN)");
+    }
+    double clock_Hz = (double)c->chip->rcc.clock_Hz;
+    if ((double)adc_sampling(c, REFERENCE_CHANNEL) < REFERENCE_S * clock_Hz) {
+        cpu_fail(c->chip->cpu, "ADC%d: the internal reference takes 4 us of sampling", c->which + 1);
+    }
+    return share_code(BOARD_REFERENCE_V / c->chip->wiring.supply_V);
+}
+
+/* A current into the motor comes up through the shunt: the code falls from the middle, which the supply makes. */
 static uint32_t current_code(const adc_converter_t *c, int leg, const plant_adc_t *seen)
 {
     const char *fault = analog_fault(&c->chip->analog, leg);
     if (fault) {
         cpu_fail(c->chip->cpu, "ADC%d: current of leg %d: %s", c->which + 1, leg + 1, fault);
+    }
+    if (c->chip->wiring.supply_V != BOARD_SUPPLY_V) {
+        return share_code(0.5 - (seen->i_leg[leg] / 65536.0 - 0.5) * per_supply(c));
     }
     uint32_t code = (0x10000u - seen->i_leg[leg]) / 16u;
     return code > TOP_CODE ? TOP_CODE : code;
@@ -50,6 +76,9 @@ static uint32_t current_code(const adc_converter_t *c, int leg, const plant_adc_
 
 uint32_t adc_input(const adc_converter_t *c, uint32_t channel, const plant_adc_t *seen)
 {
+    if (c->which == 0 && channel == REFERENCE_CHANNEL) {
+        return reference_code(c);
+    }
     for (size_t n = 0; n < sizeof inputs / sizeof *inputs; n++) {
         if (inputs[n].converter != c->which || inputs[n].channel != (int)channel) {
             continue;
@@ -60,7 +89,7 @@ uint32_t adc_input(const adc_converter_t *c, uint32_t channel, const plant_adc_t
         }
         switch (inputs[n].source) {
         case LINK_VOLTAGE:
-            return seen->v_dc / 16u;
+            return share_code(seen->v_dc / 65536.0 * per_supply(c));
         case TEMPERATURE:
             return temperature_code(&c->chip->wiring);
         case DIAL:

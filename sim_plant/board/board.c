@@ -13,9 +13,10 @@
 #define CCM_BASE    0x10000000u
 #define CCM_SIZE    0x2800u
 #define CCM_ALIAS   0x20005800u
-#define SYSTEM_BASE 0x1FFF7400u /* of it, the unique identifier alone has its contents */
+#define SYSTEM_BASE 0x1FFF7400u /* of it, identifier and calibration of the reference have their contents */
 #define SYSTEM_SIZE 0x400u
 #define UNIQUE_ID   0x1FFF7590u
+#define VREFINT_CAL 0x1FFF75AAu
 #define ERASED      0xFF
 #define PAINT       0xC5
 #define BOOT_STEP_S 50e-6
@@ -49,6 +50,8 @@ static void add_memories(cpu_t *cpu)
     memset(cpu_memory(cpu, CCM_BASE, CCM_SIZE), PAINT, CCM_SIZE);
     memset(cpu_memory(cpu, SYSTEM_BASE, SYSTEM_SIZE), ERASED, SYSTEM_SIZE);
     memcpy(cpu_memory(cpu, UNIQUE_ID, sizeof unique_id), unique_id, sizeof unique_id);
+    const uint16_t vrefint = (uint16_t)(BOARD_REFERENCE_V / 3.0 * 4096.0);
+    memcpy(cpu_memory(cpu, VREFINT_CAL, sizeof vrefint), &vrefint, sizeof vrefint);
 }
 
 static bool load(void *context, uint32_t address, const uint8_t *data, uint32_t size)

@@ -76,11 +76,10 @@ void board_halt(board_t *board,
                 bool halted); /* by the debugger: DBGMCU's freeze bits act, unlike cpu_halt() */
 void board_stick_converter(board_t *board, bool stuck); /* conversions never end */
 void board_stop_oscillator(board_t *board, bool stopped);
-void board_fail_pll(board_t *board, bool fails); /* it does not lock the next time */
-void board_set_supply(board_t *board,
-                      double supply_V); /* of the processor, 3.3 V; only its voltage detector sees it */
-void board_check_parity(board_t *board, bool checked); /* option byte SRAM_PE */
-void board_flip_ram(board_t *board);                   /* a bit of the memory, which is read at once */
+void board_fail_pll(board_t *board, bool fails);        /* it does not lock the next time */
+void board_set_supply(board_t *board, double supply_V); /* of the processor and its converters, 3.3 V */
+void board_check_parity(board_t *board, bool checked);  /* option byte SRAM_PE */
+void board_flip_ram(board_t *board);                    /* a bit of the memory, which is read at once */
 /* Power is lost in the midst of the n-th double word or page erase from now on: the board resets. 0: never.
  */
 void board_cut_flash(board_t *board, uint32_t after_words);

@@ -14,9 +14,10 @@ typedef struct board_chip board_chip_t;
 
 /* Gain from shunt to amplifier output 64/7, of which the bias network in front of the pins takes 4/7; a
  * shunt's full scale is the swing of 1.65 V at the output. */
-#define BOARD_SUPPLY_V   3.3
-#define BOARD_INNER_GAIN 16.0
-#define BOARD_LEGS       3
+#define BOARD_SUPPLY_V    3.3
+#define BOARD_REFERENCE_V 1.212 /* inside the processor: DS12589 table 16 */
+#define BOARD_INNER_GAIN  16.0
+#define BOARD_LEGS        3
 
 typedef struct {
     uint64_t start; /* cycle of the plant's period */

@@ -14,7 +14,7 @@ from random import Random
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
-from dictionary import generate, model  # noqa: E402
+from dictionary import generate, methods, model  # noqa: E402
 from dictionary.source import SourceError  # noqa: E402
 
 GOOD = (ROOT / generate.SOURCE).read_text(encoding="utf-8")
@@ -31,7 +31,7 @@ class Project:
         self.root = Path(self.folder.name)
         headers = [path.relative_to(ROOT).as_posix()
                    for folder in ("observers", "injection", "firmware/control") for path in sorted(ROOT.glob(f"{folder}/*.[hd]*"))]
-        for path in (generate.SOURCE, generate.FAULTS, generate.LEDGER, LIST, *headers, *generate.parts(ROOT)):
+        for path in (generate.SOURCE, generate.FAULTS, generate.LEDGER, LIST, methods.OPTIONS, *headers, *generate.parts(ROOT)):
             (self.root / path).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / path, self.root / path)
         return self

@@ -85,11 +85,15 @@ def image_methods(dictionary, known):
     return out
 
 
+def _condition(entry, methods):
+    return " || ".join(f"PM_HAS({name})" for name in methods[(entry.index, entry.sub)])
+
+
 def runs(entries, methods):
     """[(condition of the preprocessor, or "", entries)] in order."""
     out = []
     for entry in entries:
-        condition = " || ".join(f"PM_HAS({name})" for name in methods[(entry.index, entry.sub)])
+        condition = _condition(entry, methods)
         if not out or out[-1][0] != condition:
             out.append((condition, []))
         out[-1][1].append(entry)
@@ -115,11 +119,11 @@ FILTERS = {
 }
 
 
-def constants(dictionary, eds):
-    """(C name, bytes) by slot."""
+def constants(dictionary, eds, methods):
+    """(C name, bytes, condition of the preprocessor) by slot."""
     out = []
     for entry in dictionary.of("constant"):
         if entry.bits == 0:
             data = eds if entry.text == "$eds" else entry.text.encode("ascii")
-            out.append((c_name(entry.name).lower(), [f"0x{x:02X}" for x in data]))
+            out.append((c_name(entry.name).lower(), [f"0x{x:02X}" for x in data], _condition(entry, methods)))
     return out

@@ -16,7 +16,8 @@ LEDGER = "firmware/params/allocations.txt"
 LISTS = "observers/observers.def", "injection/injections.def", "firmware/control/regulators.def"
 METHODS_H = "methods.h"
 # Beside a method x.h stands x.yaml with its parameters.
-METHODS = "observers/*.yaml", "injection/**/*.yaml", "bldc/**/*.yaml", "firmware/control/*.yaml", "firmware/drive/**/*.yaml"
+METHODS = "observers/*.yaml", "injection/**/*.yaml", "bldc/**/*.yaml", "firmware/control/*.yaml", "firmware/drive/**/*.yaml", \
+    "firmware/can/*.yaml"
 
 
 def _environment():
@@ -46,7 +47,7 @@ def _c_files(render, dictionary, sheet):
     render("firmware/can/dictionary_table.c", "dictionary_table.c.j2", runs=emit_c.runs(dictionary.entries, of_image),
            values=emit_c.all_values(dictionary), schema=emit_c.schema(dictionary))
     render(BYTES, "dictionary_bytes.c.j2",
-           constants=emit_c.constants(dictionary, sheet))
+           constants=emit_c.constants(dictionary, sheet, of_image))
 
 
 def _headers(render, known):

@@ -7,6 +7,7 @@ from .source import SourceError
 LISTS = ("firmware", "observers", "injection", "bldc")
 ROW = re.compile(r"^PM_METHOD\((\w+),", re.MULTILINE)
 ROW_WITH_NEEDS = re.compile(r"^PM_METHOD\((\w+),(.*)\)$", re.MULTILINE)
+OPTIONS = "firmware/images/options.def"
 CHANNELS = "firmware/math/measure.h"
 CHANNEL = re.compile(r"^#define NEEDS_(\w+)\s+0x", re.MULTILINE)
 NEED = re.compile(r"\bNEEDS_(\w+)")
@@ -22,6 +23,12 @@ def needs(root):
     return {name: [need.lower() for need in NEED.findall(rest)]
             for path in {Path(root) / path for path in known(root).values()}
             for name, rest in ROW_WITH_NEEDS.findall(path.read_text(encoding="utf-8"))}
+
+
+def options(root):
+    """What an image may do without beside the methods, of which no header need be there."""
+    path = Path(root) / OPTIONS
+    return ROW.findall(path.read_text(encoding="utf-8")) if path.is_file() else []
 
 
 def known(root):

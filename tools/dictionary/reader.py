@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from . import model, pdo, source
+from .methods import options
 from .model import Entry, Object
 
 NODE_ID = re.compile(r"\$NODEID *\+ *(0x[0-9A-Fa-f]+|\d+)")
@@ -226,7 +227,7 @@ def _methods(root, file, project):
     """The methods of a file: what `methods` says, or the one that the file is named for."""
     names = root.texts("methods") if "methods" in root.nodes else [Path(file).stem]
     for name in names:
-        if not (project / file).with_name(f"{name}.h").is_file():
+        if name not in options(project) and not (project / file).with_name(f"{name}.h").is_file():
             raise root.error(f"no method `{name}`: {Path(file).with_name(name + '.h')} is not there", "methods")
     return tuple(names)
 

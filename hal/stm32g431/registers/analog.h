@@ -39,6 +39,7 @@ typedef struct {
 #define ADC_SMPR1_SMP5   (7U << 15)
 #define ADC_SMPR2_SMP11  (7U << 3)
 #define ADC_SMPR2_SMP12  (7U << 6)
+#define ADC_SMPR2_SMP18  (7U << 24)
 #define ADC_SQR1_SQ1     (0x1FU << 6)
 #define ADC_JSQR_JL      (3U << 0)
 #define ADC_JSQR_JEXTSEL (0x1FU << 2)
@@ -56,8 +57,14 @@ typedef struct {
 } adc_common_t;
 
 #define ADC_CCR_CKMODE (3U << 16)
+#define ADC_CCR_VREFEN (1U << 22)
 
 enum { ADC_CKMODE_DIV_4 = 3 }; /* of the processor's clock */
+
+/* What the converter made of the internal reference at 3.0 V: DS12589 3.18.2. */
+typedef struct {
+    volatile uint16_t CAL;
+} vrefint_t;
 
 typedef struct {
     reg_t CSR;
@@ -102,6 +109,7 @@ enum { DAC_MODE_INTERNAL = 3, DAC_HFSEL_160_MHZ = 2 };
 
 extern adc_t ADC1, ADC2;
 extern adc_common_t ADC12_COMMON;
+extern vrefint_t VREFINT;
 extern opamp_t OPAMP1, OPAMP2, OPAMP3;
 extern comp_t COMP1, COMP2, COMP4;
 extern dac_t DAC3;

@@ -135,4 +135,28 @@ TEST(BoardFault, ABrokenTemperatureSensorIsAFault)
     EXPECT_EQ(b.watched()->drive.fault, DRIVE_FAULT_TEMPERATURE_SENSOR);
 }
 
+// Above the voltage detector's threshold, or too high: currents and voltages are read wrong by as much.
+TEST(BoardFault, ASupplyThatIsNoReferenceIsAFault)
+{
+    for (const double supply_V : {3.05, 3.55}) {
+        Bench b;
+        b.running();
+        board_set_supply(b.board, supply_V);
+        b.run_ms(10);
+        EXPECT_FALSE(b.bridge_on()) << supply_V;
+        EXPECT_EQ(b.watched()->drive.fault, DRIVE_FAULT_SENSOR_REFERENCE) << supply_V;
+    }
+}
+
+TEST(BoardFault, ASupplyWithinItsToleranceIsNone)
+{
+    for (const double supply_V : {3.2, 3.4}) {
+        Bench b;
+        b.running();
+        board_set_supply(b.board, supply_V);
+        b.run_ms(50);
+        EXPECT_TRUE(b.bridge_on()) << supply_V;
+    }
+}
+
 } // namespace

@@ -105,14 +105,14 @@ TEST(BoardReset, APllThatDoesNotLockIsRefused)
     EXPECT_EQ(board_resets(b.board), 0u);
 }
 
-// Where flash holds the electronic data sheet, which nobody reads at the start.
-uint32_t find_eds(board_t *board)
+// Where flash holds the text of a fault, which nobody reads at the start.
+uint32_t find_text(board_t *board, drive_fault_t fault)
 {
     const uint32_t flash = 0x08000000;
     std::vector<uint8_t> image(124 * 1024);
     board_read_flash(board, flash, image.data(), image.size());
-    const od_bytes_t &eds = od_bytes[OD_BYTES_STORED_EDS];
-    const auto found = std::search(image.begin(), image.end(), eds.bytes, eds.bytes + eds.size);
+    const std::string text = drive_fault_text(fault);
+    const auto found = std::search(image.begin(), image.end(), text.begin(), text.end());
     EXPECT_NE(found, image.end());
     return flash + uint32_t(found - image.begin());
 }
@@ -120,20 +120,20 @@ uint32_t find_eds(board_t *board)
 // One bit of it: the console says so, and the bridge stays off.
 TEST(BoardReset, ADamagedImageNeverArms)
 {
-    for (const uint32_t offset : {0u, 1000u, od_bytes[OD_BYTES_STORED_EDS].size - 1}) {
+    for (const drive_fault_t fault : {DRIVE_FAULT_OVER_CURRENT, DRIVE_FAULT_STALL, DRIVE_FAULT_OVERLOAD}) {
         Bench b;
         b.store(0, bench::params(), 1);
-        const uint32_t address = (find_eds(b.board) + offset) & ~1u;
+        const uint32_t address = find_text(b.board, fault) & ~1u;
         uint16_t word = 0;
         board_read_flash(b.board, address, &word, sizeof word);
         word ^= 0x0400;
         board_program(b.board, address, &word, sizeof word);
         b.boot();
         b.run_ms(100);
-        EXPECT_THAT(b.console(), HasSubstr("the image is damaged")) << offset;
+        EXPECT_THAT(b.console(), HasSubstr("the image is damaged")) << fault;
         b.command(true);
         b.run_ms(300);
-        EXPECT_FALSE(b.bridge_on()) << offset;
+        EXPECT_FALSE(b.bridge_on()) << fault;
         EXPECT_EQ(b.watched()->drive.fault, DRIVE_FAULT_PARAMETERS);
         EXPECT_EQ(board_resets(b.board), 0u);
     }

@@ -21,7 +21,7 @@ constexpr double f_pwm_Hz = 20e3;
 constexpr double most_s = 2.0;
 constexpr double bit_s = 1e-6;
 constexpr double master_s = 1e-3; // before a master answers a block: an adapter at a serial port
-constexpr size_t samples = APP_TRACE_NUMBERS / 4; // what the ring of the image holds: 46 ms and more
+constexpr size_t samples = APP_TRACE_NUMBERS / 4; // what the ring of the image holds: 45 ms and more
 constexpr size_t signals = 4;
 constexpr uint8_t block = 127;
 

@@ -342,6 +342,18 @@ TEST(App, MissingTemperatureSensorIsAFault)
     EXPECT_FALSE(x.loop.hal.armed);
 }
 
+TEST(App, AReferenceThatIsOffIsAFault)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_enabled_ms(600);
+    x.loop.hal.reference_off = true;
+    x.run_ms(2);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_SENSOR_REFERENCE);
+    EXPECT_FALSE(x.loop.hal.armed);
+}
+
 TEST(App, SlowThatHasNotEndedIsAnOverrun)
 {
     Bench x;

@@ -443,6 +443,26 @@ TEST(SdoBlock, UploadTimesOutWhileItWaits)
     EXPECT_EQ(can::le(&replies[0].data[4], 4), TIMEOUT);
 }
 
+// The client's second begins with the last segment, which a busy bus may hold up for longer than that.
+TEST(SdoBlock, ABusThatIsBusyForLongLeavesTheClientItsTime)
+{
+    Bench x;
+    x.domain = some_bytes(889);
+    x.ask(Bench::request(0xA4, 0x1009, 0, 127));
+    x.bus_full = true;
+    x.give(0x601, {0xA3, 0, 0, 0, 0, 0, 0, 0});
+    x.run_ms(1500);
+    x.bus_full = false;
+    x.run_ms(900);
+    for (const node_frame_t &frame : x.take(0x581)) {
+        EXPECT_NE(frame.data[0], 0x80);
+    }
+    x.run_ms(200);
+    const auto replies = x.take(0x581);
+    ASSERT_EQ(replies.size(), 1U);
+    EXPECT_EQ(can::le(&replies[0].data[4], 4), TIMEOUT);
+}
+
 // --- block download
 
 uint32_t block_download(Bench &x, uint16_t index, const Bytes &data, bool sized, bool good_crc = true,

@@ -133,6 +133,27 @@ TEST(InjectionConfig, AnswerOfThePulsatingSquareIsItsFormula)
     }
 }
 
+// The negative sequence of a sine, V_h / (2 omega_h) (1 / L_d - 1 / L_q), with x / sin x for the staircase, read over N
+// samples, against four times the noise.
+TEST(InjectionConfig, AnswerOfTheStationarySineIsItsFormula)
+{
+    drive_params_t p = with(INJECTION_stationary_sine);
+    p.start_method = 0;
+    const auto si = [&p](drive_param_id_t id) {
+        return drive_param_get(&p, id) * std::pow(10, drive_param_exp10[id]);
+    };
+    const double N = std::round(kF_pwm / si(DRIVE_PARAM_f_injection)), x = bench::kPi / N;
+    const double flux = si(DRIVE_PARAM_v_injection) / (2 * x * kF_pwm) * x / std::sin(x);
+    const double I_n = flux / 2 * (1 / si(DRIVE_PARAM_L_d) - 1 / si(DRIVE_PARAM_L_q));
+    for (const double share : {0.9, 1.1}) {
+        p.i_noise = static_cast<int32_t>(std::lround(share * I_n * std::sqrt(N / 2) / 4 *
+                                                     std::pow(10, -drive_param_exp10[DRIVE_PARAM_i_noise])));
+        drive_config_t c = {};
+        drive_configure(&c, &p, PM_CHANNELS);
+        EXPECT_EQ(c.injection, share < 1) << share;
+    }
+}
+
 // 5.4: the saliency of the negative sequence leads the magnets by half of atan(-L_dq / L_sd), at half and full rated current.
 TEST(InjectionConfig, ShiftIsHalfTheAngleOfTheCoupling)
 {

@@ -11,6 +11,7 @@ namespace
 using bench::Complex;
 using bench::kDegree;
 using bench::Machine;
+using bench::real;
 
 // First order in R / (omega_h L): what is left is its square, 0.035^2 rad, and the staircase of the voltage.
 constexpr double kFirstOrder_deg = 0.15;
@@ -38,6 +39,21 @@ TEST(RotatingSine, ErrorSignalIsHalfTheSineOfTwiceTheError)
         const double expected = 0.5 * std::sin(2 * a * kDegree);
         EXPECT_NEAR(settled(c, a * kDegree, 1e-3).eps, expected, 0.005) << a;
     }
+}
+
+// From the reset on: what the 1 kHz step says without current is no other angle.
+TEST(RotatingSine, TurnsByTheResistanceFromTheResetOn)
+{
+    const injection_config_t c = config(6, false);
+    const double rho = real(c.rotating_sine.rho_0);
+    ASSERT_GT(rho, 0.03);
+    obs_in_t in = {};
+    in.dir = bench::direction(0);
+    rotating_sine_t self;
+    rotating_sine_reset(&self, &c.rotating_sine, &in);
+    EXPECT_NEAR(std::atan2(self.turn.sin, self.turn.cos), 2 * rho, 1e-5);
+    rotating_sine_slow(&self, &c.rotating_sine, &in);
+    EXPECT_NEAR(std::atan2(self.turn.sin, self.turn.cos), 2 * rho, 1e-5);
 }
 
 TEST(RotatingSine, SlopeIsOne)

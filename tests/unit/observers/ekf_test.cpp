@@ -5,7 +5,9 @@
 
 #include <Eigen/Dense>
 
+#include "observers/ekf_noise_config.h"
 #include "tests/contract/bench.h"
+#include "tests/contract/observers.h"
 #include "tests/unit/observers/closed.h"
 #include "tests/unit/observers/ekf_bench.h"
 
@@ -301,6 +303,55 @@ TEST(Ekf, HoldsThePosition)
                     << salient << ' ' << share << ' ' << i;
             }
         }
+    }
+}
+
+// Far beyond rated current the flux along d is half a base, against the magnet.
+TEST(Ekf, HoldsThePositionWithALargeFluxAlongD)
+{
+    const Machine m = bench::kIpmLinear;
+    const Base b = bench::kIpmBase;
+    for (const Complex i : {Complex{-9.5, 1}, Complex{-9.5, -1}}) {
+        EXPECT_GT(std::abs(m.L_d0_H * i.real() / (b.v_V / b.omega_rad_s)), 0.45);
+        const Rotation truth(m, b, 0.3 * kRated_pu, i, 1.0);
+        EXPECT_LE(Full(bench::ekf_full_config(m, b), b, truth).settled().max, kIdeal_deg) << i;
+        EXPECT_LE(Reduced(bench::ekf_reduced_config(m, b), b, truth).settled().max, kIdeal_deg) << i;
+    }
+}
+
+// The variance of what is measured, in the units of the covariance and within what its arithmetic bears.
+TEST(Ekf, MeasurementNoiseIsTheSquareWithinItsLimits)
+{
+    const auto told = [](int32_t sigma_permille) {
+        return ekf_measurement(pm_num_ratio(sigma_permille, 1000), pm_num(1));
+    };
+    EXPECT_NEAR(real(told(100), PM_KALMAN_BITS), 0.01, 1e-6);
+    EXPECT_EQ(told(0), PM_KALMAN_LEAST_R);
+    EXPECT_EQ(told(5000), PM_KALMAN_MOST_R);
+}
+
+// ekf_reduced.h: from the speed on at which the EMF of a period is the noise, and not below 0.02.
+TEST(Ekf, TheReducedFilterSeesFromTheSpeedOfItsNoise)
+{
+    const Machine m = bench::kIpmLinear;
+    const Base b = bench::kIpmBase;
+    drive_params_t p = bench::parameters(m, b);
+    p.observer = OBSERVER_ekf_reduced;
+    const auto unit = [](drive_param_id_t id) { return std::pow(10, drive_param_exp10[id]); };
+    const drive_param_info_t &range = drive_param_table[DRIVE_PARAM_ekf_voltage_noise];
+    for (const int32_t told : {range.min, p.ekf_voltage_noise, range.max}) {
+        drive_params_t louder = p;
+        louder.ekf_voltage_noise = told;
+        louder.i_noise = told == range.min ? 1 : p.i_noise;
+        drive_config_t c = {};
+        const drive_result_t result = drive_configure(&c, &louder, PM_CHANNELS);
+        ASSERT_TRUE(result.ok) << drive_param_table[result.param].name << ' ' << result.reason;
+        const double v = louder.ekf_voltage_noise * unit(DRIVE_PARAM_ekf_voltage_noise) *
+                         louder.v_dc_nominal * unit(DRIVE_PARAM_v_dc_nominal) / b.period_s / 1e4;
+        const double i = louder.i_noise * unit(DRIVE_PARAM_i_noise) * m.L_d0_H;
+        const double rho = std::sqrt(std::pow(v * b.period_s, 2) + 2 * i * i);
+        const double noise = rho / (m.psi_m_Wb * b.omega_rad_s * b.period_s);
+        EXPECT_NEAR(real(c.position.observer.ekf_reduced.omega_min), std::max(0.02, noise), 1e-4) << told;
     }
 }
 

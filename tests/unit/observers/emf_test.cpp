@@ -30,6 +30,8 @@ constexpr double kInductance_deg = -3.0, kResistance_deg = -1.3;
 constexpr double kLag = 0.03;
 // eps has 16 fractional bits, and is a ratio of amplitudes known to 2e-5; both within errors of 20 degrees.
 constexpr double kRounding = 6e-5;
+// Second order in omega T_s = 0.054, of the share of a filter's step; a sign that is wrong gives ten times that.
+constexpr double kFirst = 2e-3;
 // Adapted at 1 kHz with a filter of 0.5 ms, in 64 ms at rated current.
 constexpr double kAdapted = 0.02;
 
@@ -281,6 +283,24 @@ TEST(Emf, AWobbleOfTheLoopsSpeedMovesNoResistance)
                 closed.rotation.omega_rad_s * (1 + 0.3 * std::sin(2 * bench::kPi * 12 * k * f.base.period_s));
         }
         EXPECT_NEAR(real(closed.state.back_emf.R), truth, kAdapted * truth) << id;
+    }
+}
+
+// A reset with the truth is the steady state: the first steps show no error, in angle or in length.
+TEST(Emf, TheStepsAfterAResetAreThoseOfTheSteadyState)
+{
+    const Fixture f = ipm();
+    for (const observer_id_t id : kSalient) {
+        for (const double omega : {1.0, -1.0}) {
+            for (const Complex i : {Complex{-1, 4}, Complex{2, -4}}) {
+                Closed closed(f.base, with(id, f.config), Rotation(f.machine, f.base, omega, i));
+                for (int n = 0; n < 3; ++n) {
+                    closed.step();
+                    EXPECT_NEAR(real(closed.out.eps), 0, kFirst) << id << ' ' << omega << ' ' << i;
+                    EXPECT_NEAR(real(closed.out.misfit), 0, kFirst) << id << ' ' << omega << ' ' << i;
+                }
+            }
+        }
     }
 }
 

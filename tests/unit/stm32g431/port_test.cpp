@@ -177,18 +177,24 @@ TEST_F(Port, BreakIsReportedAndThenCleared)
     EXPECT_EQ(TIM1.SR, ~(TIM_SR_BIF | TIM_SR_SBIF));
 }
 
-TEST_F(Port, SlowInputsAlternate)
+TEST_F(Port, SlowInputsTakeTurns)
 {
     hal_slow_t slow = {};
+    VREFINT.CAL = 1654;
+    measure_run(hal);
     ADC1.ISR = ADC_ISR_EOC;
     ADC1.DR = 1309; // 25 degC
     hal_measure_slow(hal, &slow);
     EXPECT_NEAR(slow.temperature_dC, 250, 10);
     EXPECT_FALSE(slow.temperature_missing);
+    EXPECT_FALSE(slow.reference_off);
     EXPECT_EQ(reg_value(ADC_SQR1_SQ1, ADC1.SQR1), 11U);
     ADC1.DR = 4095;
     hal_measure_slow(hal, &slow);
     EXPECT_EQ(slow.dial, 4095U * 16U);
+    EXPECT_EQ(reg_value(ADC_SQR1_SQ1, ADC1.SQR1), 18U);
+    hal_measure_slow(hal, &slow);
+    EXPECT_TRUE(slow.reference_off);
     EXPECT_EQ(reg_value(ADC_SQR1_SQ1, ADC1.SQR1), 5U);
     hal_measure_slow(hal, &slow);
     EXPECT_TRUE(slow.temperature_missing);
@@ -198,6 +204,24 @@ TEST_F(Port, SlowInputsAlternate)
     GPIOC.IDR = 0;
     hal_measure_slow(hal, &slow);
     EXPECT_TRUE(slow.button);
+}
+
+// 1.212 V against the supply: 5 % of it either way.
+TEST_F(Port, TheReferenceIsHeldToFivePerCent)
+{
+    VREFINT.CAL = 1654; // at 3.0 V
+    for (double supply_V = 2.9; supply_V < 3.7; supply_V += 0.01) {
+        const double off = 3.3 / supply_V - 1;
+        if (std::abs(std::abs(off) - 0.05) < 0.002) {
+            continue; // rounding
+        }
+        hal->turn = PORT_REFERENCE;
+        ADC1.ISR = ADC_ISR_EOC;
+        ADC1.DR = static_cast<uint32_t>(1.212 / supply_V * 4096);
+        hal_slow_t slow = {};
+        hal_measure_slow(hal, &slow);
+        EXPECT_EQ(slow.reference_off, std::abs(off) > 0.05) << supply_V;
+    }
 }
 
 TEST_F(Port, CanBitTimes)

@@ -23,6 +23,7 @@ flash_t FLASH;
 syscfg_t SYSCFG;
 pwr_t PWR;
 dbgmcu_t DBGMCU;
+vrefint_t VREFINT;
 
 hal_t port_hal;
 uint32_t port_store[HAL_STORE_PAGES][HAL_STORE_PAGE_SIZE / 4U];

@@ -3,7 +3,7 @@ from pathlib import Path
 
 from . import bus, flash, names
 from . import trace as scope
-from .errors import NoAnswer, NotDone, UsageError
+from .errors import NoAnswer, NotDone, NotInImage, UsageError
 from .output import show, write_text
 
 
@@ -70,7 +70,12 @@ def _verify(arguments, drive, out):
     wanted = ("device_name", "hardware_version", "software_version", "identity.revision", "parameters_ready")
     values = {names.find(name): drive.read(name) for name in wanted}
     show(out, values)
-    if arguments.image and drive.read("stored_eds") not in Path(arguments.image).read_bytes():
+    try:
+        sheet = drive.read("stored_eds") if arguments.image else b""
+    except NotInImage:
+        out.line("its data sheet is not in this image: whether it is this one was not compared")
+        return
+    if arguments.image and sheet not in Path(arguments.image).read_bytes():
         raise NotDone(f"node {drive.node_id} does not run {arguments.image}: its data sheet is another",
                       "is it the board that was written? `pmdrive scan`")
     out.line(f"node {drive.node_id} runs it")
@@ -93,4 +98,9 @@ def flash_board(arguments, drive, out):
 
 
 def eds(arguments, drive, out):
-    write_text(arguments.out, scope.data_sheet(drive), out)
+    try:
+        text = scope.data_sheet(drive)
+    except NotInImage:
+        raise NotDone(f"node {drive.node_id} holds no data sheet: its image does without",
+                      f"it is the one of this tool: {Path(__file__).with_name('pmdrive.eds')}") from None
+    write_text(arguments.out, text, out)

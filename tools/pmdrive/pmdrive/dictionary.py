@@ -428,6 +428,7 @@ FAULTS = (
     Fault(15, "TEMPERATURE_SENSOR", 'temperature sensor broken or shorted', 0x4320, 'check the sensor and its cable'),
     Fault(16, "OVERLOAD", 'windings overloaded', 0x2350, ('the windings were loaded beyond i_rated for too long: let them cool, check '
  'load, i_rated and t_winding')),
+    Fault(17, "SENSOR_REFERENCE", 'reference of the converters off by 5 % or more', 0x5212, "check the processor's supply: currents and voltages are measured against it"),
 )
 
 # Error codes of 603Fh, 1003h and the emergency message beside those of faults
