@@ -99,11 +99,12 @@ void app_trip(app_t *app, drive_fault_t fault)
     hal_unlock(app->hal);
 }
 
-/* Both between two control interrupts: a fault that begins a short has both. */
+/* Fault and stage are of the same instant: one that begins a short is not seen without it. */
 static bool is_open_fault(app_t *app)
 {
     hal_lock(app->hal);
-    const bool open = app->drive.fault != DRIVE_FAULT_NONE && app->drive.stage != STAGE_SHORT;
+    const bool shorted = app->armed && app->drive.stage == STAGE_SHORT;
+    const bool open = app->drive.fault != DRIVE_FAULT_NONE && !shorted;
     hal_unlock(app->hal);
     return open;
 }

@@ -9,6 +9,9 @@
 /* Smallest current with an angle. */
 #define I_LEAST PM_Q(0.02)
 
+/* What is left of the flux at the fault when the current's angle counts. */
+#define FLUX_LEAST PM_Q(0.1)
+
 /* Phase EMF over link voltage, 1 / sqrt(3) and a sixteenth more or less. */
 #define BEGINS PM_UNIT(0.5773503 * 17 / 16)
 #define ENDS   PM_UNIT(0.5773503 * 15 / 16)
@@ -31,7 +34,8 @@ static bool begins(drive_t *drive, drive_fault_t fault)
 {
     const drive_config_t *c = &drive->config;
     const pm_q_t omega = fault == DRIVE_FAULT_POSITION_LOST ? drive->status.omega_ref : drive->pll.omega;
-    drive->fault_short = (fault_short_t){.turn = pm_half(pm_omega_to_angle(omega, c->k_theta))};
+    drive->fault_short =
+        (fault_short_t){.flux = PM_ONE, .turn = pm_half(pm_omega_to_angle(omega, c->k_theta))};
     return c->fault_short.k != 0 && drive->stage >= STAGE_OPEN_LOOP &&
            pm_mul_sat(c->machine.psi_m, pm_abs(omega)) > pm_unit(link(drive), BEGINS);
 }
@@ -55,14 +59,13 @@ PM_APART void fault_short_step(drive_t *drive, drive_out_t *out)
 {
     fault_short_t *self = &drive->fault_short;
     const pm_ab_t i = drive->i_ab;
-    int32_t step = 0;
-    if (pm_abs(i.alpha) > I_LEAST || pm_abs(i.beta) > I_LEAST) {
-        const pm_angle_t theta = pm_atan2(i.beta, i.alpha);
-        step = self->seen ? pm_half(pm_angle_diff(theta, self->theta)) : self->turn;
-        self->theta = theta;
-        self->seen = true;
+    const pm_frac_t k = drive->config.fault_short.k;
+    const pm_angle_t theta = pm_atan2(i.beta, i.alpha);
+    if (pm_lp1(&self->flux, 0, k) < FLUX_LEAST) {
+        const bool has_angle = pm_abs(i.alpha) > I_LEAST || pm_abs(i.beta) > I_LEAST;
+        (void)pm_lp1(&self->turn, has_angle ? pm_half(pm_angle_diff(theta, self->theta)) : 0, k);
     }
-    (void)pm_lp1(&self->turn, step, drive->config.fault_short.k);
+    self->theta = theta;
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
         drive_write_leg(out->compare[x], 0);
     }

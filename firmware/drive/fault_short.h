@@ -16,10 +16,11 @@
  * link by 6 % at most, above the lower one it still might.
  *
  * omega is the estimate, for POSITION_LOST the reference. From then on it is that of the current vector: in the
- * stationary frame the current of a shorted machine turns with the rotor, whatever the estimate says. Its step per
- * period goes through a low-pass of L_q / R_s, the longest time for which the flux of before, which stands still in that
- * frame, distorts the step. So a short that was begun in error ends, too. A current below 2 % of full scale, 40 steps of
- * a 12-bit converter, has no angle and counts as one that stands still.
+ * stationary frame the current of a shorted machine turns with the rotor, whatever the estimate says. The flux of before
+ * stands still in that frame and can hold the current's angle back until it has decayed, at least with L_q / R_s: for
+ * 2.3 L_q / R_s, to a tenth, the angle does not count. Then its step per period does, through a low-pass of L_q / R_s. So
+ * a short that was begun in error ends, too. A current below 2 % of full scale, 40 steps of a 12-bit converter, has no
+ * angle and counts as one that stands still.
  *
  * Limits. At the fault the flux is at most v_dc / (sqrt(3) omega) < psi_m. It stands still while the rotor turns on, and
  * the current is largest when it opposes the magnets:
@@ -51,9 +52,9 @@ typedef struct {
 } fault_short_config_t;
 
 typedef struct {
+    pm_q_t flux;      /* of the moment of the fault: what is left of 1 */
     pm_angle_t theta; /* of the current vector */
     int32_t turn;     /* half its step per period, filtered, in turns of 2^32 */
-    bool seen;        /* there is an angle */
 } fault_short_t;
 
 void make_fault_short(maker_t *m, fault_short_config_t *c);
