@@ -19,11 +19,12 @@
 #define BIT(fault) (UINT32_C(1) << (uint32_t)(fault))
 
 /* Not: a switch that may be broken or is too warm (HARDWARE, OVER_CURRENT, OVER_TEMPERATURE), currents that are not
- * known (SENSOR_...), a program or parameters that are not to be relied on (OVERRUN, PARAMETERS). */
+ * known (SENSOR_...), a program or numbers that are not to be relied on (OVERRUN, PARAMETERS), POSITION_NOT_FOUND, where
+ * nothing turns. */
 #define BORNE                                                                                                \
     (BIT(DRIVE_FAULT_OVER_VOLTAGE) | BIT(DRIVE_FAULT_UNDER_VOLTAGE) | BIT(DRIVE_FAULT_POSITION_LOST) |       \
-     BIT(DRIVE_FAULT_POSITION_NOT_FOUND) | BIT(DRIVE_FAULT_STALL) | BIT(DRIVE_FAULT_OVER_SPEED) |            \
-     BIT(DRIVE_FAULT_REMOTE_LOST) | BIT(DRIVE_FAULT_TEMPERATURE_SENSOR) | BIT(DRIVE_FAULT_OVERLOAD))
+     BIT(DRIVE_FAULT_STALL) | BIT(DRIVE_FAULT_OVER_SPEED) | BIT(DRIVE_FAULT_REMOTE_LOST) |                   \
+     BIT(DRIVE_FAULT_TEMPERATURE_SENSOR) | BIT(DRIVE_FAULT_OVERLOAD))
 
 static pm_q_t link(const drive_t *drive)
 {
