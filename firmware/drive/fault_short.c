@@ -16,15 +16,28 @@
 #define BEGINS PM_UNIT(0.5773503 * 17 / 16)
 #define ENDS   PM_UNIT(0.5773503 * 15 / 16)
 
-#define BIT(fault) (UINT32_C(1) << (uint32_t)(fault))
-
 /* Not: a switch that may be broken or is too warm (HARDWARE, OVER_CURRENT, OVER_TEMPERATURE), currents that are not
  * known (SENSOR_...), a program or numbers that are not to be relied on (OVERRUN, PARAMETERS), POSITION_NOT_FOUND, where
  * nothing turns. */
-#define BORNE                                                                                                \
-    (BIT(DRIVE_FAULT_OVER_VOLTAGE) | BIT(DRIVE_FAULT_UNDER_VOLTAGE) | BIT(DRIVE_FAULT_POSITION_LOST) |       \
-     BIT(DRIVE_FAULT_STALL) | BIT(DRIVE_FAULT_OVER_SPEED) | BIT(DRIVE_FAULT_REMOTE_LOST) |                   \
-     BIT(DRIVE_FAULT_TEMPERATURE_SENSOR) | BIT(DRIVE_FAULT_OVERLOAD))
+static bool leaves_low_switches(drive_fault_t fault)
+{
+    bool leaves = false;
+    switch (fault) {
+    case DRIVE_FAULT_OVER_VOLTAGE:
+    case DRIVE_FAULT_UNDER_VOLTAGE:
+    case DRIVE_FAULT_OVER_SPEED:
+    case DRIVE_FAULT_POSITION_LOST:
+    case DRIVE_FAULT_STALL:
+    case DRIVE_FAULT_OVERLOAD:
+    case DRIVE_FAULT_REMOTE_LOST:
+    case DRIVE_FAULT_TEMPERATURE_SENSOR:
+        leaves = true;
+        break;
+    default:
+        break;
+    }
+    return leaves;
+}
 
 static pm_q_t link(const drive_t *drive)
 {
@@ -44,7 +57,7 @@ static bool begins(drive_t *drive, drive_fault_t fault)
 PM_APART drive_stage_t fault_short_stage(drive_t *drive, drive_fault_t fault)
 {
     drive_stage_t stage = STAGE_OFF;
-    if ((BORNE & BIT(fault)) != 0U) {
+    if (leaves_low_switches(fault)) {
         if (drive->fault != DRIVE_FAULT_NONE) {
             stage = drive->stage;
         } else if (begins(drive, fault)) {
