@@ -65,6 +65,16 @@ typedef struct {
     uint32_t address; /* of the faulty access */
 } hal_last_words_t;
 
+/* What the board is and bears, by its schematic: objects 2001h and 2700h:1 and 2, and nobody else's to change. 0: not
+ * known, or without such a limit. */
+typedef struct {
+    int32_t i_full_scale_mA, v_full_scale_mV;          /* of the converters; always known */
+    int32_t shunt_uohm, current_gain, voltage_divider; /* shunt to converter, converter to link; in 0.001 */
+    int32_t i_limit_mA, v_limit_mV;                    /* phase current, peak, and DC link */
+    int32_t i_bridge_mA, t_bridge_ms; /* phase current that is borne for good, thermal time constant */
+    int32_t dead_time_least_ns, f_pwm_least_Hz, f_pwm_most_Hz;
+} hal_board_t;
+
 /* --- system.c ------------------------------------------------------------------------------------------ */
 
 /* The port's single instance. Ports with several instances, such as sim, do not define it. */
@@ -78,6 +88,7 @@ hal_status_t hal_init(hal_t *hal, const hal_config_t *config);
 void hal_start(hal_t *hal, app_t *app);
 
 const char *hal_board_name(const hal_t *hal);
+const hal_board_t *hal_board(const hal_t *hal); /* any; the same from reset on */
 uint32_t hal_timer_Hz(const hal_t *hal); /* clock of the carrier: timer_counts = timer_Hz / (2 f_pwm) */
 void hal_unique_id(const hal_t *hal, uint32_t id[3]);
 hal_reset_t hal_reset_cause(const hal_t *hal);

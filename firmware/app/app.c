@@ -76,11 +76,12 @@ drive_result_t app_configure(app_t *app, hal_t *hal, const drive_params_t *param
     app->hal = hal;
     app->slow_divider = 1;
     app->params = *params;
+    app_take_board(hal, &app->params);
     app->f_pwm = params->f_pwm;
     app->stored = stored;
-    const drive_result_t result = drive_init(&app->drive, params, hal_channels(hal));
+    const drive_result_t result = drive_init(&app->drive, &app->params, hal_channels(hal));
     app->refused_param = result.param;
-    app->hal_config = app_hal_config(params, bit_rate(hal));
+    app->hal_config = app_hal_config(&app->params, bit_rate(hal));
     app->hardware = hal_init(hal, &app->hal_config) == HAL_OK;
     app->refused = !result.ok || (app->hardware && !carrier_agrees(hal, params));
     if (result.ok) {

@@ -48,7 +48,7 @@ static bool has_machine(const uint32_t *words)
 
 bool app_load(const hal_t *hal, drive_params_t *params, uint32_t *unknown)
 {
-    drive_params_default(params);
+    app_preset(hal, params);
     *unknown = 0;
     const int32_t page = newest(hal);
     if (page < 0) {

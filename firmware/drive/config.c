@@ -66,6 +66,12 @@ static void make_protection(maker_t *m, protection_config_t *c)
               Q_BITS, DRIVE_PARAM_i_rated);
     c->k_heat =
         fixed(m, pm_num_div(m->t_slow, si(m, DRIVE_PARAM_t_winding)), FRAC_BITS, DRIVE_PARAM_t_winding);
+    /* where the bridge bears more than i_trip, it is not asked for as much */
+    const pm_num_t bridge = pm_num_div(si(m, DRIVE_PARAM_i_bridge), m->base.i);
+    c->bridge_heat_max = fixed(m, square(pm_num_mul(pm_num_ratio(21, 20), least(bridge, pm_num(2)))), Q_BITS,
+                               DRIVE_PARAM_i_bridge);
+    c->k_bridge_heat =
+        fixed(m, pm_num_div(m->t_slow, si(m, DRIVE_PARAM_t_bridge)), FRAC_BITS, DRIVE_PARAM_t_bridge);
     c->temp_derate_dC = (int16_t)p->temp_derate;
     c->temp_trip_dC = (int16_t)p->temp_trip;
     c->omega_stall = speed(m, DRIVE_PARAM_speed_max) / 50;
@@ -118,6 +124,23 @@ static void check_machine(maker_t *m)
     }
 }
 
+static void check_board(maker_t *m)
+{
+    static const char reason[] = "beyond what the board bears: schematic";
+    const drive_params_t *p = m->params;
+    if (p->v_dc_max > p->v_limit) {
+        refuse(m, DRIVE_PARAM_v_dc_max, reason);
+    } else if (p->i_max > p->i_limit) {
+        refuse(m, DRIVE_PARAM_i_max, reason);
+    } else if (p->dead_time < p->dead_time_least) {
+        refuse(m, DRIVE_PARAM_dead_time, reason);
+    } else if (p->f_pwm < p->f_pwm_least || p->f_pwm > p->f_pwm_most) {
+        refuse(m, DRIVE_PARAM_f_pwm, reason);
+    } else {
+        /* it bears all */
+    }
+}
+
 static void make_limits(maker_t *m, drive_config_t *config)
 {
     config->k_theta = config->position.pll_low.k_theta;
@@ -155,6 +178,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
                  .channels = channels & PM_CHANNELS,
                  .result = {.ok = true, .param = DRIVE_PARAM_COUNT, .reason = "ok"}};
     check_ranges(&m);
+    check_board(&m);
     check_machine(&m);
     if (!m.result.ok) {
         return m.result;

@@ -29,8 +29,10 @@ typedef struct {
     pm_q_t i_sum;       /* largest believable sum of the phase currents */
     int32_t offset_max; /* of a 16-bit code */
     int16_t temp_derate_dC, temp_trip_dC;
-    pm_q_t heat_max;    /* square of the current that is borne for good, with a margin of 5 % */
-    pm_frac_t k_heat;   /* low-pass of the windings' heat, at 1 kHz */
+    pm_q_t heat_max;        /* square of the current that is borne for good, with a margin of 5 % */
+    pm_frac_t k_heat;       /* low-pass of the windings' heat, at 1 kHz */
+    pm_q_t bridge_heat_max; /* the same of the bridge */
+    pm_frac_t k_bridge_heat;
     pm_q_t omega_stall; /* below: not turning */
     uint16_t stall_ms, lost_ms;
 } protection_config_t;

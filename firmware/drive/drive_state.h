@@ -72,7 +72,8 @@ struct drive {
     uint16_t still_ms; /* standstill while stopping */
     uint16_t agree_ms; /* observer and imposed angle turn alike */
     int32_t temperature_dC;
-    pm_q_t heat; /* of the windings: the current's square, through the low-pass of t_winding */
+    pm_q_t heat;        /* of the windings: the current's square, through the low-pass of t_winding */
+    pm_q_t bridge_heat; /* the same of the bridge, t_bridge */
     fault_short_t fault_short;
 
     /* not of a control period */

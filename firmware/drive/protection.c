@@ -102,6 +102,9 @@ void protection_heat(drive_t *drive)
     if (pm_lp1(&drive->heat, square, c->k_heat) > c->heat_max) {
         drive_trip(drive, DRIVE_FAULT_OVERLOAD);
     }
+    if (pm_lp1(&drive->bridge_heat, square, c->k_bridge_heat) > c->bridge_heat_max) {
+        drive_trip(drive, DRIVE_FAULT_BRIDGE_OVERLOAD);
+    }
 }
 
 /* 1 below `from`, 0 above `to`. */

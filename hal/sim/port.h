@@ -34,6 +34,7 @@ struct hal {
     app_t *app;      /* since hal_start() */
     plant_adc_t adc; /* of the present period */
     uint32_t time_us, timer_Hz;
+    hal_board_t board;
     bool armed, configured;
     bool broke;                        /* a break that is not reported yet */
     uint16_t timer_counts;             /* of half a period */

@@ -8,6 +8,11 @@ void sim_hal_init(hal_t *hal, plant_t *plant)
 {
     memset(hal, 0, sizeof *hal);
     hal->plant = plant;
+    if (plant != NULL) { /* for the store alone there is none */
+        const plant_sensor_t *sensor = plant_sensor(plant);
+        hal->board.i_full_scale_mA = (int32_t)(sensor->i_full_scale_A * 1e3 + 0.5);
+        hal->board.v_full_scale_mV = (int32_t)(sensor->v_full_scale_V * 1e3 + 0.5);
+    }
     hal->timer_Hz = TIMER_HZ;
     hal->temperature_dC = 250;
     hal->store_bytes_left = UINT32_MAX;
@@ -31,6 +36,12 @@ const char *hal_board_name(const hal_t *hal)
 {
     (void)hal;
     return "simulated board";
+}
+
+/* Without limits of its own: those of the machine count. */
+const hal_board_t *hal_board(const hal_t *hal)
+{
+    return &hal->board;
 }
 
 uint32_t hal_timer_Hz(const hal_t *hal)

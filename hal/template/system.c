@@ -55,6 +55,15 @@ const char *hal_board_name(const hal_t *hal)
 }
 
 /* What the PWM counter counts by. */
+/* By your schematic. What the bridge bears for an instant and for good, the least dead time of its drivers, the
+ * carriers that leave the control interrupt its time: the drive refuses what is beyond. */
+const hal_board_t *hal_board(const hal_t *hal)
+{
+    static const hal_board_t board = {.i_full_scale_mA = 10000, .v_full_scale_mV = 450000};
+    (void)hal;
+    return &board;
+}
+
 uint32_t hal_timer_Hz(const hal_t *hal)
 {
     (void)hal;

@@ -64,8 +64,22 @@ static bool load(void *context, uint32_t address, const uint8_t *data, uint32_t 
     return true;
 }
 
+/* To 1 %: parts have tolerances. */
+static bool near(double x, double wanted)
+{
+    return fabs(x - wanted) <= 0.01 * wanted;
+}
+
 board_t *board_create(const char *elf_path, plant_t *plant, char *error, size_t error_size)
 {
+    const plant_sensor_t *sensor = plant_sensor(plant);
+    if (!near(sensor->i_full_scale_A, BOARD_I_FULL_SCALE_A) ||
+        !near(sensor->v_full_scale_V, BOARD_V_FULL_SCALE_V)) {
+        snprintf(error, error_size,
+                 "the plant's sensors for %.4g A and %.4g V are not the board's, %.4g A and %.4g V",
+                 sensor->i_full_scale_A, sensor->v_full_scale_V, BOARD_I_FULL_SCALE_A, BOARD_V_FULL_SCALE_V);
+        return NULL;
+    }
     board_t *board = calloc(1, sizeof *board);
     if (!board) {
         snprintf(error, error_size, "out of memory");

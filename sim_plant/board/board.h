@@ -2,9 +2,9 @@
  * plant. One PWM period after the other.
  *
  * TIM1 drives the legs, the converters sample at the instants that TIM1 triggers, the comparators act on the
- * timer's break input without software. Shunts, amplifiers and dividers are those of the plant's sensor
- * section: full scale there is full scale of the converter. What is not modelled is an error that names
- * register and PC, never a guess. docs/board.md.
+ * timer's break input without software. Shunts, amplifiers and dividers are those of the schematic, below: a plant
+ * whose sensors have other full scales is refused. What is not modelled is an error that names register and PC,
+ * never a guess. docs/board.md.
  *
  * A period k runs from one update event of TIM1 to the next: processor until t_k+1, the plant behind it,
  * moved on where something happens in it: samples, legs switched on or off, t_k+1. A break by the comparators
@@ -24,6 +24,16 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+/* Of the schematic: shunts, amplifiers with the network in front of them, divider of 169 and 18 kohm, and how long
+ * the amplifiers take after an edge. */
+#define BOARD_SHUNT_OHM      3e-3
+#define BOARD_CURRENT_GAIN   (16.0 * 4.0 / 7.0)
+#define BOARD_DIVIDER        (187.0 / 18.0)
+#define BOARD_CONVERTER_V    3.3
+#define BOARD_I_FULL_SCALE_A (0.5 * BOARD_CONVERTER_V / (BOARD_SHUNT_OHM * BOARD_CURRENT_GAIN))
+#define BOARD_V_FULL_SCALE_V (BOARD_CONVERTER_V * BOARD_DIVIDER)
+#define BOARD_SETTLE_S       1.3e-6
 
 typedef struct board board_t;
 

@@ -9,6 +9,7 @@ import argparse
 import contextlib
 import io
 import json
+import re
 import socket
 import subprocess
 import sys
@@ -112,6 +113,13 @@ class Bench:
                 [e for e in names.stored() if e.record in names.DRIVE_RECORDS]).items()}
 
 
+def board_ratios(name):
+    """Voltages and currents of the emulated board over those of a machine's sensors: sim_plant/board/board.h."""
+    text = (ROOT / f"sim_plant/machines/{name}.yaml").read_text(encoding="utf-8")
+    v, i = (float(re.search(rf"{key}: ([0-9.]+)", text)[1]) for key in ("v_full_scale_V", "i_full_scale_A"))
+    return 3.3 * 187 / 18 / v, 1.65 / (3e-3 * 64 / 7) / i
+
+
 def within(name, found, truth, bound):
     error = found / truth - 1
     assert abs(error) <= bound, f"{name}: {found:g}, {100 * error:+.1f} % off"
@@ -130,6 +138,7 @@ def run_live(pmsim, image, name, folder):
     """Its parameters after identification and tuning."""
     machine = MACHINES[name]
     current, pole_pairs, speed, dc_link = machine["plate"]
+    offset = 0.005 * current
     R, L_d, L_q, psi, J = machine["truth"]
     true = {"R_s": R, "L_d": L_d, "L_q": L_q, "psi_m": psi, "J": J, "L_q_rated": L_q, "L_dh_rated": L_d,
             "L_qh_rated": L_q}
@@ -137,13 +146,18 @@ def run_live(pmsim, image, name, folder):
     wrong = {**OTHER, **{key: factor * true[key] for key, factor in factors.items()}, "L_dqh_rated": 0, "cross_half": 0}
     path = Path(folder) / f"{name}.yaml"
     path.write_text(NODE.format(machine=ROOT / f"sim_plant/machines/{name}.yaml", seed=len(name),
-                                offset=0.005 * current, drive=yaml_map(wrong)), encoding="utf-8")
+                                offset=offset, drive=yaml_map(wrong)), encoding="utf-8")
+    truth = machine["truth"]
+    if image:  # `pmsim board --similar` winds the machine for the board
+        v, i = board_ratios(name)
+        current, dc_link = current * i, dc_link * v
+        truth = (R * v / i, L_d * v / i, L_q * v / i, psi * v, J * v * i)
     bench = Bench(pmsim, image, path)
     try:
         assert bench.answer("scan") == {"nodes": [1]}
         bench.command("identify", "--yes", "--rated-current", f"{current}A", "--pole-pairs", str(pole_pairs),
                       "--max-speed", f"{speed}rad/s", "--dc-link", f"{dc_link}V")
-        check_results(bench.parameters(), machine["truth"])
+        check_results(bench.parameters(), truth)
         bench.command("tune", "--yes")
         found = bench.parameters()
         bench.command("save")

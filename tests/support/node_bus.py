@@ -134,7 +134,7 @@ class Node:
     """The program and what it prints."""
 
     def __init__(self, pmsim, bus, *options, scenario=SCENARIO, image=None):
-        what = ["node"] if image is None else ["board", image]  # the latter on the emulated board
+        what = ["node"] if image is None else ["board", image, "--similar"]  # the latter on the emulated board
         self.process = subprocess.Popen(
             [pmsim, *what, scenario, "--can", bus, *map(str, options)],
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)

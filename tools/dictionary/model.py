@@ -180,8 +180,8 @@ def _check_use(entry, least, most):
             raise entry.error("a parameter of the drive is an i32 with unit, range and preset")
         if least >= most or most == 2**31 - 1 or least == -(2**31) or entry.exp10 > 0:
             raise entry.error("a parameter needs a range with room beyond both ends, and exp10 of 0 or less")
-        if not entry.writable or not entry.stored:
-            raise entry.error("a parameter of the drive can be written and is stored")
+        if entry.writable != entry.stored:
+            raise entry.error("a parameter of the drive can be written and is stored, or neither: what the board says")
     if entry.stored and not entry.writable:
         raise entry.error("what is stored must be writable")
     if entry.stored and entry.preset is None:

@@ -89,7 +89,8 @@ void read_channels(Event &event, const Map &map, const Setup &setup)
             throw InputError(map.key_place(entry.key),
                              "the machine has a flux map, which this does not change");
         }
-        target = value->number(entry.min, entry.max) * (entry.unit != nullptr ? entry.unit(setup) : 1.0);
+        target = value->number(entry.min, entry.max) *
+                 (entry.unit != nullptr ? entry.unit(setup) : setup.similarity.of_key(entry.key));
     }
 }
 
@@ -102,6 +103,9 @@ std::optional<std::array<double, PLANT_LEGS>> read_legs_of(const Map &map, const
     }
     std::array<double, PLANT_LEGS> legs{};
     read_legs(*value, leg_count(setup.plant), -1e5, 1e5, legs.data());
+    for (double &leg : legs) {
+        leg *= setup.similarity.of_key(key);
+    }
     return legs;
 }
 
@@ -144,7 +148,8 @@ ShortCircuit read_short(const Value &value, const Setup &setup)
         return {0, -1, -1.0};
     }
     const Map map(value, {"from", "to", "R_ohm"});
-    ShortCircuit tie{read_leg(map.at("from"), setup), -1, map.at("R_ohm").number(0, 1e6)};
+    ShortCircuit tie{read_leg(map.at("from"), setup), -1,
+                     map.at("R_ohm").number(0, 1e6) * setup.similarity.of_key("R_ohm")};
     const Value to = map.at("to");
     if (to.text() != "rail") {
         tie.leg_b = read_leg(to, setup);

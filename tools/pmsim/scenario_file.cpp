@@ -32,6 +32,16 @@ void read_window(Scenario &scenario, Expectation &expectation, const Value &item
     }
 }
 
+void make_similar(Expectation &expectation, const Similarity &similarity)
+{
+    const double factor = similarity.of_unit(find_metric(expectation.metric)->unit);
+    for (std::optional<double> *bound : {&expectation.min, &expectation.max, &expectation.max_abs}) {
+        if (*bound) {
+            **bound *= factor;
+        }
+    }
+}
+
 bool can_be(const plant_config_t &config, const char *&reason)
 {
     plant_t *plant = plant_create(&config, 0.0, &reason);
@@ -134,6 +144,7 @@ Scenario ScenarioFile::scenario(const Run &run) const
     scenario.title = map.at("title").text();
     scenario.setup = read_layers(map, settings_);
     require_drive(scenario.setup);
+    fit_board(scenario.setup);
     if (run.seed) {
         scenario.seed = *run.seed;
     } else if (const auto seed = value_of(seed_key)) {
@@ -154,6 +165,7 @@ Scenario ScenarioFile::scenario(const Run &run) const
         for (const Value &item : expect->list()) {
             scenario.expect.push_back(read_expectation(item));
             read_window(scenario, scenario.expect.back(), item);
+            make_similar(scenario.expect.back(), scenario.setup.similarity);
         }
     }
     return scenario;

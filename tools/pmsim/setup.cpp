@@ -57,29 +57,6 @@ void require_all(const Setup &setup, const Map &map)
     }
 }
 
-// What the board fixes, unless `drive:` says otherwise on purpose.
-void derive_board_parameters(Setup &setup)
-{
-    const plant_inverter_t &inverter = setup.plant.inverter;
-    const plant_sensor_t &sensor = setup.plant.sensor;
-    const auto derive = [&setup](drive_param_id_t id, double si) {
-        if (setup.given.count(std::string("drive.") + drive_param_table[id].name) == 0) {
-            set_parameter_si(*setup.params, id, si);
-        }
-    };
-    derive(DRIVE_PARAM_f_pwm, inverter.f_pwm_Hz);
-    derive(DRIVE_PARAM_timer_counts, inverter.timer_counts);
-    derive(DRIVE_PARAM_dead_time, inverter.dead_time_s);
-    derive(DRIVE_PARAM_device_drop, 0.5 * (inverter.v_switch_V + inverter.v_diode_V));
-    derive(DRIVE_PARAM_v_dc_nominal, setup.rated.v_dc_V);
-    derive(DRIVE_PARAM_i_full_scale, sensor.i_full_scale_A);
-    derive(DRIVE_PARAM_v_full_scale, sensor.v_full_scale_V);
-    derive(DRIVE_PARAM_t_settle, sensor.shunt == PLANT_LOW_SIDE ? sensor.settle_s : 0.0);
-    // rounding adds to the noise; codes have 16 bits at most
-    const double lsb_A = std::ldexp(2.0 * sensor.i_full_scale_A, -(sensor.bits > 0 ? sensor.bits : 16));
-    derive(DRIVE_PARAM_i_noise, lsb_A * std::sqrt(sensor.noise_lsb * sensor.noise_lsb + 1.0 / 12.0));
-}
-
 void read_flux_map_section(Setup &setup, const Value &value)
 {
     setup.flux_map = std::make_shared<const FluxMap>(read_flux_map(value));
@@ -178,6 +155,28 @@ void read_setting(Setup &setup, const std::string &section, const std::string &k
     }
     expand_trapezoid(setup);
     derive_board_parameters(setup);
+}
+
+void derive_board_parameters(Setup &setup)
+{
+    const plant_inverter_t &inverter = setup.plant.inverter;
+    const plant_sensor_t &sensor = setup.plant.sensor;
+    const auto derive = [&setup](drive_param_id_t id, double si) {
+        if (setup.given.count(std::string("drive.") + drive_param_table[id].name) == 0) {
+            set_parameter_si(*setup.params, id, si);
+        }
+    };
+    derive(DRIVE_PARAM_f_pwm, inverter.f_pwm_Hz);
+    derive(DRIVE_PARAM_timer_counts, inverter.timer_counts);
+    derive(DRIVE_PARAM_dead_time, inverter.dead_time_s);
+    derive(DRIVE_PARAM_device_drop, 0.5 * (inverter.v_switch_V + inverter.v_diode_V));
+    derive(DRIVE_PARAM_v_dc_nominal, setup.rated.v_dc_V);
+    derive(DRIVE_PARAM_i_full_scale, sensor.i_full_scale_A);
+    derive(DRIVE_PARAM_v_full_scale, sensor.v_full_scale_V);
+    derive(DRIVE_PARAM_t_settle, sensor.shunt == PLANT_LOW_SIDE ? sensor.settle_s : 0.0);
+    // rounding adds to the noise; codes have 16 bits at most
+    const double lsb_A = std::ldexp(2.0 * sensor.i_full_scale_A, -(sensor.bits > 0 ? sensor.bits : 16));
+    derive(DRIVE_PARAM_i_noise, lsb_A * std::sqrt(sensor.noise_lsb * sensor.noise_lsb + 1.0 / 12.0));
 }
 
 void read_sections(Setup &setup, const Map &map, bool is_machine_file)

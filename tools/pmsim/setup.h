@@ -14,6 +14,7 @@
 
 #include "tools/pmsim/drive_parameters.h"
 #include "tools/pmsim/flux_map.h"
+#include "tools/pmsim/similarity.h"
 #include "tools/pmsim/yaml_reader.h"
 
 extern "C" {
@@ -40,6 +41,7 @@ struct Setup {
     double i_break_A; // over-current comparator of the board; 0: none
     Parameters params;
     std::map<std::string, Place> given; // "section.key": where it stands, the last time
+    Similarity similarity;              // to what the files say
 };
 
 const std::vector<std::string> &setup_sections(); // including "drive"
@@ -51,6 +53,9 @@ Setup default_setup();
 // Reads the sections that are present. In a machine file every value that describes the machine must be.
 void read_sections(Setup &setup, const Map &map, bool is_machine_file);
 void read_setting(Setup &setup, const std::string &section, const std::string &key, const Value &value);
+
+// The parameters that follow from inverter and sensors, unless `drive:` says otherwise on purpose.
+void derive_board_parameters(Setup &setup);
 
 // Three phases: 3; two sets or an open winding: 6.
 int leg_count(const plant_config_t &plant);

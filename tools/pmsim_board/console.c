@@ -14,7 +14,7 @@ static const plant_config_t bench = {
     .mech = {.J_kgm2 = 1e-4, .B_Nms = 1e-5},
     .inverter = {.f_pwm_Hz = 20000.0, .dead_time_s = 500e-9, .timer_counts = 4250},
     .dclink = {.v_source_V = 24.0},
-    .sensor = {.bits = 12, .i_full_scale_A = 60.0, .v_full_scale_V = 34.0},
+    .sensor = {.bits = 12, .i_full_scale_A = BOARD_I_FULL_SCALE_A, .v_full_scale_V = BOARD_V_FULL_SCALE_V},
 };
 
 static bool begins_line(const char *text, const char *word)

@@ -6,10 +6,12 @@
 #include <iostream>
 #include <map>
 
+#include "sim_plant/board/board.h"
 #include "tools/pmsim/command_line.h"
 #include "tools/pmsim/input_files.h"
 #include "tools/pmsim/node_command.h"
 #include "tools/pmsim/run_command.h"
+#include "tools/pmsim/similarity.h"
 #include "tools/pmsim/yaml_reader.h"
 #include "tools/pmsim_board/console.h"
 #include "tools/pmsim_board/figures_report.h"
@@ -26,7 +28,7 @@ struct BoardOptions {
     int load = BUS_QUIET; // a bus_noise_kind_t
     double console_s = 0.0;
     int gdb_port = -1;
-    bool busy = false;
+    bool busy = false, similar = false;
 };
 
 // NAME=MOST: a line like those of the expectations. Returns whether it holds.
@@ -76,6 +78,10 @@ int run(RunOptions options, const BoardOptions &board, NodeOptions node)
     rig_board_bus_load(static_cast<bus_noise_kind_t>(board.load));
     if (board.busy) {
         rig_board_busy();
+    }
+    use_board({BOARD_I_FULL_SCALE_A, BOARD_V_FULL_SCALE_V, BOARD_SETTLE_S, board.similar});
+    if (board.similar) {
+        rig_board_similar();
     }
     if (board.gdb_port >= 0) {
         rig_board_gdb(static_cast<uint16_t>(board.gdb_port));
@@ -134,6 +140,10 @@ int main(int argc, char **argv)
         "--busy", board.busy,
         "beside the scenario, the bus keeps the image busy: a trace of eight signals in every period, "
         "armed again and again, and a parameter written now and then");
+    app.add_flag("--similar", board.similar,
+                 "the machine, its inverter and its load wound again for the board, whose converters see 60 "
+                 "A and 34 V: the "
+                 "same in per unit; values in the scenario with them");
     app.add_option("--figures", board.figures,
                    "write instructions, cycles, stack and load to this file (JSON)");
     app.add_option("--limit", board.limits,

@@ -35,7 +35,7 @@ struct rig {
 };
 
 static const char *image_path;
-static bool live, busy;
+static bool live, busy, similar;
 static int gdb_port = -1;
 static bus_noise_kind_t noise;
 
@@ -48,6 +48,11 @@ void rig_board_image(const char *elf_path, bool commands_by_bus)
 void rig_board_bus_load(bus_noise_kind_t kind)
 {
     noise = kind;
+}
+
+void rig_board_similar(void)
+{
+    similar = true;
 }
 
 void rig_board_busy(void)
@@ -66,6 +71,12 @@ static uint32_t make_page(const drive_params_t *params, uint32_t words[STORE_WOR
     return noise == BUS_QUIET ? app_page(params, 1, words) : bus_load_page(params, 1000, words);
 }
 
+/* Wound again with the machine: then its preset is another. */
+static bool is_wound(drive_param_id_t id)
+{
+    return similar && strcmp(drive_param_text[id].unit, "A") == 0;
+}
+
 /* A parameter that the image has not, and that is not as it would be without it */
 static const char *missing(const twin_t *twin, const uint32_t page[])
 {
@@ -75,7 +86,7 @@ static const char *missing(const twin_t *twin, const uint32_t page[])
         const store_pair_t pair = store_pair(page, (uint32_t)n);
         const od_entry_t *entry = od_find((uint16_t)(pair.id >> 8), (uint8_t)(pair.id & 0xFFU), &has_index);
         if (entry->kind == (uint8_t)OD_PARAMETER && !twin->has(pair.id) &&
-            pair.value != drive_param_table[entry->slot].def) {
+            pair.value != drive_param_table[entry->slot].def && !is_wound((drive_param_id_t)entry->slot)) {
             return drive_param_table[entry->slot].name;
         }
     }
@@ -92,7 +103,8 @@ static bool check_parameters(rig_t *rig, const twin_t *twin, const uint32_t page
     }
     const char *reason = twin->configure(page, &rig->scale, &parameter);
     if (reason != NULL && !refusal_expected) {
-        snprintf(error, error_size, "drive refuses parameter %s: %s", parameter, reason);
+        snprintf(error, error_size, "drive refuses parameter %s: %s%s", parameter, reason,
+                 similar ? "" : " (--similar: a machine for other voltages)");
         return false;
     }
     return true;

@@ -28,6 +28,9 @@ void rig_board_bus_load(bus_noise_kind_t kind);
 /* Beside the scenario, requests to the image keep it busy (load.h). */
 void rig_board_busy(void);
 
+/* Machines are wound for the board, with their presets: tools/pmsim/similarity.h. */
+void rig_board_similar(void);
+
 #ifdef __cplusplus
 }
 #endif

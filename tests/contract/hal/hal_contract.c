@@ -109,6 +109,17 @@ static void float_all(struct app *app)
     app->out.trip = 0;
 }
 
+/* Full scales are known, and limits make sense beside them. */
+static void check_board(run_t *run)
+{
+    const hal_board_t *board = hal_board(run->hal);
+    check(run, "full scale of the currents", board->i_full_scale_mA >= 100, board->i_full_scale_mA);
+    check(run, "full scale of the link", board->v_full_scale_mV >= 5000, board->v_full_scale_mV);
+    check(run, "current limit within it", board->i_limit_mA <= board->i_full_scale_mA, board->i_limit_mA);
+    check(run, "voltage limit within it", board->v_limit_mV <= board->v_full_scale_mV, board->v_limit_mV);
+    check(run, "carriers in order", board->f_pwm_least_Hz <= board->f_pwm_most_Hz, board->f_pwm_least_Hz);
+}
+
 static void check_refusals(run_t *run)
 {
     const hal_config_t good = run->contract->config;
@@ -119,6 +130,7 @@ static void check_refusals(run_t *run)
     check(run, "configuration taken", hal_init(run->hal, &good) == HAL_OK, 0);
     check(run, "off after init", !hal_bridge_armed(run->hal), 0);
     check(run, "a name", hal_board_name(run->hal)[0] != '\0', 0);
+    check_board(run);
     const uint32_t carrier_us = (uint32_t)(2000000ULL * good.timer_counts / hal_timer_Hz(run->hal));
     const int32_t off_us = (int32_t)(carrier_us - run->contract->period_us);
     check(run, "timer clock makes the period", off_us >= -1 && off_us <= 1, off_us);

@@ -19,7 +19,7 @@ class Board:
     """A run that waits for a client."""
 
     def __init__(self):
-        self.process = subprocess.Popen([PMSIM, "board", IMAGE, SCENARIO, "--gdb", "0"], text=True,
+        self.process = subprocess.Popen([PMSIM, "board", IMAGE, SCENARIO, "--similar", "--gdb", "0"], text=True,
                                         stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         line = self.process.stderr.readline()
         self.port = int(re.search(r"localhost:(\d+)", line)[1])

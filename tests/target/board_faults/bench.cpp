@@ -1,6 +1,9 @@
 #include "bench.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <map>
 #include <stdexcept>
 
 namespace bench
@@ -14,15 +17,44 @@ constexpr uint32_t store_address = 0x0801F000;
 plant_config_t plant_config()
 {
     plant_config_t c = plants::ipm_1000();
-    c.sensor.shunt = PLANT_LOW_SIDE;
+    const double ohms = kVolts / kAmperes;
+    c.machine.R_s_ohm *= ohms;
+    c.machine.L_d0_H *= ohms;
+    c.machine.L_q0_H *= ohms;
+    c.machine.c_A_Wb5 *= kAmperes / std::pow(kVolts, 5);
+    c.machine.psi_m_Wb *= kVolts;
+    c.mech.J_kgm2 *= kVolts * kAmperes;
+    c.mech.B_Nms *= kVolts * kAmperes;
     c.mech.locked = true;
+    c.inverter.v_switch_V *= kVolts;
+    c.inverter.v_diode_V *= kVolts;
+    c.dclink.v_source_V *= kVolts;
+    c.dclink.r_source_ohm *= ohms;
+    c.dclink.c_F /= ohms;
+    c.sensor.i_full_scale_A = BOARD_I_FULL_SCALE_A;
+    c.sensor.v_full_scale_V = BOARD_V_FULL_SCALE_V;
+    c.sensor.shunt = PLANT_LOW_SIDE;
     return c;
 }
 
 drive_params_t params()
 {
+    const std::map<std::string, double> factors = {
+        {"V", kVolts},  {"A", kAmperes},          {"ohm", kVolts / kAmperes},  {"H", kVolts / kAmperes},
+        {"Wb", kVolts}, {"F", kAmperes / kVolts}, {"kg m2", kVolts * kAmperes}};
     drive_params_t p;
     drive_params_default(&p);
+    for (int32_t n = 0; n < DRIVE_PARAM_COUNT; ++n) {
+        const auto id = static_cast<drive_param_id_t>(n);
+        const auto found = factors.find(drive_param_text[id].unit);
+        if (found != factors.end()) {
+            const double value = std::round(found->second * drive_param_get(&p, id));
+            const drive_param_info_t &range = drive_param_table[id]; // the limits are open to their ends
+            drive_param_set(&p, id, int32_t(std::clamp<double>(value, range.min, range.max)));
+        }
+    }
+    p.i_full_scale = int32_t(std::lround(1e3 * BOARD_I_FULL_SCALE_A));
+    p.v_full_scale = int32_t(std::lround(1e3 * BOARD_V_FULL_SCALE_V));
     return p;
 }
 

@@ -1,4 +1,5 @@
-// The flashed image on the emulated board with IPM-1000, its parameters in flash, commands over CAN.
+// The flashed image on the emulated board with IPM-1000 wound for its voltage and current, its parameters in flash,
+// commands over CAN.
 #ifndef TESTS_TARGET_BOARD_FAULTS_BENCH_H
 #define TESTS_TARGET_BOARD_FAULTS_BENCH_H
 
@@ -25,6 +26,9 @@ namespace bench
 
 extern const char *image, *contract; // paths, from the command line
 
+// The board's full scales over those of METHODS.md 0.3.
+constexpr double kVolts = BOARD_V_FULL_SCALE_V / 450, kAmperes = BOARD_I_FULL_SCALE_A / 10;
+
 plant_config_t plant_config();
 drive_params_t params();
 
@@ -40,8 +44,8 @@ class Bench
     void boot();
     void run_ms(double ms); // the run must not end with an error
     void command(bool enable, drive_mode_t mode = DRIVE_MODE_CURRENT, int32_t speed_mrad_s = 0,
-                 int32_t current_mA = 2000, bool clear = false);
-    void running(); // on, with a current of 2 A that turns slowly
+                 int32_t current_mA = 12000, bool clear = false);
+    void running(); // on, with a current of 12 A that turns slowly
     bool bridge_on() const;
     std::string console() const;
     plant_truth_t truth() const;

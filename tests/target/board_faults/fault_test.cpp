@@ -9,12 +9,12 @@ namespace
 
 using bench::Bench;
 
-// A short between the two terminals that differ most, 0.5 ohm and 1 uH.
+// A short between the two terminals that differ most, 0.05 ohm and 1 uH.
 void short_terminals(const Bench &b)
 {
     const uint32_t *compare = &board_inside(b.board)->tim1.regs.value[0x34 / 4];
     const auto [least, most] = std::minmax_element(compare, compare + 3);
-    plant_set_short(b.plant, static_cast<int>(least - compare), static_cast<int>(most - compare), 0.5);
+    plant_set_short(b.plant, static_cast<int>(least - compare), static_cast<int>(most - compare), 0.05);
 }
 
 // The processor stands still: only comparators and timer are left. The short carries a steep current in every

@@ -189,7 +189,7 @@ TEST(BoardReset, APageCutShortFallsBackToTheOther)
 {
     drive_params_t older = bench::params();
     drive_params_t newer = bench::params();
-    newer.i_trip = 5000;
+    newer.i_trip = 45000;
     for (bool cut : {false, true}) {
         Bench b;
         b.store(0, older, 1);

@@ -62,13 +62,14 @@ TEST(BoardRun, CurrentsArriveWithSignAndScale)
         b.run_ms(0.1);
         const image_in_t &in = b.watched()->in;
         for (int leg = 0; leg < DRIVE_LEGS; leg++) {
-            double seen_A = 10.0 * (in.i_leg[leg] / 32768.0 - 1.0);
-            EXPECT_NEAR(seen_A, before.i_A[leg], 0.03); // 0.6 us later, 12 bits, 0.5 LSB of noise
+            double seen_A = BOARD_I_FULL_SCALE_A * (in.i_leg[leg] / 32768.0 - 1.0);
+            EXPECT_NEAR(seen_A, before.i_A[leg],
+                        0.03 * bench::kAmperes); // 0.6 us later, 12 bits, 0.5 LSB of noise
             most_A = std::fmax(most_A, std::fabs(before.i_A[leg]));
         }
-        EXPECT_NEAR(450.0 * in.v_dc / 65536.0, before.v_dc_V, 0.5);
+        EXPECT_NEAR(BOARD_V_FULL_SCALE_V * in.v_dc / 65536.0, before.v_dc_V, 0.5 * bench::kVolts);
     }
-    EXPECT_GT(most_A, 1.0);
+    EXPECT_GT(most_A, 1.0 * bench::kAmperes);
 }
 
 TEST(BoardRun, TemperatureDialAndButton)

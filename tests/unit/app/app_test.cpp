@@ -105,7 +105,7 @@ TEST(App, PowerLostInMidWriteKeepsTheOldParameters)
     const drive_params_t old = defaults();
     drive_params_t wanted = old;
     wanted.i_max = 1234;
-    const uint32_t bytes = 4 * (4 + 2 * DRIVE_PARAM_COUNT + 2);
+    const uint32_t bytes = 4 * (4 + 2 * Bench::stored_parameters() + 2);
     for (uint32_t cut = 0; cut < bytes; ++cut) {
         Bench x;
         ASSERT_TRUE(app_save(&x.loop.hal, &old));
@@ -116,6 +116,26 @@ TEST(App, PowerLostInMidWriteKeepsTheOldParameters)
         ASSERT_TRUE(app_load(&x.loop.hal, &back, &unknown)) << cut;
         EXPECT_EQ(back.i_max, old.i_max) << cut;
     }
+}
+
+// What the converters see is the board's to say, whatever was stored; without parameters its presets fit it.
+TEST(App, ScalesAreThoseOfTheBoard)
+{
+    Bench x;
+    x.loop.hal.board.i_full_scale_mA = 60150;
+    x.loop.hal.board.v_full_scale_mV = 45000;
+    x.boot(nullptr);
+    EXPECT_EQ(x.loop.app.params.i_full_scale, 60150);
+    EXPECT_EQ(x.loop.app.params.v_full_scale, 45000);
+    EXPECT_EQ(x.loop.app.params.v_dc_nominal, 30000);
+    EXPECT_EQ(x.loop.app.params.v_dc_max, 40000);
+    EXPECT_FALSE(x.loop.app.refused) << drive_param_table[x.loop.app.refused_param].name;
+    drive_params_t stored = x.loop.app.params;
+    stored.i_full_scale = 1000;
+    stored.v_dc_nominal = 24000;
+    x.boot(&stored);
+    EXPECT_EQ(x.loop.app.params.i_full_scale, 60150);
+    EXPECT_EQ(x.loop.app.params.v_dc_nominal, 24000);
 }
 
 TEST(App, NamesOfAnotherVersionAreLeftOut)

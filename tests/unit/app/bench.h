@@ -139,17 +139,31 @@ class Bench
         return value;
     }
 
-    // Where a parameter of the drive is in the dictionary
+    // Where a parameter of the drive is in the dictionary; those of the schematic are neither written nor stored
     static const od_entry_t *entry_of(drive_param_id_t id)
     {
         for (uint32_t row = 0; row < od_count; ++row) {
             if (od_table[row].kind == OD_PARAMETER && od_table[row].slot == id &&
-                (od_table[row].flags & OD_STORED) != 0) {
+                ((od_table[row].flags & OD_STORED) != 0 || (od_table[row].flags & OD_WRITE) == 0)) {
                 return &od_table[row];
             }
         }
         ADD_FAILURE() << id;
         return nullptr;
+    }
+
+    static bool is_stored(drive_param_id_t id)
+    {
+        return (entry_of(id)->flags & OD_STORED) != 0;
+    }
+
+    static uint32_t stored_parameters()
+    {
+        uint32_t count = 0;
+        for (int id = 0; id < DRIVE_PARAM_COUNT; ++id) {
+            count += is_stored(drive_param_id_t(id)) ? 1 : 0;
+        }
+        return count;
     }
 
     uint32_t set(drive_param_id_t id, int32_t value)

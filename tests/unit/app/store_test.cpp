@@ -40,7 +40,8 @@ bool save_i_max(hal_t *hal, int32_t value)
     return app_save(hal, &params);
 }
 
-const uint32_t words_of_page = 2 + 4 + 2 * DRIVE_PARAM_COUNT + 2; // behind another seal of the old one
+const uint32_t words_of_page =
+    2 + 4 + 2 * Bench::stored_parameters() + 2; // behind another seal of the old one
 
 // The last word reads as written once, and as erased after the next power cut, which comes while the other page is
 // erased: that one was good and must not have been given up.

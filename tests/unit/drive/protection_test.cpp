@@ -468,6 +468,32 @@ TEST(Protection, WindingsAreOverloadedInEveryModeAfterTheirTime)
     }
 }
 
+// The same of the bridge, which another board bears better or worse: i_bridge, t_bridge.
+TEST(Protection, TheBridgeIsOverloadedAfterItsTime)
+{
+    drive_params_t p = direct::params();
+    p.t_bridge = 5000;
+    p.i_rated = 8000; // the windings bear more
+    p.i_bridge = 2000;
+    for (const double share : {2.0, 1.04}) {
+        Drive x(p);
+        x.d.state = DRIVE_RUNNING;
+        x.d.stage = STAGE_VECTOR;
+        x.d.i_ab = {static_cast<pm_q_t>(std::lround(0.2 * share * PM_ONE)), 0};
+        int ms = 0;
+        for (; ms < 100000 && x.d.fault == DRIVE_FAULT_NONE; ++ms) {
+            protection_heat(&x.d);
+        }
+        if (share < 1.05) {
+            EXPECT_EQ(x.d.fault, DRIVE_FAULT_NONE);
+            continue;
+        }
+        const double expected_ms = 5e3 * std::log(share * share / (share * share - 1.05 * 1.05));
+        EXPECT_EQ(x.d.fault, DRIVE_FAULT_BRIDGE_OVERLOAD);
+        EXPECT_NEAR(ms, expected_ms, 0.005 * expected_ms);
+    }
+}
+
 // More torque than there is, and no speed: also a stall. Torque within the limit may hold a rotor for good.
 TEST(Protection, AStallInTorqueControl)
 {
