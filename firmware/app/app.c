@@ -100,13 +100,23 @@ void app_trip(app_t *app, drive_fault_t fault)
     hal_unlock(app->hal);
 }
 
+/* Fault and stage are of the same instant: one that begins a short is not seen without it. */
+static bool is_open_fault(app_t *app)
+{
+    hal_lock(app->hal);
+    const bool shorted = app->armed && app->drive.stage == STAGE_SHORT;
+    const bool open = app->drive.fault != DRIVE_FAULT_NONE && !shorted;
+    hal_unlock(app->hal);
+    return open;
+}
+
 /* The bridge follows the state and is armed once, on the way out of OFF. Outputs that are lost while they are
- * wanted are a fault, which leaves them off. */
+ * wanted are a fault, which leaves them off. A fault opens it, or holds it shorted with what is armed already. */
 static void follow_state(app_t *app)
 {
     const drive_state_t state = app->drive.state;
-    const bool wanted = state != DRIVE_OFF && state != DRIVE_FAULT && app->drive.fault == DRIVE_FAULT_NONE;
-    if (!wanted || !app_may_run(app)) {
+    const bool off = state == DRIVE_OFF || is_open_fault(app);
+    if (off || !app_may_run(app)) {
         hal_bridge_off(app->hal);
         app->armed = false;
     } else if (app->armed ? !hal_bridge_armed(app->hal) : !hal_bridge_arm(app->hal)) {

@@ -3,7 +3,8 @@
  *
  * The bridge is on only while the drive wants it, no fault is latched, the control interrupt runs, and the
  * machine's parameters are stored, each of them: otherwise the image reports it and stays off. It is armed
- * once, when the drive leaves OFF; if the hardware opens it after that, the fault is HARDWARE.
+ * once, when the drive leaves OFF; if the hardware opens it after that, the fault is HARDWARE. A fault that shorts
+ * the motor (firmware/drive/fault_short.h) leaves it armed until the short ends, and never arms it.
  *
  *   app_boot(a, hal)   parameters from the store, hardware, drive; then interrupts run
  *   app_turn(a)        one round of the main loop, cheap when nothing has changed and no timer of the bus can

@@ -4,7 +4,7 @@
 
 /* clang-format off */
 
-const uint32_t od_schema = 0xA2B8BB2CU;
+const uint32_t od_schema = 0xF023E902U;
 
 /* least, preset, most; those of parameters are in firmware/params/parameters.def */
 const od_values_t od_values[] = {
@@ -44,7 +44,7 @@ const int32_t od_presets[] = {
     100,
     1000,
     1073742208,
-    11,
+    12,
     128,
     13,
     131474,
@@ -362,6 +362,7 @@ const od_entry_t od_table[] = {
     {0x2600U, 9U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_T_STALL, 0U, 1U},
     {0x2600U, 10U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_T_LOST, 0U, 1U},
     {0x2600U, 11U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_T_WINDING, 0U, 1U},
+    {0x2600U, 12U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_FAULT_SHORT, 0U, 1U},
     {0x2700U, 0U, OD_READ, OD_U8, OD_CONSTANT, OD_GROUP_NONE, 0U, 36U, 0U},
     {0x2700U, 1U, OD_READ, OD_I32, OD_PARAMETER, OD_GROUP_NONE, OD_PARAMETER_I_FULL_SCALE, 0U, 0U},
     {0x2700U, 2U, OD_READ, OD_I32, OD_PARAMETER, OD_GROUP_NONE, OD_PARAMETER_V_FULL_SCALE, 0U, 0U},

@@ -213,6 +213,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     }
     make_open_loop(&m, &config->open_loop);
     make_protection(&m, &config->protection);
+    make_fault_short(&m, &config->fault_short);
     make_limits(&m, config);
     return m.result;
 }

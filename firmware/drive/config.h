@@ -10,6 +10,7 @@
 #include "firmware/control/mtpa.h"
 #include "firmware/control/regulator.h"
 #include "firmware/control/speed_control.h"
+#include "firmware/drive/fault_short.h"
 #include "firmware/drive/position.h"
 #include "firmware/drive/procedures/sequence.h"
 #include "firmware/math/num.h"
@@ -59,6 +60,7 @@ typedef struct {
     pulses_config_t pulses;
     open_loop_config_t open_loop;
     protection_config_t protection;
+    fault_short_config_t fault_short;
     pm_num_t pole_pairs;
     uint32_t slow_divider;   /* periods per drive_slow(): the nearest to 1 ms */
     bool injection;          /* injection leads at low speed; else open-loop start */

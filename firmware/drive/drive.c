@@ -80,7 +80,8 @@ bool drive_clear_fault(drive_t *drive)
     if (drive->fault == DRIVE_FAULT_NONE) {
         return true;
     }
-    if (drive->fault == DRIVE_FAULT_PARAMETERS || drive->command.enable || protection_cause_present(drive)) {
+    if (drive->fault == DRIVE_FAULT_PARAMETERS || drive->stage == STAGE_SHORT || drive->command.enable ||
+        protection_cause_present(drive)) {
         return false;
     }
     drive->fault = DRIVE_FAULT_NONE;
@@ -243,8 +244,12 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
         drive->hw_fault = in->hw_fault;
         protection_step(drive);
         drive->status.theta = drive->pll.theta;
-        off(out);
-        out->trip = drive->fault != DRIVE_FAULT_NONE ? 1U : 0U;
+        if (drive->stage == STAGE_SHORT) {
+            fault_short_step(drive, out);
+        } else {
+            off(out);
+            out->trip = drive->fault != DRIVE_FAULT_NONE ? 1U : 0U;
+        }
     }
     if (checked || drive->stage == STAGE_PROCEDURE) {
         procedure_step(drive, in, out);

@@ -141,10 +141,10 @@ void drive_slow(drive_t *drive, const drive_slow_in_t *in);
 void drive_command(drive_t *drive, const drive_command_t *command);
 
 /* Latches a fault, the drive's own or one that only the caller can see, with the values of the moment; the
- * first stays. The step that runs next, or this one, opens the bridge. From thread context with the interrupt
- * masked. */
+ * first stays. The step that runs next, or this one, opens the bridge, or shorts the motor (fault_short.h).
+ * From thread context with the interrupt masked. */
 void drive_trip(drive_t *drive, drive_fault_t fault);
-bool drive_clear_fault(drive_t *drive); /* false: the cause is still there, or enable is still set */
+bool drive_clear_fault(drive_t *drive); /* false: cause or short are still there, or enable is still set */
 const drive_status_t *drive_status(const drive_t *drive);
 const drive_fault_record_t *drive_fault_record(const drive_t *drive); /* values at the moment of the fault */
 

@@ -53,6 +53,12 @@ bool protection_cause_present(const drive_t *drive); /* of the faults that show 
 /* Limits of the q-axis current after derating, for the present direction of rotation. */
 void protection_current_limits(drive_t *drive, pm_q_t *i_min, pm_q_t *i_max);
 
+/* fault_short.c */
+
+drive_stage_t fault_short_stage(drive_t *drive, drive_fault_t fault); /* that the fault leads to */
+void fault_short_step(drive_t *drive, drive_out_t *out);
+void fault_short_slow(drive_t *drive); /* 1 kHz: ends it */
+
 /* reference.c: at 1 kHz, from the command to current references. */
 void reference_units(drive_t *drive);  /* for a new configuration: what reference_take() multiplies with */
 void reference_take(drive_t *drive);   /* command to per-unit */

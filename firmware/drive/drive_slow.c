@@ -291,7 +291,11 @@ void drive_slow(drive_t *drive, const drive_slow_in_t *in)
     if (drive->fault != DRIVE_FAULT_NONE) {
         procedure_abort(drive);
         drive->state = DRIVE_FAULT;
-        drive->stage = STAGE_OFF;
+        if (drive->stage == STAGE_SHORT) {
+            fault_short_slow(drive);
+        } else {
+            drive->stage = STAGE_OFF;
+        }
     }
     drive_prepare(drive);
     report(drive);

@@ -9,6 +9,7 @@
 /* What drive_step() does; drive_slow() moves it on. */
 typedef enum {
     STAGE_OFF,
+    STAGE_SHORT,     /* after a fault: all low switches on (fault_short.h) */
     STAGE_PROCEDURE, /* a procedure has the legs, each by itself */
     STAGE_OPEN_LOOP, /* current vector at an imposed angle */
     STAGE_VECTOR,    /* field-oriented control at the estimated angle */
@@ -17,7 +18,7 @@ typedef enum {
 struct drive {
     drive_config_t config;
 
-    drive_fault_t fault; /* latched; while it is set, the stage is STAGE_OFF */
+    drive_fault_t fault; /* latched; while it is set, the stage is STAGE_OFF or STAGE_SHORT */
     drive_state_t state;
     drive_stage_t stage;
     uint32_t period;
@@ -73,6 +74,7 @@ struct drive {
     int32_t temperature_dC;
     pm_q_t heat;        /* of the windings: the current's square, through the low-pass of t_winding */
     pm_q_t bridge_heat; /* the same of the bridge, t_bridge */
+    fault_short_t fault_short;
 
     /* not of a control period */
     pm_num_t per_mrad_s, per_uNm, per_mA; /* units of a command in per-unit */

@@ -1,5 +1,5 @@
-/* Fault codes and the record of the first fault. A fault is latched; the step that finds it drives nothing.
- */
+/* Fault codes and the record of the first fault. A fault is latched; the step that finds it drives nothing, or shorts
+ * the motor (fault_short.h). */
 #ifndef DRIVE_FAULT_H
 #define DRIVE_FAULT_H
 

@@ -5,11 +5,11 @@
 
 void drive_trip(drive_t *drive, drive_fault_t fault)
 {
+    drive->stage = fault_short_stage(drive, fault); /* which opens the bridge */
     if (drive->fault != DRIVE_FAULT_NONE) {
         return;
     }
     drive->fault = fault;
-    drive->stage = STAGE_OFF; /* which opens the bridge */
     drive->record = (drive_fault_record_t){
         .fault = fault,
         .i = drive->i_abc,

@@ -70,6 +70,7 @@ static int mode(const void *before)
     const drive_t *drive = before;
     switch (drive->stage) {
     case STAGE_OFF:
+    case STAGE_SHORT:
         return FIGURE_OFF;
     case STAGE_PROCEDURE:
         return drive->state == DRIVE_CALIBRATING ? FIGURE_CALIBRATE
