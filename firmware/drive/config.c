@@ -3,15 +3,51 @@
 #include "firmware/drive/procedures/procedure.h"
 #include "firmware/params/maker.h"
 
-static void make_base(maker_t *m)
+/* Full scale of the converters is the base, so that a code is its signal but for a shift. A winding of many turns, a
+ * gimbal's, has a resistance and reactances far above the ratio of both: then the base of the voltages is a multiple of
+ * full scale, as far as v_dc_min is a sixteenth of it. */
+#define X_MOST 4 /* observers hold L_q in Q29 */
+#define R_MOST 8
+
+static bool fits(const maker_t *m, pm_num_t impedance, int32_t times)
+{
+    return pm_num_cmp(impedance, pm_num_mul(pm_num(times), pm_num_div(m->base.v, m->base.i))) < 0;
+}
+
+static void choose_voltage(maker_t *m, drive_config_t *config)
+{
+    static const char reason[] = "too large for this board: raise v_dc_min";
+    const pm_num_t R = si(m, DRIVE_PARAM_R_s);
+    const pm_num_t X = pm_num_mul(si(m, DRIVE_PARAM_L_q), m->base.omega);
+    int32_t shift = 0;
+    while (!(fits(m, R, R_MOST / 2) && fits(m, X, X_MOST)) &&
+           m->params->v_dc_min / 2 >= pm_shl(m->params->v_full_scale / 16, (uint32_t)shift)) {
+        shift++;
+        m->base.v = pm_num_mul(m->base.v, pm_num(2));
+    }
+    config->protection.v_bits = PM_Q_BITS - 16 - shift;
+    if (!fits(m, R, R_MOST)) {
+        refuse(m, DRIVE_PARAM_R_s, reason);
+    } else if (!fits(m, X, X_MOST)) {
+        refuse(m, DRIVE_PARAM_L_q, reason);
+    } else {
+        /* both fit */
+    }
+}
+
+static void make_base(maker_t *m, drive_config_t *config)
 {
     drive_base_t *b = &m->base;
     b->v = si(m, DRIVE_PARAM_v_full_scale);
     b->i = si(m, DRIVE_PARAM_i_full_scale);
     b->omega = pm_num_mul(si(m, DRIVE_PARAM_speed_trip), pole_pairs(m));
+    choose_voltage(m, config);
     b->psi = pm_num_div(b->v, b->omega);
     b->torque = mul3(pm_num_mul(pm_num_ratio(3, 2), pole_pairs(m)), b->psi, b->i);
     b->t_s = pm_num_div(pm_num(1), si(m, DRIVE_PARAM_f_pwm));
+    if (pm_num_cmp(pm_num_mul(b->t_s, b->omega), pm_num_ratio(1, 2)) >= 0) {
+        refuse(m, DRIVE_PARAM_speed_trip, "above an electrical frequency of f_pwm / 12.6: raise f_pwm");
+    }
     m->slow_divider = ((uint32_t)m->params->f_pwm + 500U) / 1000U; /* f_pwm >= 4000 */
     m->t_slow = pm_num_mul(pm_num((int32_t)m->slow_divider), b->t_s);
     m->impedance = pm_num_div(b->v, b->i);
@@ -59,8 +95,8 @@ static void make_protection(maker_t *m, protection_config_t *c)
     c->v_dc_span = c->v_dc_max - c->v_dc_min;
     c->v_dc_derate = per_unit(m, DRIVE_PARAM_v_dc_derate, m->base.v);
     c->i_sum = PM_Q(0.1);
-    c->offset_max =
-        fixed(m, pm_num_div(si(m, DRIVE_PARAM_offset_max), m->base.i), 15, DRIVE_PARAM_offset_max);
+    c->offset_max = fixed(m, pm_num_div(si(m, DRIVE_PARAM_offset_max), si(m, DRIVE_PARAM_i_full_scale)), 15,
+                          DRIVE_PARAM_offset_max);
     c->heat_max =
         fixed(m, square(pm_num_mul(pm_num_ratio(21, 20), pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i))),
               Q_BITS, DRIVE_PARAM_i_rated);
@@ -183,7 +219,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     if (!m.result.ok) {
         return m.result;
     }
-    make_base(&m);
+    make_base(&m, config);
     config->base = m.base;
     config->pole_pairs = pole_pairs(&m);
     config->slow_divider = m.slow_divider;

@@ -23,6 +23,7 @@ extern "C" {
 
 typedef struct {
     int32_t i_trip_squared; /* Q24 */
+    int32_t v_bits;         /* from a code of the link's voltage to per unit */
     pm_q_t v_dc_min;
     int32_t v_dc_span; /* v_dc_max - v_dc_min */
     pm_q_t v_dc_max, v_dc_derate;

@@ -9,7 +9,6 @@
 
 /* A code of full scale is one. */
 #define CURRENT_BITS (PM_Q_BITS - 15)
-#define VOLTAGE_BITS (PM_Q_BITS - 16)
 
 /* The modulator's smallest link voltage; below v_dc_min, which is larger, the bridge is off. */
 #define V_DC_LEAST PM_Q(0.0625)
@@ -150,7 +149,7 @@ static inline obs_more_t measure_more(const drive_t *drive, const drive_in_t *in
 }
 #endif
 
-static inline void measure(drive_t *drive, const drive_in_t *in)
+static inline void measure(drive_t *drive, const drive_in_t *in, int32_t v_bits)
 {
     const pm_pair_t zero_c = pm_pair(&drive->zero[2], &drive->modulator.hidden);
     pm_abc_t i = currents(drive, in->i_leg, zero_c.first);
@@ -166,7 +165,7 @@ static inline void measure(drive_t *drive, const drive_in_t *in)
 #endif
     drive->i_abc = i;
     drive->i_ab = pm_clarke(i);
-    drive->status.v_dc = pm_shl(in->v_dc, VOLTAGE_BITS);
+    drive->status.v_dc = pm_shl(in->v_dc, (uint32_t)v_bits);
 }
 
 /* What a method asked for is asked for in that period alone. */
@@ -229,7 +228,7 @@ static inline void procedure_step(drive_t *drive, const drive_in_t *in, drive_ou
 static inline bool is_checked(const drive_t *drive, const drive_in_t *in)
 {
     return drive->stage == STAGE_PROCEDURE && drive->state != DRIVE_CALIBRATING && !in->hw_fault &&
-           protection_passed(drive);
+           protection_passed(drive, drive->config.protection.i_trip_squared);
 }
 
 /* A period without control: a fault, the bridge off, or a procedure that has the legs. */
@@ -333,9 +332,11 @@ static inline void control(drive_t *drive, const position_out_t *frame, bool usu
 
 void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
 {
+    const protection_config_t *limits = &drive->config.protection;
+    const pm_pair_t i_trip_and_bits = pm_pair(&limits->i_trip_squared, &limits->v_bits);
     drive->period++;
-    measure(drive, in);
-    if (drive->stage < STAGE_OPEN_LOOP || in->hw_fault || !protection_passed(drive)) {
+    measure(drive, in, i_trip_and_bits.second);
+    if (drive->stage < STAGE_OPEN_LOOP || in->hw_fault || !protection_passed(drive, i_trip_and_bits.first)) {
         without_control(drive, in, out);
     } else {
         PM_IF_MEASURED(const obs_more_t more = measure_more(drive, in);)

@@ -21,22 +21,21 @@ static inline void drive_write_leg(uint16_t compare[2], int32_t on) /* 0 <= on <
 }
 
 /* Each period while the bridge is driven: currents and DC link within their limits. */
-static inline bool protection_currents_passed(const drive_t *drive)
+static inline bool protection_currents_passed(const drive_t *drive, int32_t top)
 {
     const pm_abc_t i = drive->i_abc;
-    const int32_t top = drive->config.protection.i_trip_squared;
     const int32_t a = pm_mulh_sub(top, i.a, i.a);
     const int32_t b = pm_mulh_sub(top, i.b, i.b);
     const int32_t c = pm_mulh_sub(top, i.c, i.c);
     return a >= 0 && b >= 0 && c >= 0;
 }
 
-static inline bool protection_passed(const drive_t *drive)
+static inline bool protection_passed(const drive_t *drive, int32_t top)
 {
     const protection_config_t *c = &drive->config.protection;
     const pm_pair_t v_dc = pm_pair(&c->v_dc_min, &c->v_dc_span);
     const uint32_t above = (uint32_t)drive->status.v_dc - (uint32_t)v_dc.first;
-    return above <= (uint32_t)v_dc.second && protection_currents_passed(drive);
+    return above <= (uint32_t)v_dc.second && protection_currents_passed(drive, top);
 }
 
 /* drive.c: at 1 kHz, what the step needs of the present operating point and stage. */

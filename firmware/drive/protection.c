@@ -35,9 +35,9 @@ void protection_step(drive_t *drive)
     const bool live = is_live(drive);
     if (drive->hw_fault) {
         drive_trip(drive, DRIVE_FAULT_HARDWARE);
-    } else if (live && !protection_currents_passed(drive)) {
+    } else if (live && !protection_currents_passed(drive, c->i_trip_squared)) {
         drive_trip(drive, DRIVE_FAULT_OVER_CURRENT);
-    } else if (live && !protection_passed(drive)) {
+    } else if (live && !protection_passed(drive, c->i_trip_squared)) {
         drive_trip(drive, v_dc > c->v_dc_max ? DRIVE_FAULT_OVER_VOLTAGE : DRIVE_FAULT_UNDER_VOLTAGE);
     } else {
         /* all is well */

@@ -725,6 +725,76 @@ TEST(Config, TheArctangentLeavesNothingToLearnASecondHarmonicFrom)
     EXPECT_EQ(result.param, DRIVE_PARAM_second_harmonic);
 }
 
+// A gimbal's winding on the drive board, whose scales are those of another kind of motor: impedances far above their ratio,
+// 0.57 ohm. The base of the voltages grows, as far as v_dc_min leaves it.
+drive_params_t gimbal(double R_ohm, double L_H, double v_dc_min_V)
+{
+    return changed({{DRIVE_PARAM_i_full_scale, 60.156},
+                    {DRIVE_PARAM_v_full_scale, 34.283},
+                    {DRIVE_PARAM_v_dc_nominal, 24},
+                    {DRIVE_PARAM_v_dc_min, v_dc_min_V},
+                    {DRIVE_PARAM_v_dc_derate, 28},
+                    {DRIVE_PARAM_v_dc_max, 30},
+                    {DRIVE_PARAM_pole_pairs, 11},
+                    {DRIVE_PARAM_R_s, R_ohm},
+                    {DRIVE_PARAM_L_d, L_H},
+                    {DRIVE_PARAM_L_q, L_H},
+                    {DRIVE_PARAM_L_q_rated, L_H},
+                    {DRIVE_PARAM_L_dh_rated, L_H},
+                    {DRIVE_PARAM_L_qh_rated, L_H},
+                    {DRIVE_PARAM_L_dqh_rated, 0},
+                    {DRIVE_PARAM_cross_half, 0},
+                    {DRIVE_PARAM_psi_m, 0.012},
+                    {DRIVE_PARAM_J, 2e-5},
+                    {DRIVE_PARAM_i_rated, 1},
+                    {DRIVE_PARAM_i_max, 1.2},
+                    {DRIVE_PARAM_i_trip, 5},
+                    {DRIVE_PARAM_i_open_loop, 0.6},
+                    {DRIVE_PARAM_i_pulse, 1},
+                    {DRIVE_PARAM_i_fw_max, 0},
+                    {DRIVE_PARAM_speed_max, 100},
+                    {DRIVE_PARAM_speed_trip, 130},
+                    {DRIVE_PARAM_speed_low, 8},
+                    {DRIVE_PARAM_speed_high, 14},
+                    {DRIVE_PARAM_start_method, 2},
+                    {DRIVE_PARAM_device_drop, 0},
+                    {DRIVE_PARAM_v_injection, 2},
+                    {DRIVE_PARAM_i_noise, 0.012},
+                    {DRIVE_PARAM_dead_time, 0.5e-6}});
+}
+
+TEST(Config, GimbalsAreAccepted)
+{
+    for (const double v_dc_min : {8.6, 12.0, 17.2}) {
+        for (const double R : {4.0, 8.0, 12.0, 16.0, 20.0}) {
+            for (const double L : {0.2e-3 * R, 2e-3, 4e-3, 10e-3}) { // of two periods and more
+                if (L < 0.2e-3 * R) {
+                    continue;
+                }
+                const drive_params_t p = gimbal(R, L, v_dc_min);
+                drive_config_t c = {};
+                const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
+                const double most_ohm =
+                    34.283 / 60.156 * (v_dc_min < 17 ? 4 : 8); // of a base of 4 or 8 times full scale
+                if (R > 8 * most_ohm || L * 130 * 11 > 4 * most_ohm) {
+                    EXPECT_EQ(r.param, R > 8 * most_ohm ? DRIVE_PARAM_R_s : DRIVE_PARAM_L_q) << R << ' ' << L;
+                    EXPECT_NE(std::string(r.reason).find("raise v_dc_min"), std::string::npos);
+                    continue;
+                }
+                ASSERT_TRUE(r.ok) << R << ' ' << L << ' ' << drive_param_table[r.param].name << ' '
+                                  << r.reason;
+                const double shift = 28 - 16 - c.protection.v_bits, v = 34.283 * std::pow(2, shift);
+                EXPECT_NEAR(bench::real(c.machine.R_s), R / (v / 60.156), 1e-5);
+                EXPECT_NEAR(bench::real(c.machine.psi_m), 0.012 / (v / (130 * 11)), 1e-6);
+                EXPECT_NEAR(bench::real(c.protection.v_dc_max), 30 / v, 1e-6);
+                EXPECT_GE(bench::real(c.protection.v_dc_min), 1.0 / 16);
+                // a code of the link is the voltage that it stands for
+                EXPECT_NEAR(std::ldexp(30 / 34.283 * 65536, c.protection.v_bits - 28), 30 / v, 1e-6);
+            }
+        }
+    }
+}
+
 TEST(Config, RandomSetsAreRefusedOrMakeSense)
 {
     const Survey s = survey(kDraws);
