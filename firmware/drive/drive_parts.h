@@ -69,7 +69,8 @@ void open_loop_start(drive_t *drive);
 void open_loop_hold(drive_t *drive); /* the vector stays, but for a rotor that swings */
 void open_loop_slow(drive_t *drive);
 void open_loop_resume(drive_t *drive);
-bool open_loop_ramps(const drive_t *drive); /* the imposed speed is not what is wanted yet */
+bool open_loop_ramps(const drive_t *drive);  /* the imposed speed is not what is wanted yet */
+bool open_loop_stands(const drive_t *drive); /* the rotor does not follow the vector */
 
 #ifdef __cplusplus
 }

@@ -79,16 +79,34 @@ bool open_loop_ramps(const drive_t *drive)
     return drive->omega_ramp != wanted_speed(drive);
 }
 
+/* Across the vector, where there is no current: the EMF but for what the rotor lags behind. */
+static pm_q_t emf_across(const drive_t *drive)
+{
+    return pm_narrow_sat(drive->voltage.v.q) -
+           pm_mul(drive->omega_open, pm_mul(drive->config.machine.L_d, drive->status.i.d));
+}
+
+/* A rotor that follows shows w psi_m, and of that at least 0.7 along or across the vector; one that stands shows what R
+ * and saliency are not known to. It is judged where half of w psi_m is more than half of R i and 1/64 of v_dc, which is
+ * what the compensation of dead time may leave. */
+bool open_loop_stands(const drive_t *drive)
+{
+    const pm_machine_t *machine = &drive->config.machine;
+    const pm_q_t half = pm_mul(pm_abs(drive->omega_ramp), machine->psi_m) / 2;
+    const pm_q_t drop = pm_mul(machine->R_s, drive->status.i.d);
+    const pm_q_t along = pm_narrow_sat(drive->voltage.v.d) - drop;
+    return half > pm_abs(drop) / 2 + drive->status.v_dc / 64 && pm_abs(along) < half &&
+           pm_abs(emf_across(drive)) < half;
+}
+
 /* A rotor on a vector of constant current swings undamped. Across the vector, where there is no current, the
  * voltage is the EMF of the rotor's speed: the vector falls behind a rotor that is too fast and runs ahead of
  * one that is too slow. */
 static void damp(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
-    const pm_q_t across = pm_narrow_sat(drive->voltage.v.q) -
-                          pm_mul(drive->omega_open, pm_mul(c->machine.L_d, drive->status.i.d));
-    const pm_q_t emf = pm_clamp(across - pm_mul(drive->omega_ramp, c->machine.psi_m), -c->open_loop.v_swing,
-                                c->open_loop.v_swing);
+    const pm_q_t emf = pm_clamp(emf_across(drive) - pm_mul(drive->omega_ramp, c->machine.psi_m),
+                                -c->open_loop.v_swing, c->open_loop.v_swing);
     const pm_q_t swing = emf - pm_lp1(&drive->emf_open, emf, c->open_loop.k_swing);
     drive->omega_open = drive->omega_ramp - pm_small_gain(pm_small(swing), c->open_loop.per_swing);
 }

@@ -22,6 +22,9 @@ void drive_trip(drive_t *drive, drive_fault_t fault)
     };
 }
 
+/* On an imposed vector, by the EMF that is not there. */
+#define STANDS_MS 300U
+
 static bool is_live(const drive_t *drive)
 {
     return drive->stage != STAGE_OFF && drive->state != DRIVE_CALIBRATING;
@@ -87,9 +90,11 @@ void protection_slow(drive_t *drive)
     /* In torque control the limit is at work only if more torque is wanted than there is. */
     const bool wanted =
         drive->command.mode == DRIVE_MODE_TORQUE || pm_abs(drive->speed.reference) > c->omega_stall;
-    const bool stalled = turning && drive->state == DRIVE_RUNNING && wanted &&
+    const bool open = drive->stage == STAGE_OPEN_LOOP;
+    const bool blocked = turning && drive->state == DRIVE_RUNNING && wanted &&
                          (drive->status.limits & DRIVE_LIMIT_CURRENT) != 0U && pm_abs(omega) < c->omega_stall;
-    if (lasts(&drive->stall_ms, stalled, c->stall_ms)) {
+    const bool stalled = open ? open_loop_stands(drive) : blocked;
+    if (lasts(&drive->stall_ms, stalled, open ? STANDS_MS : c->stall_ms)) {
         drive_trip(drive, DRIVE_FAULT_STALL);
     }
 }

@@ -138,6 +138,35 @@ TEST(App, ScalesAreThoseOfTheBoard)
     EXPECT_EQ(x.loop.app.params.v_dc_nominal, 24000);
 }
 
+// Each of them, in the place that is its own; what a board does not know leaves the preset.
+TEST(App, WhatTheBoardSaysIsInItsParameters)
+{
+    Bench x;
+    x.loop.hal.board = {60150, 45000, 3000, 9143, 10389, 40000, 32000, 25000, 7000, 310, 4100, 39000};
+    drive_params_t p;
+    drive_params_default(&p);
+    const int32_t R_s = p.R_s;
+    app_take_board(&x.loop.hal, &p);
+    EXPECT_EQ(p.i_full_scale, 60150);
+    EXPECT_EQ(p.v_full_scale, 45000);
+    EXPECT_EQ(p.shunt, 3000);
+    EXPECT_EQ(p.current_gain, 9143);
+    EXPECT_EQ(p.voltage_divider, 10389);
+    EXPECT_EQ(p.i_limit, 40000);
+    EXPECT_EQ(p.v_limit, 32000);
+    EXPECT_EQ(p.i_bridge, 25000);
+    EXPECT_EQ(p.t_bridge, 7000);
+    EXPECT_EQ(p.dead_time_least, 310);
+    EXPECT_EQ(p.f_pwm_least, 4100);
+    EXPECT_EQ(p.f_pwm_most, 39000);
+    EXPECT_EQ(p.R_s, R_s);
+    x.loop.hal.board = {};
+    drive_params_default(&p);
+    drive_params_t q = p;
+    app_take_board(&x.loop.hal, &q);
+    EXPECT_EQ(std::memcmp(&p, &q, sizeof p), 0);
+}
+
 TEST(App, NamesOfAnotherVersionAreLeftOut)
 {
     Bench x;

@@ -534,7 +534,10 @@ TEST(Drive, GoodParametersEndTheirFault)
     const drive_params_t good = direct::params();
     drive_config_t config = {};
     ASSERT_TRUE(drive_configure(&config, &good, PM_CHANNELS).ok);
+    x.run_ms(1);
+    ASSERT_EQ(x.d.state, DRIVE_FAULT);
     drive_reconfigure(&x.d, &config);
+    EXPECT_EQ(x.d.state, DRIVE_OFF); // at once
     x.run_ms(1);
     EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
     EXPECT_EQ(x.state(), DRIVE_OFF);

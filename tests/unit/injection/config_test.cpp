@@ -174,6 +174,22 @@ TEST(InjectionConfig, ShiftIsHalfTheAngleOfTheCoupling)
     EXPECT_NEAR(of(-1), -of(1), 1e-6);
 }
 
+// The positive sequence, in proportion to (L_d + L_q) / (L_d L_q - L_dq^2), grows with the current as the inductances fall.
+TEST(InjectionConfig, PositiveSequenceFollowsTheInductances)
+{
+    const drive_params_t p = with(INJECTION_rotating_sine);
+    const saliency_config_t c = configure(p).position.injection.rotating_sine.saliency;
+    const auto sum = [](double L_d, double L_q, double L_dq) {
+        return (L_d + L_q) / (L_d * L_q - L_dq * L_dq);
+    };
+    const double zero = sum(p.L_d, p.L_q, 0), rated = sum(p.L_dh_rated, p.L_qh_rated, p.L_dqh_rated);
+    const auto i_rated = static_cast<pm_q_t>(std::lround(double(p.i_rated) / p.i_full_scale * PM_ONE));
+    EXPECT_GT(rated / zero, 1.1);
+    for (const pm_q_t i_q : {i_rated, -i_rated}) {
+        EXPECT_NEAR(real(saliency_i_p(&c, i_q)) / real(saliency_i_p(&c, 0)), rated / zero, 1e-4);
+    }
+}
+
 TEST(InjectionConfig, NoSaliencyAtRatedCurrentIsRefused)
 {
     for (const int32_t id :
