@@ -49,7 +49,7 @@ injection_limits_t injection_limits(const maker_t *m)
 #undef PM_METHOD
     case INJECTION_COUNT:
     default:
-        return (injection_limits_t){{0, 0}, {0, 0}};
+        return (injection_limits_t){.pll_max = {0, 0}};
     }
 }
 

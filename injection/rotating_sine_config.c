@@ -18,9 +18,14 @@ static pm_num_t seen_share(const maker_t *m)
     return pm_num_add(pm_num(1), square(kappa));
 }
 
+/* Below I_p the carrier governs the signs of the currents, and a compensation there disturbs both sequences. */
 injection_limits_t rotating_sine_limits(const maker_t *m)
 {
-    return sine_limits(m);
+    const inductances_t L = inductances_at_zero(m);
+    const pm_num_t per_L = pm_num_add(pm_num_div(pm_num(1), L.L_d), pm_num_div(pm_num(1), L.L_q));
+    injection_limits_t limits = sine_limits(m);
+    limits.comp_zone = mul3(pm_num_ratio(3, 2), sine_flux(m), per_L); /* three times I_p */
+    return limits;
 }
 
 /* kappa = (L_q - L_d) / (L_q + L_d) >= 0.1 */

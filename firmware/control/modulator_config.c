@@ -15,7 +15,8 @@ static pm_num_t zone_of_capacitance(const maker_t *m)
 void make_modulator(maker_t *m, modulator_config_t *c)
 {
     const pm_num_t duty = pm_num_mul(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm));
-    const pm_num_t least_zone = si(m, DRIVE_PARAM_comp_zone);
+    const pm_num_t told = si(m, DRIVE_PARAM_comp_zone);
+    const pm_num_t least_zone = pm_num_cmp(m->comp_zone, told) > 0 ? m->comp_zone : told;
     const pm_num_t by_capacitance = zone_of_capacitance(m);
     const bool two_parts = pm_num_cmp(by_capacitance, least_zone) > 0;
     const pm_num_t zone = pm_num_div(two_parts ? by_capacitance : least_zone, m->base.i);

@@ -231,6 +231,9 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     config->charge_periods =
         (channels & PM_BOOTSTRAP) != 0U ? (uint16_t)(m.slow_divider * (uint32_t)CHARGE_MS) : 0U;
     require(&m, sequence_needs((sequence_id_t)config->start, config->find), DRIVE_PARAM_start_method);
+    if (config->injection) {
+        m.comp_zone = injection_limits(&m).comp_zone;
+    }
     make_modulator(&m, &config->modulator);
     make_regulator(&m, &config->regulator);
     if (config->injection && (regulator_traits(config->regulator.id) & REGULATOR_SWITCHES) != 0U) {

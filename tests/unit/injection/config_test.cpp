@@ -174,6 +174,28 @@ TEST(InjectionConfig, ShiftIsHalfTheAngleOfTheCoupling)
     EXPECT_NEAR(of(-1), -of(1), 1e-6);
 }
 
+// Three times I_p of the rotating sine, unless more is told: below, the carrier governs the signs of the currents.
+TEST(InjectionConfig, RotatingSineWidensTheZoneOfTheCompensation)
+{
+    const auto zone_A = [](const drive_params_t &p) { // zone_alpha is its inverse
+        return 1 / double(configure(p).modulator.zone_alpha);
+    };
+    drive_params_t p = with(INJECTION_rotating_sine), none = p;
+    none.start_method = 2;
+    const auto si = [&p](drive_param_id_t id) {
+        return drive_param_get(&p, id) * std::pow(10, drive_param_exp10[id]);
+    };
+    const double N = std::round(kF_pwm / si(DRIVE_PARAM_f_injection)), x = bench::kPi / N;
+    const double flux = si(DRIVE_PARAM_v_injection) / (2 * x * kF_pwm) * x / std::sin(x);
+    const double i_p = flux / 2 * (1 / si(DRIVE_PARAM_L_d) + 1 / si(DRIVE_PARAM_L_q));
+    EXPECT_NEAR(zone_A(p) / zone_A(none), 3 * i_p / si(DRIVE_PARAM_comp_zone),
+                1e-3 * 3 * i_p / si(DRIVE_PARAM_comp_zone));
+    p.comp_zone = static_cast<int32_t>(std::lround(4000 * i_p));
+    drive_params_t told = p;
+    told.start_method = 2;
+    EXPECT_EQ(zone_A(p), zone_A(told));
+}
+
 // The positive sequence, in proportion to (L_d + L_q) / (L_d L_q - L_dq^2), grows with the current as the inductances fall.
 TEST(InjectionConfig, PositiveSequenceFollowsTheInductances)
 {
