@@ -47,7 +47,7 @@ TEST(Lock, MachineAndProtectionChangeBehindItAlone)
             ++tried;
         }
     }
-    EXPECT_EQ(tried, 14 + 11); // machine, protections
+    EXPECT_EQ(tried, 14 + 12); // machine, protections
     EXPECT_EQ(x.get(0x2010, 5), 0U);
     EXPECT_EQ(x.set_as_it_is(0x2010, 5, signature_open), 0U);
     EXPECT_EQ(x.get(0x2010, 5), 1U);
@@ -145,7 +145,7 @@ TEST(Lock, OpenOrNotNothingProtectedChangesWhileTheBridgeIsOn)
             }
         }
     }
-    EXPECT_EQ(tried, 2 * 25);
+    EXPECT_EQ(tried, 2 * 26);
     EXPECT_EQ(x.loop.app.drive.state, DRIVE_RUNNING);
 }
 
