@@ -44,14 +44,13 @@ void make_model(maker_t *m, observer_model_t *c)
     c->t_s = fixed(m, step, FRAC_BITS, DRIVE_PARAM_f_pwm);
 }
 
-/* Format of the gain. */
+/* What the format of the gain, Q26, holds: a motor whose rated current is far below the base learns more slowly. */
 #define RESISTANCE_K_MOST 31
 
 void make_resistance(maker_t *m, observer_resistance_t *c, pm_num_t k)
 {
     c->k = 0;
     if (m->params->resistance_adaptation != 0) {
-        /* a motor whose rated current is far below the base is learnt more slowly */
         c->k = fixed(m, least(k, pm_num(RESISTANCE_K_MOST)), GAIN_BITS, DRIVE_PARAM_i_rated);
     }
     c->omega = speed(m, DRIVE_PARAM_speed_low) / 2;

@@ -54,7 +54,6 @@ const char *hal_board_name(const hal_t *hal)
     return "template";
 }
 
-/* What the PWM counter counts by. */
 /* By your schematic. What the bridge bears for an instant and for good, the least dead time of its drivers, the
  * carriers that leave the control interrupt its time: the drive refuses what is beyond. */
 const hal_board_t *hal_board(const hal_t *hal)
@@ -64,6 +63,7 @@ const hal_board_t *hal_board(const hal_t *hal)
     return &board;
 }
 
+/* What the PWM counter counts by. */
 uint32_t hal_timer_Hz(const hal_t *hal)
 {
     (void)hal;
