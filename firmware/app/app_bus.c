@@ -133,7 +133,6 @@ uint32_t node_host_store(void *context, uint32_t group)
     const uint32_t code = app_store_group(app, group, true);
     if (code == 0U && (group == NODE_GROUP_ALL || group == (uint32_t)OD_GROUP_MACHINE)) {
         app->stored = true;
-        app_give_parameters(app);
     }
     return code;
 }

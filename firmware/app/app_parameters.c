@@ -109,11 +109,6 @@ uint32_t app_put_batch(app_t *app, bool open)
     return code;
 }
 
-void app_give_parameters(app_t *app)
-{
-    (void)check(app, app->refused);
-}
-
 uint32_t app_refused_object(const app_t *app)
 {
     for (uint32_t row = 0; row < od_count; row++) {

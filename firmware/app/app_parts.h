@@ -41,7 +41,6 @@ uint32_t app_put_batch(app_t *app, bool open);
 uint32_t app_refused_object(const app_t *app);
 void app_judge_parameters(app_t *app); /* a fault where nothing may run with them */
 void app_take_parameters(app_t *app);  /* slow, when next_ready is set */
-void app_give_parameters(app_t *app);  /* the present set again: it may be good for something now */
 
 /* app_store.c */
 bool app_stored_value(const hal_t *hal, uint16_t index, uint8_t sub, int32_t *value);

@@ -466,6 +466,59 @@ TEST(App, MonitorOpensTheBridgeWhenControlCeases)
     EXPECT_EQ(x.fault(), DRIVE_FAULT_OVERRUN);
 }
 
+// The main loop has a round each 250 us, and at once when there is something to do.
+TEST(App, RoundsAreSpaced)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_ms(5);
+    app_t &app = x.loop.app;
+    hal_t &hal = x.loop.hal;
+    const auto has_round = [&](uint32_t after_us) {
+        hal.time_us += after_us;
+        app_turn(&app);
+        return app.round_us == hal.time_us;
+    };
+    ASSERT_TRUE(has_round(1000));
+    EXPECT_FALSE(has_round(249)); // nothing to do
+    EXPECT_TRUE(has_round(1));
+    x.give(0x201, {0x07, 0, 3, 0, 0, 0, 0});
+    EXPECT_TRUE(has_round(1)); // a frame
+    EXPECT_FALSE(has_round(1));
+    app.seen_state = DRIVE_RUNNING;
+    EXPECT_TRUE(has_round(1)); // another state than was seen
+    EXPECT_FALSE(has_round(1));
+    app.shown_fault = DRIVE_FAULT_STALL;
+    EXPECT_TRUE(has_round(1)); // another fault than was told
+    EXPECT_FALSE(has_round(1));
+    EXPECT_TRUE(has_round(250));
+}
+
+// The profile, the bridge or the drive: each of them is enough.
+TEST(App, IsOnWhileAnyOfItIs)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_ms(5);
+    app_t &app = x.loop.app;
+    EXPECT_FALSE(app_is_on(&app));
+    x.loop.hal.armed = true;
+    EXPECT_TRUE(app_is_on(&app));
+    x.loop.hal.armed = false;
+    for (const drive_state_t state : {DRIVE_CALIBRATING, DRIVE_FINDING, DRIVE_RUNNING, DRIVE_STOPPING}) {
+        app.drive.state = state;
+        EXPECT_TRUE(app_is_on(&app)) << state;
+    }
+    for (const drive_state_t state : {DRIVE_OFF, DRIVE_FAULT}) {
+        app.drive.state = state;
+        EXPECT_FALSE(app_is_on(&app)) << state;
+    }
+    app.cia402.state = CIA402_OPERATION_ENABLED;
+    EXPECT_TRUE(app_is_on(&app));
+}
+
 TEST(App, WatchdogIsNotFedWhenTheMainLoopHangs)
 {
     Bench x;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 
+#include "firmware/drive/commissioning/commissioning_parts.h"
 #include "tests/support/plants.h"
 #include "tests/unit/drive/direct.h"
 
@@ -148,6 +149,40 @@ TEST(Commissioning, InductancesOfALinearMachine)
     EXPECT_NEAR(real(x.result().L_dq_rated) * kHenry, 0, 76.9e-3 * 1e-2);
 }
 
+// Anti-windup at the rate at which the integral follows: ki / kp.
+TEST(Commissioning, GainsAreThoseOfTheMachineThatWasFound)
+{
+    direct::Drive x(direct::params(2));
+    identify_t &self = x.d.procedure.identify;
+    for (const double R_ohm : {0.5, 6.0, 30.0}) {
+        self.R = bench::fixed(R_ohm / kOhm, PM_Q_BITS);
+        self.L_d = bench::fixed(46e-3 / kHenry, PM_Q_BITS);
+        commissioning_set_gains(&x.d);
+        EXPECT_NEAR(double(self.pi.ki) / self.pi.kp, R_ohm * 1e-4 / 46e-3, 2e-5) << R_ohm;
+        EXPECT_NEAR(real(self.pi.kb, 31), R_ohm * 1e-4 / 46e-3, 2e-5) << R_ohm;
+    }
+}
+
+// A rotor that has been moved, or whose R has changed under it: the voltage gives way while the vector turns.
+TEST(Commissioning, SweepGivesWayToACurrentThatIsTooLarge)
+{
+    direct::Drive x(direct::params(2));
+    x.run_ms(1); // the DC link is known
+    x.d.i_target = PM_Q(0.4);
+    identify_t &self = x.d.procedure.identify;
+    sweep_enter(&x.d);
+    const pm_q_t U = x.d.status.v_dc / 16;
+    for (const bool large : {false, true}) {
+        self.part = 1;
+        self.of.resistance.U = U;
+        commissioning_clear_sums(&self);
+        self.samples = 1;
+        self.sum[0] = large ? PM_Q(2.0) : 0;
+        EXPECT_FALSE(sweep_slow(&x.d).done);
+        EXPECT_EQ(self.of.resistance.U < U, large);
+    }
+}
+
 TEST(Commissioning, SaturationAndCrossCoupling)
 {
     plant_config_t c = ideal();
@@ -177,6 +212,24 @@ TEST(Commissioning, FluxInertiaAndFriction)
         EXPECT_NEAR(real(x.result().viscous) * kTorque / 180, 2e-3, 0.5e-3);
         EXPECT_NEAR(real(x.result().coulomb) * kTorque, 0.05, 0.02);
     }
+}
+
+// The flux at a quarter of the current is held against that at all of it: a rotor that follows the strong vector alone is
+// not measured.
+TEST(Commissioning, TheFluxAtFullCurrentIsKept)
+{
+    Bench x(ideal(), direct::params(2)); // the machine's own
+    x.command(true, COMMISSIONING_FLUX);
+    const auto &rotation = x.loop.app.drive.procedure.identify.of.rotation;
+    double before = 0;
+    while (x.report().state <= COMMISSIONING_RUNNING) {
+        x.step();
+        if (x.report().result.psi_m == 0) {
+            before = real(rotation.psi_full) * kWb;
+        }
+    }
+    ASSERT_EQ(x.report().state, COMMISSIONING_DONE);
+    EXPECT_NEAR(before, 0.236, 0.236 * 0.1); // L_q of the parameters is saturated
 }
 
 TEST(Commissioning, ValuesNotIdentifiedComeFromTheParameters)

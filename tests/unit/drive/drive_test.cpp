@@ -30,9 +30,10 @@ plant_config_t ipm()
 class Closed
 {
   public:
-    explicit Closed(const plant_config_t &config = ipm(), const drive_params_t &p = direct::params())
+    explicit Closed(const plant_config_t &config = ipm(), const drive_params_t &p = direct::params(),
+                    double theta_e_rad = 1.0)
         : periods_per_ms_(static_cast<int>(std::lround(config.inverter.f_pwm_Hz * 1e-3))),
-          plant_(plant_create(&config, 1.0, &error_), &plant_destroy)
+          plant_(plant_create(&config, theta_e_rad, &error_), &plant_destroy)
     {
         sim_loop_init(&loop, plant_.get(), &p);
     }
@@ -286,6 +287,28 @@ TEST(Drive, EstimateIsTheRotor)
     EXPECT_LE(worst, kPosition_deg);
 }
 
+// By each train of pulses: the pole that is there, and how sure of it.
+TEST(Drive, PulsesFindTheRotorAndSayHowSure)
+{
+    for (const int32_t train : {0, 1}) {
+        for (const double rotor_deg : {20.0, 200.0}) {
+            drive_params_t p = direct::params(1);
+            p.position_pulses = train;
+            Closed x(ipm(), p, rotor_deg * bench::kDegree);
+            x.command(true, 0);
+            drive_t &d = x.loop.app.drive;
+            for (int ms = 0; ms < 500 && x.state() != DRIVE_RUNNING; ++ms) {
+                x.run_ms(1);
+            }
+            EXPECT_NEAR(bench::wrapped(bench::rad(d.sequence.theta) - rotor_deg * bench::kDegree) /
+                            bench::kDegree,
+                        0, 5)
+                << train;
+            EXPECT_GE(d.sequence.margin, 5 * PM_SIGMA_ONE) << train;
+        }
+    }
+}
+
 TEST(Drive, LockedRotorIsAStall)
 {
     plant_config_t c = ipm();
@@ -393,6 +416,24 @@ TEST(Drive, StopWithoutInjectionEndsInOpenLoop)
     EXPECT_EQ(x.state(), DRIVE_OFF);
     EXPECT_NEAR(x.truth().omega_mech_rad_s, 0, 3);
     EXPECT_EQ(drive_status(&d)->fault, DRIVE_FAULT_NONE);
+}
+
+// While the carrier is on, current control has the share that injection leaves it, and the modulator passes what is small.
+TEST(Drive, ACarrierSlowsCurrentControlDown)
+{
+    drive_params_t p = direct::params(1);
+    p.injection = INJECTION_pulsating_sine; // its window leaves current control less than was asked for
+    Drive x(p);
+    x.step();
+    x.d.stage = STAGE_VECTOR;
+    const pm_gain_t kp = x.d.config.regulator.synchronous_pi.d.kp;
+    for (const bool on : {true, false}) {
+        x.d.position.inject = on;
+        x.d.position.weight = PM_ONE / 16 * 15; // the observer leads almost
+        drive_prepare(&x.d);
+        EXPECT_EQ(x.d.modulator.all, on);
+        EXPECT_EQ(x.d.regulator_config.synchronous_pi.d.kp < kp, on);
+    }
 }
 
 // Between the pulses and running injection settles for 30 ms: without torque, and with its slow part at work.

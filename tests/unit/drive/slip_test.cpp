@@ -147,12 +147,13 @@ TEST(Slip, ThreeArePutRightTheFourthIsAFault)
     for (int ms = 0; ms < 4 * static_cast<int>(SLIP_MS) + 20 && d.fault == DRIVE_FAULT_NONE; ++ms) {
         d.position.pll = {0, omega};
         d.position.inject = true;
-        d.voltage.v = {0, -pm_widen(emf)};
+        d.voltage.v = {pm_widen(emf) / 2, -pm_widen(emf)};
         const drive_slow_in_t slow = {250};
         drive_slow(&d, &slow);
         if (d.fault == DRIVE_FAULT_NONE && d.position.pll.theta != 0U) {
             ++turns;
             EXPECT_EQ(d.position.pll.theta, PM_TURN(0.5));
+            EXPECT_NEAR(bench::real(d.regulator.synchronous_pi.d.integral, 22), -bench::real(emf) / 2, 1e-3);
             EXPECT_NE(drive_status(&d)->limits & DRIVE_LIMIT_SLIP, 0U);
         }
     }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "firmware/math/pair.h"
 #include "firmware/math/trig.h"
 #include "samples.h"
 
@@ -214,6 +215,21 @@ TEST(MathFrames, TurnBetweenTwoDirections)
         for (double by = 0.3; by < 1.5; by += 0.1) {
             ASSERT_GT(turn(from, by), turn(from, by - 0.1));
         }
+    }
+}
+
+TEST(MathFrames, PairsAreTheirTwoWords)
+{
+    for (int32_t n = 1; n < 100; n += 7) {
+        const pm_dq_t dq = {n, -3 * n};
+        const pm_ab_t ab = {-5 * n, 7 * n};
+        const pm_dir_t dir = {11 * n, -13 * n};
+        EXPECT_EQ(pm_pair_dq(&dq).d, dq.d);
+        EXPECT_EQ(pm_pair_dq(&dq).q, dq.q);
+        EXPECT_EQ(pm_pair_ab(&ab).alpha, ab.alpha);
+        EXPECT_EQ(pm_pair_ab(&ab).beta, ab.beta);
+        EXPECT_EQ(pm_pair_dir(&dir).cos, dir.cos);
+        EXPECT_EQ(pm_pair_dir(&dir).sin, dir.sin);
     }
 }
 

@@ -343,6 +343,7 @@ TEST(Mismatch, RestsAndBeginsAgain)
     Drive drive(MISMATCH_Q_AXIS);
     drive.d_inductance = 0.99e-3;
     drive.run(12.0); // 64 windows of 125 ms, and the mean of the speed before
+    EXPECT_EQ(drive.window.windows, MISMATCH_WINDOWS);
     const double k = drive.k().imag();
     drive.largest = 0;
     drive.run(20.0);
@@ -405,6 +406,19 @@ TEST(Mismatch, LargestInputsSaturate)
             ASSERT_LE(std::abs(real(state.k.d)), 1.0) << id;
             ASSERT_LE(std::abs(real(state.k.q)), 1.0) << id;
         }
+    }
+}
+
+// A rotor so light that its swing is beyond the format: at the limit, on the swing's own side.
+TEST(Mismatch, ASwingBeyondItsRangeSaturates)
+{
+    for (const int32_t share : {1, 3, 7, 20, 50}) {
+        Drive drive(MISMATCH_Q_AXIS);
+        drive.config.swing = INT32_MAX / share;
+        drive.held = true;
+        drive.settle();
+        drive.run(10.0);
+        EXPECT_LT(real(drive.state.k.q), -0.99) << share;
     }
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 #include "tests/unit/observers/mras_bench.h"
@@ -361,6 +362,36 @@ TYPED_TEST(Mras, ErrorSignalIsTheSineInBothDirections)
             EXPECT_EQ(last.eps, out.eps);
             EXPECT_EQ(last.vector.d, out.vector.d);
         }
+    }
+}
+
+// A current that jumps on the d-axis by far more than a period can change it: at the limit, on its own side.
+TYPED_TEST(Mras, AJumpOfTheCurrentSaturates)
+{
+    const Fixture f = ipm();
+    const double most = std::is_same_v<TypeParam, Current> ? 1 : 0.2; // 10 and 2 of the base voltage
+    for (double jump = 0.1; jump <= most; jump += 0.1) {
+        double eps[2];
+        for (const int side : {0, 1}) {
+            Rotation rotation(f.machine, f.base, 0.5, {0, 0});
+            obs_in_t in = rotation.seen(0, rotation.omega_rad_s);
+            typename TypeParam::State state;
+            TypeParam::reset(&state, &f.config, &in);
+            obs_out_t out = {};
+            rotation.advance();
+            in = rotation.seen(rotation.theta_rad, rotation.omega_rad_s);
+            TypeParam::step(&state, &f.config, &in, &out);
+            rotation.advance();
+            in = rotation.seen(rotation.theta_rad, rotation.omega_rad_s);
+            const Complex i = (side == 0 ? jump : -jump) * std::polar(1.0, rotation.theta_rad);
+            in.i.alpha += bench::fixed(i.real(), 28);
+            in.i.beta += bench::fixed(i.imag(), 28);
+            in.i_dq.d += bench::fixed(side == 0 ? jump : -jump, 28);
+            TypeParam::step(&state, &f.config, &in, &out);
+            eps[side] = real(out.eps);
+        }
+        EXPECT_GT(std::abs(eps[0]), 0.5) << jump;
+        EXPECT_LT(eps[0] * eps[1], 0) << jump;
     }
 }
 
