@@ -43,9 +43,10 @@ void drive_prepare(drive_t *drive);
 
 /* protection.c */
 
-void protection_step(drive_t *drive); /* names the fault of a period that has not passed */
-void protection_slow(drive_t *drive); /* 1 kHz: temperature, speed, position, stall, sum */
-void protection_heat(drive_t *drive); /* 1 kHz, in every state: what windings and bridge bear */
+void protection_step(drive_t *drive);   /* names the fault of a period that has not passed */
+void protection_slow(drive_t *drive);   /* 1 kHz: temperature, speed, position, stall, sum */
+void protection_heat(drive_t *drive);   /* 1 kHz, in every state: what windings and bridge bear */
+void protection_phases(drive_t *drive); /* 1 kHz, while the references are those of the currents */
 
 bool protection_cause_present(const drive_t *drive); /* of the faults that show with the bridge off */
 

@@ -3,6 +3,7 @@
 #define DRIVE_DRIVE_STATE_H
 
 #include "firmware/drive/drive.h"
+#include "firmware/drive/open_phase.h"
 #include "firmware/drive/procedures/procedure.h"
 #include "firmware/drive/procedures/sequence.h"
 
@@ -74,6 +75,7 @@ struct drive {
     int32_t temperature_dC;
     pm_q_t heat;        /* of the windings: the current's square, through the low-pass of t_winding */
     pm_q_t bridge_heat; /* the same of the bridge, t_bridge */
+    open_phase_t open_phase;
     fault_short_t fault_short;
 
     /* not of a control period */

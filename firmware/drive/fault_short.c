@@ -16,7 +16,7 @@
 #define BEGINS PM_UNIT(0.5773503 * 17 / 16)
 #define ENDS   PM_UNIT(0.5773503 * 15 / 16)
 
-/* Not: a switch that may be broken or is too warm (HARDWARE, OVER_CURRENT, OVER_TEMPERATURE, BRIDGE_OVERLOAD), currents
+/* Not: a switch that may be broken or is too warm (HARDWARE, OVER_CURRENT, OVER_TEMPERATURE, BRIDGE_OVERLOAD, OPEN_PHASE), currents
  * that are not known (SENSOR_...), a program or numbers that are not to be relied on (OVERRUN, PARAMETERS),
  * POSITION_NOT_FOUND, where nothing turns. */
 static bool leaves_low_switches(drive_fault_t fault)

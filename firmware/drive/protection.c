@@ -2,6 +2,7 @@
 
 #include "firmware/math/filter.h"
 #include "firmware/math/root.h"
+#include "firmware/math/trig.h"
 
 void drive_trip(drive_t *drive, drive_fault_t fault)
 {
@@ -21,9 +22,6 @@ void drive_trip(drive_t *drive, drive_fault_t fault)
         .refusal = drive->status.refusal,
     };
 }
-
-/* On an imposed vector, by the EMF that is not there. */
-#define STANDS_MS 300U
 
 static bool is_live(const drive_t *drive)
 {
@@ -60,6 +58,9 @@ static bool lasts(uint16_t *timer, bool condition, uint16_t limit)
     *timer = condition ? (uint16_t)(*timer + (*timer < UINT16_MAX ? 1U : 0U)) : 0U;
     return *timer > limit;
 }
+
+/* On an imposed vector, by the EMF that is not there. */
+#define STANDS_MS 300U
 
 void protection_slow(drive_t *drive)
 {
@@ -109,6 +110,20 @@ void protection_heat(drive_t *drive)
     }
     if (pm_lp1(&drive->bridge_heat, square, c->k_bridge_heat) > c->bridge_heat_max) {
         drive_trip(drive, DRIVE_FAULT_BRIDGE_OVERLOAD);
+    }
+}
+
+/* References and measured currents of a frame, whichever it is. */
+void protection_phases(drive_t *drive)
+{
+    if (drive->stage != STAGE_VECTOR && drive->stage != STAGE_OPEN_LOOP) {
+        open_phase_reset(&drive->open_phase);
+        return;
+    }
+    const pm_dir_t dir = pm_dir(drive->stage == STAGE_VECTOR ? drive->position.pll.theta : drive->theta_open);
+    if (open_phase_slow(&drive->open_phase, drive->config.protection.missed_least,
+                        pm_park_inverse(drive->i_ref, dir), pm_park_inverse(drive->status.i, dir))) {
+        drive_trip(drive, DRIVE_FAULT_OPEN_PHASE);
     }
 }
 

@@ -38,6 +38,7 @@ struct Drive {
     explicit Drive(const drive_params_t &p = params())
     {
         drive_init(&d, &p, PM_CHANNELS);
+        d.config.protection.missed_least = INT32_MAX; // no motor: its phases are not looked for
         for (uint16_t &leg : in.i_leg) {
             leg = current_code(0);
         }

@@ -444,6 +444,7 @@ FAULTS = (
     Fault(17, "SENSOR_REFERENCE", 'reference of the converters off by 5 % or more', 0x5212, "check the processor's supply: currents and voltages are measured against it"),
     Fault(18, "BRIDGE_OVERLOAD", 'bridge overloaded', 0x2351, ('the bridge was loaded beyond i_bridge for too long: lower i_max or i_rated, '
  'or cool it and use another board')),
+    Fault(19, "OPEN_PHASE", 'a phase or a switch does not conduct', 0x3321, "check the motor's cable and winding, then the switches and their drivers"),
 )
 
 # Error codes of 603Fh, 1003h and the emergency message beside those of faults
