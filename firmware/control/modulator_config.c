@@ -19,7 +19,8 @@ void make_modulator(maker_t *m, modulator_config_t *c)
     const pm_num_t least_zone = pm_num_cmp(m->comp_zone, told) > 0 ? m->comp_zone : told;
     const pm_num_t by_capacitance = zone_of_capacitance(m);
     const bool two_parts = pm_num_cmp(by_capacitance, least_zone) > 0;
-    const pm_num_t zone = pm_num_div(two_parts ? by_capacitance : least_zone, m->base.i);
+    m->comp_zone = two_parts ? by_capacitance : least_zone;
+    const pm_num_t zone = pm_num_div(m->comp_zone, m->base.i);
     c->far = two_parts ? PM_FRAC(0.25) : 0;
     c->counts = m->params->timer_counts;
     c->whole = pm_share_whole(c->counts);

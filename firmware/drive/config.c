@@ -85,9 +85,6 @@ static void make_open_loop(maker_t *m, open_loop_config_t *c)
     c->sweep = PM_TURN(0.5) / (uint32_t)m->params->t_align;
 }
 
-/* What the low-pass of open_phase.c resolves, Q28. */
-#define MISSED_LEAST 64
-
 static void make_protection(maker_t *m, protection_config_t *c)
 {
     const drive_params_t *p = m->params;
@@ -111,10 +108,11 @@ static void make_protection(maker_t *m, protection_config_t *c)
                                DRIVE_PARAM_i_bridge);
     c->k_bridge_heat =
         fixed(m, pm_num_div(m->t_slow, si(m, DRIVE_PARAM_t_bridge)), FRAC_BITS, DRIVE_PARAM_t_bridge);
-    const pm_num_t least_seen =
-        pm_num_add(square(pm_num_div(si(m, DRIVE_PARAM_i_rated), pm_num_mul(pm_num(128), m->base.i))),
-                   square(pm_num_div(si(m, DRIVE_PARAM_i_noise), m->base.i)));
-    c->missed_least = pm_max(fixed(m, least_seen, Q_BITS, DRIVE_PARAM_i_noise), MISSED_LEAST);
+    /* a current that dead time holds at zero is not one that does not conduct */
+    const pm_q_t zone = 2 * fixed(m, pm_num_div(m->comp_zone, m->base.i), Q_BITS, DRIVE_PARAM_comp_zone);
+    const pm_q_t noise = 8 * per_unit(m, DRIVE_PARAM_i_noise, m->base.i);
+    const pm_q_t judged = pm_max(pm_max(zone, noise), per_unit(m, DRIVE_PARAM_i_rated, m->base.i) / 64);
+    c->judged = pm_mul(judged, judged);
     c->temp_derate_dC = (int16_t)p->temp_derate;
     c->temp_trip_dC = (int16_t)p->temp_trip;
     c->omega_stall = speed(m, DRIVE_PARAM_speed_max) / 50;

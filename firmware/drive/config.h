@@ -34,8 +34,8 @@ typedef struct {
     pm_frac_t k_heat;       /* low-pass of the windings' heat, at 1 kHz */
     pm_q_t bridge_heat_max; /* the same of the bridge */
     pm_frac_t k_bridge_heat;
-    pm_q_t missed_least; /* of a phase that is open: open_phase.h */
-    pm_q_t omega_stall;  /* below: not turning */
+    pm_q_t judged;      /* square of the least current whose legs are looked at: open_phase.h */
+    pm_q_t omega_stall; /* below: not turning */
     uint16_t stall_ms, lost_ms;
 } protection_config_t;
 

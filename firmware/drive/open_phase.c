@@ -1,28 +1,39 @@
 #include "firmware/drive/open_phase.h"
 
-#include "firmware/math/filter.h"
-
-#define K_MISSED PM_FRAC(1.0 / 32)
+#define SEEN 2U /* what a millisecond in which the leg conducts takes back */
 
 void open_phase_reset(open_phase_t *self)
 {
-    *self = (open_phase_t){.ms = 0};
+    *self = (open_phase_t){.missed = {{0}}};
 }
 
-/* One leg; true while it is missed. */
-static bool is_missed(pm_q_t missed[2], pm_q_t least, pm_q_t wanted, pm_q_t i)
+static pm_q_t square(pm_ab_t x)
 {
-    const pm_q_t short_of = wanted / 2 + wanted / 4 - i;
-    return pm_lp1(&missed[wanted < 0 ? 1 : 0], pm_mul(wanted, short_of), K_MISSED) > least;
+    return pm_mul(x.alpha, x.alpha) + pm_mul(x.beta, x.beta);
+}
+
+/* One leg, where it has most of what is wanted; true when it has been missed for long. */
+static bool is_missed(uint8_t missed[2], pm_q_t half_asked, pm_q_t sixteenth, pm_q_t w, pm_q_t i)
+{
+    uint8_t *ms = &missed[w < 0 ? 1 : 0];
+    if (pm_mul(w, w) > half_asked) {
+        const uint32_t less = *ms > SEEN ? *ms - SEEN : 0U;
+        *ms = (uint8_t)(pm_mul(i, i) < sixteenth ? *ms + 1U : less);
+    }
+    return *ms > OPEN_PHASE_MS;
 }
 
 bool open_phase_slow(open_phase_t *self, pm_q_t least, pm_ab_t wanted, pm_ab_t i)
 {
+    const pm_q_t all = square(i);
+    const pm_q_t asked = square(wanted);
+    if (all < least || asked < pm_max(least, all / 4)) {
+        return false;
+    }
     const pm_abc_t w = pm_clarke_inverse(wanted);
     const pm_abc_t leg = pm_clarke_inverse(i);
-    const bool a = is_missed(self->missed[0], least, w.a, leg.a);
-    const bool b = is_missed(self->missed[1], least, w.b, leg.b);
-    const bool c = is_missed(self->missed[2], least, w.c, leg.c);
-    self->ms = a || b || c ? (uint16_t)(self->ms + 1U) : 0U;
-    return self->ms > OPEN_PHASE_MS;
+    const bool a = is_missed(self->missed[0], asked / 2, all / 16, w.a, leg.a);
+    const bool b = is_missed(self->missed[1], asked / 2, all / 16, w.b, leg.b);
+    const bool c = is_missed(self->missed[2], asked / 2, all / 16, w.c, leg.c);
+    return a || b || c;
 }

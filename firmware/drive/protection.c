@@ -121,7 +121,7 @@ void protection_phases(drive_t *drive)
         return;
     }
     const pm_dir_t dir = pm_dir(drive->stage == STAGE_VECTOR ? drive->position.pll.theta : drive->theta_open);
-    if (open_phase_slow(&drive->open_phase, drive->config.protection.missed_least,
+    if (open_phase_slow(&drive->open_phase, drive->config.protection.judged,
                         pm_park_inverse(drive->i_ref, dir), pm_park_inverse(drive->status.i, dir))) {
         drive_trip(drive, DRIVE_FAULT_OPEN_PHASE);
     }

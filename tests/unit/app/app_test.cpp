@@ -136,6 +136,8 @@ TEST(App, ScalesAreThoseOfTheBoard)
     x.boot(&stored);
     EXPECT_EQ(x.loop.app.params.i_full_scale, 60150);
     EXPECT_EQ(x.loop.app.params.v_dc_nominal, 24000);
+    (void)app_configure(&x.loop.app, &x.loop.hal, &stored, true); // told 1 A, by whom it be
+    EXPECT_EQ(x.loop.app.params.i_full_scale, 60150);
 }
 
 // Each of them, in the place that is its own; what a board does not know leaves the preset.
@@ -186,6 +188,12 @@ TEST(App, NamesOfAnotherVersionAreLeftOut)
     EXPECT_EQ(unknown, 2U);
     EXPECT_EQ(back.i_max, 2500);
     EXPECT_EQ(back.R_s, defaults().R_s);
+    x.boot(nullptr);
+    EXPECT_NE(x.console().find("of another version, left out: 0x00000002"), std::string::npos) << x.console();
+    Bench usual;
+    const drive_params_t params = defaults();
+    usual.boot(&params);
+    EXPECT_EQ(usual.console().find("left out"), std::string::npos);
 }
 
 TEST(App, CommandsThatCeaseAreAFault)
@@ -412,6 +420,19 @@ TEST(App, SlowThatHasNotEndedIsAnOverrun)
     x.loop.app.slow_busy = true;
     x.loop.app.slow_at = x.loop.app.drive.period; // as the period has left it that pended the slow interrupt
     app_control(&x.loop.app);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_OVERRUN);
+}
+
+// What is pended is busy until its end.
+TEST(App, SlowThatHasNotBegunIsAnOverrun)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_ms(5);
+    for (uint32_t k = 0; k < 2 * x.loop.app.slow_divider + 2; ++k) {
+        app_control(&x.loop.app);
+    }
     EXPECT_EQ(x.fault(), DRIVE_FAULT_OVERRUN);
 }
 

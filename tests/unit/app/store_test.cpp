@@ -2,6 +2,7 @@
 #include <map>
 #include <set>
 
+#include "firmware/app/app_parts.h"
 #include "tests/unit/app/bench.h"
 
 using app_test::Bench;
@@ -143,6 +144,25 @@ TEST(StoreWear, SavesOfAMasterGoneWildAreFew)
     EXPECT_EQ(saves_in(40, 1), 4);    // at once
     EXPECT_EQ(saves_in(20, 1450), 0); // one more every 30 s
     EXPECT_EQ(saves_in(20, 50), 1);
+    EXPECT_EQ(saves_in(10, 2600), 0); // none before 60 s
+    EXPECT_EQ(saves_in(10, 500), 1);
+}
+
+// By index and sub-index, before there is a dictionary of what is stored.
+TEST(StoreLss, AStoredValueIsThatOfItsSubIndex)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_ms(5);
+    ASSERT_EQ(x.set(0x1800, 5, 77), 0U);
+    ASSERT_EQ(x.set(0x1801, 5, 78), 0U);
+    ASSERT_EQ(x.set(0x1010, communication, save), 0U);
+    for (int pdo = 0; pdo < 2; ++pdo) {
+        int32_t value = 0;
+        EXPECT_TRUE(app_stored_value(&x.loop.hal, uint16_t(0x1800 + pdo), 5, &value));
+        EXPECT_EQ(value, 77 + pdo);
+    }
 }
 
 // CiA 305, "store configuration": node id and bit rate, and nothing else of their group.

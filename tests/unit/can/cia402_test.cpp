@@ -197,6 +197,17 @@ TEST(Cia402, CurrentModeGivesCurrentAndTurns)
     EXPECT_EQ(x.out.velocity, 20000);
 }
 
+TEST(Cia402, TargetsReadBack)
+{
+    Profile x;
+    int32_t value = 0;
+    for (const uint16_t slot : {OD_LIVE_TARGET_VELOCITY, OD_LIVE_TARGET_TORQUE, OD_LIVE_TARGET_CURRENT,
+                                OD_LIVE_VELOCITY_WINDOW, OD_LIVE_VELOCITY_THRESHOLD}) {
+        EXPECT_EQ(x.put(slot, ++value), 0U);
+        EXPECT_EQ(x.get(slot), value);
+    }
+}
+
 TEST(Cia402, CurrentIsGivenToTheModesOfOurOwnAlone)
 {
     for (const int mode : {CIA402_MODE_IDENTIFY, CIA402_MODE_CURRENT, CIA402_MODE_NONE, CIA402_MODE_VELOCITY,

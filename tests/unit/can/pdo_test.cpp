@@ -188,7 +188,7 @@ TEST(Communication, RefusesIdentifiersInUse)
 {
     Bench x;
     for (const uint32_t id : {0x0U, 0x1U, 0x7FU, 0x101U, 0x180U, 0x581U, 0x5FFU, 0x601U, 0x67FU, 0x6E0U,
-                              0x6FFU, 0x701U, 0x77FU, 0x7FFU, 0x20000202U, 0x800U}) {
+                              0x6FFU, 0x701U, 0x77FU, 0x7FFU, 0x20000202U, 0x800U, 0x1302U}) {
         EXPECT_EQ(x.set(0x1403, 1, id), INVALID) << std::hex << id;
         EXPECT_EQ(x.set(0x1803, 1, id), INVALID) << std::hex << id;
         EXPECT_EQ(x.set(0x1005, 0, id), INVALID) << std::hex << id;

@@ -475,6 +475,7 @@ uint32_t block_download(Bench &x, uint16_t index, const Bytes &data, bool sized,
     }
     EXPECT_EQ(begin[0], 0xA4);
     uint8_t block = begin[4];
+    EXPECT_EQ(block, 127); // all that it can take
     size_t position = 0;
     int number = 0;
     while (position < data.size()) {

@@ -323,6 +323,16 @@ TEST(Trace, RefusesWhatCannotBe)
     EXPECT_EQ(trace_size(&x.t), 0U);
 }
 
+TEST(Trace, TakesItsSettingsAlone)
+{
+    Scope x;
+    uint32_t code;
+    for (const int slot :
+         {OD_LIVE_TRACE_STATE, OD_LIVE_TRACE_AT, OD_LIVE_TRACE_SCALE_1, OD_LIVE_TRACE_SCALE_8}) {
+        EXPECT_FALSE(trace_put(&x.t, uint16_t(slot), 1, &code)) << slot;
+    }
+}
+
 TEST(Trace, NewSettingsEndTheOldData)
 {
     Scope x;

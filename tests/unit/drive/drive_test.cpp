@@ -202,8 +202,8 @@ TEST(Drive, StateIsSmall)
     EXPECT_LE(offsetof(drive_t, position.injection) + sizeof(pulsating_square_t), 1020U + 52U);
     // 92 bytes of them say which regulator it is, what the machine is, whether the position slips, what a leg loses,
     // what the legs hold, and which of their currents are seen; 24 are the units of a command, instead of seven
-    // divisions at 1 kHz, 24 what windings and bridge bear, 16 the short after a fault, and 32 phases that do not conduct
-    EXPECT_LE(sizeof(drive_t), 1488U + sizeof(injection_t));
+    // divisions at 1 kHz, 24 what windings and bridge bear, 16 the short after a fault, and 8 the legs that do not conduct
+    EXPECT_LE(sizeof(drive_t), 1468U + sizeof(injection_t));
 }
 
 TEST(Drive, StaysOffWithoutACommand)
@@ -510,6 +510,19 @@ TEST(Drive, EveryRegulatorTurnsTheMotor)
             EXPECT_EQ(x.loop.app.drive.stage, STAGE_VECTOR) << id;
             EXPECT_EQ(drive_status(&x.loop.app.drive)->fault, DRIVE_FAULT_NONE) << id;
         }
+    }
+}
+
+TEST(Drive, EveryRegulatorSaysWhetherToTrip)
+{
+    for (int32_t id = 0; id < REGULATOR_COUNT; ++id) {
+        drive_params_t p = direct::params(2);
+        p.regulator = id;
+        direct::Drive x(p);
+        x.start_current_mode();
+        EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE) << id;
+        EXPECT_TRUE(x.driven()) << id;
+        EXPECT_EQ(x.out.trip, 0) << id;
     }
 }
 

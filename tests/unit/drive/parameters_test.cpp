@@ -62,6 +62,7 @@ TEST(Parameters, DefaultsAreTheTableS)
         EXPECT_EQ(drive_param_get(&p, static_cast<drive_param_id_t>(id)), drive_param_table[id].def)
             << drive_param_table[id].name;
     }
+    EXPECT_EQ(p.absent, 0);
 }
 
 } // namespace

@@ -222,6 +222,24 @@ TEST(Emf, IsTheReferenceToTheRoundingOfItsFormats)
 }
 
 // What a carrier of half the sampling frequency leaves must not show at 1 kHz, where it would be a constant.
+// Its direction is what eps and misfit say.
+TEST(Emf, TheVectorIsThatOfTheErrorSignal)
+{
+    const Fixture f = spm();
+    for (const observer_id_t id : kAll) {
+        Closed closed(f.base, with(id, f.config), Rotation(f.machine, f.base, 0.3, {0, 2}));
+        closed.settled_deg(0.2);
+        obs_out_t out{};
+        closed.rotation.advance();
+        const obs_in_t in =
+            closed.rotation.seen(closed.rotation.theta_rad - 0.05, closed.rotation.omega_rad_s);
+        observer_step(&closed.state, &closed.config, &in, &out);
+        ASSERT_GT(std::abs(real(out.eps)), 1e-3) << id;
+        EXPECT_NEAR(real(out.vector.d) / real(out.vector.q), -real(out.eps) / (1 - real(out.misfit)), 2e-3)
+            << id;
+    }
+}
+
 TEST(Emf, ACarrierOfHalfTheSamplingFrequencyIsRemoved)
 {
     const Fixture f = ipm();
