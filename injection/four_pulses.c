@@ -74,7 +74,8 @@ static pm_procedure_t locate(four_pulses_t *self, const pulses_config_t *config)
     }
     const pm_q_t reverse = pulses_leg(&self->train.i, self->axis);
     self->D = self->train.e[self->axis][self->axis] + reverse - pm_mul(self->train.g[self->axis], reverse);
-    const pm_sigma_t polarity = pulses_margin(pm_abs(self->D), pm_mul(PM_Q(1.414), config->i_noise));
+    const pm_sigma_t polarity =
+        pulses_polarity(self->D, config->i_bridge / 2, pm_mul(PM_Q(1.414), config->i_noise));
     if (polarity < PULSES_SURE) {
         return PM_FAILED_POLARITY;
     }

@@ -11,7 +11,7 @@
  * on IPM-1000. r, the third harmonic of the saturation, is 0.11 there and from -0.2 to 0.33 in general; as
  * cos 3 x is small where x is large, B errs by at most 0.25 of itself.
  *   margin of saliency = |y| / (2.1 i_noise)
- *   margin of polarity = |D| / (1.4 i_noise)
+ *   margin of polarity = (|D| - i_bridge / 2) / (1.4 i_noise)      i_bridge: of one pair of the three, pulses.h
  * Use as initial_pulses.h; the same reasons. Duration: about 4 (2 n + 5) periods and 9 ms.
  * Tests: tests/unit/injection/four_pulses_test.cpp, tests/scenario/four_pulses.yaml. */
 #ifndef INJECTION_FOUR_PULSES_H

@@ -37,7 +37,7 @@ static pm_procedure_t locate(initial_pulses_t *self, const pulses_config_t *conf
     found->theta = pm_atan2(y.beta, y.alpha) / 2U;
     const pm_q_t along = pm_park(self->w, pm_dir(found->theta)).d;
     found->theta += along < 0 ? PM_TURN(0.5) : 0U;
-    const pm_sigma_t polarity = pulses_margin(pm_abs(along), 2 * config->i_noise);
+    const pm_sigma_t polarity = pulses_polarity(along, config->i_bridge, 2 * config->i_noise);
     if (polarity < PULSES_SURE) {
         return PM_FAILED_POLARITY;
     }

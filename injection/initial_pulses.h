@@ -6,7 +6,7 @@
  *   w = sum i         ~ e^{j theta}             first-order saturation: the polarity
  * Both sums cancel offsets. The torque of a pair of pulses averages to zero.
  *   margin of saliency = |y| / (3 i_noise)
- *   margin of polarity = |w . e^{j theta}| / (2 i_noise)
+ *   margin of polarity = (|w . e^{j theta}| - i_bridge) / (2 i_noise)
  * as a component of w has the noise of six currents of 2/3 i_noise^2 each, that of y 1.5 times as much.
  *
  * Call initial_pulses_step() each period until it is not PM_RUNNING; after PM_DONE initial_pulses_find() each

@@ -137,3 +137,8 @@ pm_sigma_t pulses_margin(pm_q_t length, pm_q_t noise)
 {
     return pm_div(length / 64, noise) / PER_SIGMA;
 }
+
+pm_sigma_t pulses_polarity(pm_q_t along, pm_q_t bridge, pm_q_t noise)
+{
+    return pulses_margin(pm_max(pm_abs(along) - bridge, 0), noise);
+}

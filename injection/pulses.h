@@ -15,6 +15,13 @@
  * Solved by iteration, a step each millisecond; e_xk (1 - g_k) then stands for e_xk. Left alone, 1 % errs by 3.5 degrees where the
  * saliency is a tenth. The gains' noise makes that of y sqrt 2 to 1.5 times as large.
  *
+ * The polarity is a difference of + and -, of a tenth of the pulse or a third, and a bridge makes one too: in + one
+ * leg switches and in - two, whose currents lose unlike voltages where a saliency makes them unlike, and the legs'
+ * capacitance rings with the winding until the next pulse:
+ *   i_bridge = 4/3 n T_dt v_dc / L_d + 2 v_dc sqrt(C_leg / L_d)
+ * Of 360 starts of machines that do not saturate, saliency 1.1 to 4, up to 1.1 n T_dt v_dc / L_d was seen. A polarity that
+ * is not sure beyond it is not found; of a machine whose L_d falls with demagnetising current it is the wrong one.
+ *
  * A one-shot procedure that owns the bridge; the step costs at most 130 instructions. What follows from the
  * train is found outside the control interrupt.
  * Tests: tests/unit/injection/initial_pulses_test.cpp, four_pulses_test.cpp. */
@@ -39,6 +46,7 @@ typedef struct {
     pm_q_t i_zero;    /* currents below count as zero */
     pm_q_t y_min;     /* least |y| of six pulses that counts as a saliency: a fourth of the machine's */
     pm_q_t i_noise;   /* of one current */
+    pm_q_t i_bridge;  /* what the bridge may add to the currents that show the polarity */
 } pulses_config_t;
 
 typedef struct {
@@ -84,9 +92,12 @@ void pulses_add(pulses_t *self, uint32_t axis, bool reverse); /* self->i to e */
 pm_procedure_t pulses_balance(pulses_t *self);
 pm_ab_t pulses_saliency(const pulses_t *self);
 
-/* Of a length with a noise. A polarity is sure from PULSES_SURE on. */
-#define PULSES_SURE (5 * PM_SIGMA_ONE)
+/* Of a length with a noise. */
 pm_sigma_t pulses_margin(pm_q_t length, pm_q_t noise);
+
+/* The same of what shows the polarity, beyond what the bridge may add to it. It is sure from PULSES_SURE on. */
+#define PULSES_SURE (5 * PM_SIGMA_ONE)
+pm_sigma_t pulses_polarity(pm_q_t along, pm_q_t bridge, pm_q_t noise);
 
 void make_pulses(maker_t *m, pulses_config_t *c);
 

@@ -28,5 +28,12 @@ void make_pulses(maker_t *m, pulses_config_t *c)
     const pm_num_t share = pm_num_div(pm_num_sub(L_q, L_d), L_q);
     const pm_num_t i_pulse = pm_num_div(si(m, DRIVE_PARAM_i_pulse), m->base.i);
     c->y_min = fixed(m, mul3(share, i_pulse, pm_num_ratio(3, 4)), Q_BITS, DRIVE_PARAM_i_pulse);
+    const pm_num_t v_dc = si(m, DRIVE_PARAM_v_dc_nominal);
+    const pm_num_t edges =
+        pm_num_mul(pm_num_ratio(4 * whole, 3), pm_num_div(si(m, DRIVE_PARAM_dead_time), L_d));
+    const pm_num_t ringing =
+        pm_num_sqrt(pm_num_div(pm_num_mul(pm_num(4), si(m, DRIVE_PARAM_leg_capacitance)), L_d));
+    c->i_bridge = fixed(m, pm_num_div(pm_num_mul(v_dc, pm_num_add(edges, ringing)), m->base.i), Q_BITS,
+                        DRIVE_PARAM_i_pulse);
     c->i_noise = pm_max(fixed(m, noise, Q_BITS, DRIVE_PARAM_i_noise), 1);
 }

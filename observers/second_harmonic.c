@@ -1,7 +1,36 @@
 #include "observers/second_harmonic.h"
 
+#include "firmware/math/image.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
+
+#if !PM_HAS(second_harmonic)
+
+/* Left out; second_harmonic_config.c refuses it. */
+void second_harmonic_reset(second_harmonic_t *self)
+{
+    (void)self;
+}
+
+pm_q_t second_harmonic_step(second_harmonic_t *self, const second_harmonic_config_t *config, pm_dir_t dir,
+                            pm_q_t eps)
+{
+    (void)self;
+    (void)config;
+    (void)dir;
+    return eps;
+}
+
+void second_harmonic_slow(second_harmonic_t *self, const second_harmonic_config_t *config, pm_q_t omega,
+                          pm_q_t weight)
+{
+    (void)self;
+    (void)config;
+    (void)omega;
+    (void)weight;
+}
+
+#else
 
 /* Time constant, in ms, with which the estimate fades while it does not learn. */
 #define FADE 20
@@ -84,3 +113,5 @@ void second_harmonic_slow(second_harmonic_t *self, const second_harmonic_config_
     const pm_q_t step = pm_frac(omega, config->t_s);
     self->turn = pm_dir((pm_angle_t)pm_rad_to_angle(pm_shl(step, 1)));
 }
+
+#endif

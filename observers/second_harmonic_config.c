@@ -1,7 +1,20 @@
 #include "observers/second_harmonic.h"
 
+#include "firmware/math/image.h"
 #include "firmware/params/maker.h"
 #include "observers/loop.h"
+
+#if !PM_HAS(second_harmonic)
+
+void make_second_harmonic(maker_t *m, second_harmonic_config_t *c)
+{
+    *c = (second_harmonic_config_t){.id = SECOND_HARMONIC_STAYS};
+    if (m->params->second_harmonic != 0) {
+        refuse(m, DRIVE_PARAM_second_harmonic, "is not in this image");
+    }
+}
+
+#else
 
 /* Learns within 2 T / mu = 50 ms; the loop's gains as they act while the observer leads. */
 void make_second_harmonic(maker_t *m, second_harmonic_config_t *c)
@@ -26,3 +39,5 @@ void make_second_harmonic(maker_t *m, second_harmonic_config_t *c)
         refuse(m, DRIVE_PARAM_second_harmonic, "learns nothing behind the arctangent");
     }
 }
+
+#endif

@@ -4,7 +4,7 @@ set(PM_IMAGES foc small)
 # every method that the board has the channels for
 set(PM_IMAGE_foc_BOARD stm32g431)
 set(PM_IMAGE_foc_PROGRAM pmdrive)
-set(PM_IMAGE_foc_METHODS synchronous_pi deadbeat calibrate initial_pulses align identify four_pulses charge stored_eds mismatch active_flux back_emf extended_emf extended_emf_ab flux_linkage sliding_mode ekf_full ekf_reduced mras_current mras_voltage mras_simple pulsating_square rotating_sine inform pulsating_sine stationary_sine stationary_square)
+set(PM_IMAGE_foc_METHODS synchronous_pi deadbeat calibrate initial_pulses align identify four_pulses charge stored_eds mismatch second_harmonic active_flux back_emf extended_emf extended_emf_ab flux_linkage sliding_mode ekf_full ekf_reduced mras_current mras_voltage mras_simple pulsating_square rotating_sine inform pulsating_sine stationary_sine stationary_square)
 set(PM_IMAGE_foc_IN_FLASH fault_short_stage fault_short_step procedure_identify_step pulses_step injection_step_other regulator_step_other)
 set(PM_IMAGE_foc_FLASH 110592)
 set(PM_IMAGE_foc_RAM 20480)

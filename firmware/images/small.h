@@ -13,6 +13,7 @@
 #define PM_WITHOUT_four_pulses 1
 #define PM_WITHOUT_stored_eds 1
 #define PM_WITHOUT_mismatch 1
+#define PM_WITHOUT_second_harmonic 1
 #define PM_WITHOUT_back_emf 1
 #define PM_WITHOUT_extended_emf 1
 #define PM_WITHOUT_extended_emf_ab 1

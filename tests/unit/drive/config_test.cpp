@@ -49,7 +49,7 @@ TEST(Config, DefaultsAreAccepted)
     const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
     EXPECT_TRUE(r.ok);
     EXPECT_TRUE(c.injection);
-    EXPECT_EQ(c.start, SEQUENCE_pulses);
+    EXPECT_EQ(c.start, SEQUENCE_pulses_align);
 }
 
 TEST(Config, RefusesAndNamesWhatIsOutOfRange)
@@ -231,6 +231,7 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
         {"i_zero", c.pulses.i_zero, 28, 5 * 5e-3 / I},
         {"y_min", c.pulses.y_min, 28, 0.75 * (L_q - L_d) / L_q * 4 / I},
         {"i_noise", c.pulses.i_noise, 28, 5e-3 / I},
+        {"i_bridge", c.pulses.i_bridge, 28, 4.0 / 3 * std::round(exact) * 2e-6 * 300 / L_d / I},
         {"open-loop i", c.open_loop.i, 28, 2 / I},
         {"open-loop slope", c.open_loop.slope, 28, 50 * P * slow / W},
         {"heat_max", c.protection.heat_max, 28, std::pow(1.05 * 4 / I, 2)},
@@ -472,10 +473,11 @@ TEST(Config, StartFollowsTheMachine)
         const drive_config_t c = configure(changed(x));
         return std::make_pair(c.injection, sequence_id_t(c.start));
     };
-    EXPECT_EQ(start({}), std::make_pair(true, SEQUENCE_pulses));
+    EXPECT_EQ(start({}), std::make_pair(true, SEQUENCE_pulses_align));
+    EXPECT_EQ(start({{DRIVE_PARAM_start_fallback, 0}}), std::make_pair(true, SEQUENCE_pulses));
     EXPECT_EQ(start({{DRIVE_PARAM_L_d, 74e-3}}), std::make_pair(false, SEQUENCE_align));   // no saliency
     EXPECT_EQ(start({{DRIVE_PARAM_i_noise, 0.1}}), std::make_pair(false, SEQUENCE_align)); // not seen
-    EXPECT_EQ(start({{DRIVE_PARAM_start_method, 1}}), std::make_pair(true, SEQUENCE_pulses));
+    EXPECT_EQ(start({{DRIVE_PARAM_start_method, 1}}), std::make_pair(true, SEQUENCE_pulses_align));
     EXPECT_EQ(start({{DRIVE_PARAM_start_method, 2}}), std::make_pair(false, SEQUENCE_align));
     EXPECT_EQ(start({{DRIVE_PARAM_start_method, 3}}), std::make_pair(true, SEQUENCE_align));
 }

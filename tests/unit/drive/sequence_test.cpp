@@ -9,10 +9,10 @@ namespace
 
 using direct::Drive;
 
-drive_params_t falling_back()
+drive_params_t without_fallback()
 {
     drive_params_t p = direct::params(1);
-    p.start_fallback = 1;
+    p.start_fallback = 0;
     return p;
 }
 
@@ -62,7 +62,7 @@ TEST(Sequence, ARefusalIsAFaultOrLeadsToTheFallBack)
 {
     for (const bool fall_back : {false, true}) {
         for (int reason = PM_DONE + 1; reason < PM_PROCEDURE_COUNT; ++reason) {
-            Drive x = in_pulses(fall_back ? falling_back() : direct::params(1));
+            Drive x = in_pulses(fall_back ? direct::params(1) : without_fallback());
             x.d.procedure.result = static_cast<pm_procedure_t>(reason);
             x.run_ms(1);
             EXPECT_EQ(drive_status(&x.d)->refusal.procedure, PROCEDURE_initial_pulses);
@@ -90,7 +90,7 @@ TEST(Sequence, ARefusalIsAFaultOrLeadsToTheFallBack)
 
 TEST(Sequence, AnotherStartForgetsTheRefusal)
 {
-    Drive x = in_pulses(falling_back());
+    Drive x = in_pulses(direct::params(1));
     x.d.procedure.result = PM_FAILED_POLARITY;
     x.run_ms(1);
     ASSERT_EQ(drive_status(&x.d)->refusal.reason, PM_FAILED_POLARITY);

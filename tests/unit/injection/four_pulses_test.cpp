@@ -126,4 +126,27 @@ TEST(FourPulses, RefusesExchangedSensors)
     EXPECT_EQ(find(wrong, ipm(0), config(ipm(0)), 0.5).state, PM_FAILED_UNEVEN);
 }
 
+// What dead time makes of a saliency is no polarity. Twin: where nobody counts with it, it is one, and the wrong one.
+TEST(Pulses, WhatTheBridgeAddsIsNoPolarity)
+{
+    int wrong = 0;
+    for (const double L_d_H : {2e-3, 4e-3, 8e-3}) {
+        Rig r = ipm(0.0);
+        r.plant.machine = {1.0, L_d_H, 3.5 * L_d_H, 0.0, 0.236, 3};
+        r.plant.inverter.c_leg_F = 0;
+        r.L_d_H = L_d_H;
+        r.L_q_H = 3.5 * L_d_H;
+        pulses_config_t unaware = config(r);
+        unaware.i_bridge = 0;
+        for (int k = 0; k < 24; ++k) {
+            const double theta = (15 * k + 3) * kDegree;
+            EXPECT_EQ(find(kSix, r, config(r), theta).state, PM_FAILED_POLARITY) << L_d_H << ' ' << k;
+            EXPECT_EQ(find(kFour, r, config(r), theta).state, PM_FAILED_POLARITY) << L_d_H << ' ' << k;
+            const Result x = find(kSix, r, unaware, theta);
+            wrong += x.state == PM_DONE && std::abs(x.error_deg) > 90 ? 1 : 0;
+        }
+    }
+    EXPECT_GT(wrong, 6);
+}
+
 } // namespace

@@ -88,6 +88,9 @@ inline pulses_config_t config(const Rig &r)
     c.i_zero = fixed(5 * r.noise_A / r.base.i_A, 28);
     c.y_min = fixed(0.75 * (r.L_q_H - r.L_d_H) / r.L_q_H * r.i_pulse_A / r.base.i_A, 28);
     c.i_noise = fixed(r.noise_A / r.base.i_A, 28);
+    const double v_dc = r.plant.dclink.v_source_V, C = r.plant.inverter.c_leg_F;
+    const double edges_A = 4.0 / 3 * whole * r.plant.inverter.dead_time_s * v_dc / r.L_d_H;
+    c.i_bridge = fixed((edges_A + 2 * v_dc * std::sqrt(C / r.L_d_H)) / r.base.i_A, 28);
     return c;
 }
 
