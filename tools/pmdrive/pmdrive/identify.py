@@ -120,19 +120,16 @@ def raw_values(wanted):
 def name_plate(drive, current, pole_pairs, speed, dc_link):
     """{entry: integer} to begin with, from what is written on the machine: rated current (peak, A), highest speed (rad/s),
     voltage of the link. The machine's own data are guesses that identification replaces."""
-    i_scale, v_scale = float(drive.get("i_full_scale")), float(drive.get("v_full_scale"))
-    if not (0 < current < 0.75 * i_scale and 0 < dc_link < 0.9 * v_scale and speed > 0 and pole_pairs >= 1):
-        raise UsageError("the board cannot measure what the name plate says",
-                         f"its channels reach {i_scale:g} A and {v_scale:g} V")
+    plate = {"pole_pairs": pole_pairs, "i_rated": current, "speed_max": speed, "v_dc_nominal": dc_link}
+    scales = {name: float(drive.get(name)) for name in ("i_full_scale", "v_full_scale")}
+    if speed <= 0 or pole_pairs < 1:
+        raise UsageError("no motor has such a name plate", "pole pairs from 1 on, a speed above 0")
+    plate.update(tune.limits({**scales, **plate}))
     psi = 0.8 * dc_link / math.sqrt(3) / (pole_pairs * speed)
     L, torque = 0.2 * psi / current, 1.5 * pole_pairs * psi * current
-    plate = {
-        "pole_pairs": pole_pairs, "i_rated": current, "i_max": 1.25 * current, "i_trip": min(2.25 * current, 0.9 * i_scale),
-        "speed_max": speed, "speed_trip": 1.2 * speed, "v_dc_nominal": dc_link,
-        "v_dc_min": max(0.3 * dc_link, 0.07 * v_scale), "v_dc_derate": min(1.27 * dc_link, 0.93 * v_scale),
-        "v_dc_max": min(1.33 * dc_link, 0.96 * v_scale), "R_s": 0.03 * dc_link / current,
-        "L_d": L, "L_q": L, "psi_m": psi, "L_q_rated": L, "L_dh_rated": L, "L_qh_rated": L, "L_dqh_rated": 0.0,
-        "cross_half": 0.0, "J": 0.3 * torque / speed,
-    }
+    plate.update({
+        "R_s": 0.03 * dc_link / current, "L_d": L, "L_q": L, "psi_m": psi, "L_q_rated": L, "L_dh_rated": L, "L_qh_rated": L,
+        "L_dqh_rated": 0.0, "cross_half": 0.0, "J": 0.3 * torque / speed,
+    })
     board = {name: float(drive.get(name)) for name in tune.BOARD}
     return raw_values({**plate, **tune.values({**board, **plate})})

@@ -1,4 +1,4 @@
-"""Controllers, position loop and start from what is known of the machine.
+"""Limits, controllers, position loop and start from what is known of the machine.
 
 The rules are those by which the machine files of sim_plant/machines were set by hand; docs/identify.md says why.
 """
@@ -12,6 +12,34 @@ SALIENT = 0.05  # the drive's own limit for injection
 STEPS = 4096    # of the converter
 INJECTION_HZ = 25.0  # of the position by injection: slow enough for the noise of the smallest answer that leads
 
+# Why each value is what it is, in a line.
+WHY = {
+    "i_max": "1.25 times rated",
+    "i_trip": "2.25 times rated, at most 90 % of the converter's range",
+    "speed_max": "1.25 times rated",
+    "speed_trip": "1.2 times speed_max",
+    "v_dc_min": "30 % of the link, and 7 % of the converter's range",
+    "v_dc_derate": "127 % of the link",
+    "v_dc_max": "133 % of the link, at most 96 % of the converter's range",
+    "current_bandwidth": "a twentieth of f_pwm, at most 1500 Hz",
+    "injection_bandwidth": "slow enough for the noise of the smallest answer that leads",
+    "speed_bandwidth": "six times rated torque over the inertia at rated speed; below the position's loop",
+    "acceleration": "0.3 of rated torque, at most what the position's loop follows 0.12 rad behind",
+    "flux_bandwidth": "follows 0.8 of rated torque within a radian",
+    "flux_gain": "half where the machine saturates; damping costs nothing where it does not",
+    "speed_low": "15 % of rated speed with injection, 4 % without",
+    "speed_high": "27 % of rated speed with injection, 8 % without",
+    "i_d_light": "a tenth of rated: light load stays out of what dead time does to small currents",
+    "i_fw_max": "half of rated",
+    "comp_zone": "a dozen steps of the converter",
+    "v_injection": "seven steps of the converter as an answer, 14 times what a leg loses; as the link leaves room",
+    "i_pulse": "rated current, which saturates",
+    "start_method": "0: pulses and injection, as the saliency is seen; 2: align and open loop, as it is not",
+    "i_open_loop": "0.8 of rated: bears half the rated torque 39 degrees behind",
+    "t_align": "half a second",
+    "open_loop_acceleration": "a twentieth of rated torque; hands over within 0.6 s where that allows it",
+}
+
 
 def _injection(x):
     """Seven steps of the converter as an answer 45 degrees off, and fourteen times what a leg loses, which at light load
@@ -24,6 +52,20 @@ def _injection(x):
     v = max(7 * step * 2 * x["L_d"] * x["L_q"] * x["f_pwm"] / dL, 14 * lost)
     answer = min(v, top) * dL / (2 * x["L_d"] * x["L_q"] * x["f_pwm"])
     return min(v, top), answer > max(4 * x["i_noise"], 2 * step)
+
+
+def limits(x):
+    """{name: SI value} from i_rated, speed_max, v_dc_nominal and the board's full scales."""
+    current, speed, link = x["i_rated"], x["speed_max"], x["v_dc_nominal"]
+    i_scale, v_scale = x["i_full_scale"], x["v_full_scale"]
+    if not (0 < current < 0.75 * i_scale and 0 < link < 0.9 * v_scale):
+        raise UsageError("the board cannot measure what the name plate says",
+                         f"its channels reach {i_scale:g} A and {v_scale:g} V")
+    return {
+        "i_max": 1.25 * current, "i_trip": min(2.25 * current, 0.9 * i_scale), "speed_trip": 1.2 * speed,
+        "v_dc_min": max(0.3 * link, 0.07 * v_scale), "v_dc_derate": min(1.27 * link, 0.93 * v_scale),
+        "v_dc_max": min(1.33 * link, 0.96 * v_scale),
+    }
 
 
 def values(x, bandwidth=None):
@@ -66,4 +108,3 @@ def changes(drive, bandwidth=None):
 
     known = {name: float(drive.get(name)) for name in BOARD + MACHINE}
     return raw_values(values(known, bandwidth))
-

@@ -1,0 +1,213 @@
+#!/usr/bin/python3
+"""From ten values of a motor to a machine file with all that the drive needs, each choice explained in a line.
+
+    tools/tune.py my_motor.yaml                  # prints the file
+    tools/tune.py my_motor.yaml -o tuned.yaml    # writes it
+    pmsim run tests/unit/tune/start.yaml --set machine=tuned.yaml
+
+my_motor.yaml, all that it must have:
+
+    name: My motor
+    electrical: {R_s_ohm: 0.11, L_d0_H: 0.18e-3, L_q0_H: 0.2e-3, psi_m_Wb: 0.022, pole_pairs: 15}
+    mechanics: {J_kgm2: 0.02}                                   # with what it turns
+    rated: {i_rated_A: 20, speed_rated_rad_s: 40, v_dc_V: 36}   # peak of a phase; mechanical
+
+What else a machine file may have is kept; inverter, sensors and link that are not told are those of a board of the motor's
+class. What `drive:` of the file says stands above what is chosen here. The rules are those of `pmdrive tune`.
+"""
+import argparse
+import importlib
+import math
+import sys
+import types
+from pathlib import Path
+
+import yaml
+
+PACKAGE = Path(__file__).resolve().parent / "pmdrive" / "pmdrive"
+package = types.ModuleType("pmdrive")  # its modules one by one: no bus is needed, nor what talks to it
+package.__path__ = [str(PACKAGE)]
+sys.modules["pmdrive"] = package
+tune = importlib.import_module("pmdrive.tune")
+UsageError = importlib.import_module("pmdrive.errors").UsageError
+
+NEEDED = {
+    "electrical": ("R_s_ohm", "L_d0_H", "L_q0_H", "psi_m_Wb", "pole_pairs"),
+    "mechanics": ("J_kgm2",),
+    "rated": ("i_rated_A", "speed_rated_rad_s", "v_dc_V"),
+}
+TIMER_HZ = 170e6
+LOW_V = 60  # below: MOSFETs
+PWM_HZ = (10e3, 20e3, 40e3, 60e3)
+PER_TURN = 20  # periods of a turn of the field at the speed that trips
+OTHERS = "name", "path", "electrical", "winding", "mechanics", "rated", "inverter", "sensor", "dclink", "drive"
+
+
+def read(path):
+    """The file's sections; an error names what is wrong with it."""
+    try:
+        with open(path, encoding="utf-8") as file:
+            x = yaml.safe_load(file)
+    except (OSError, yaml.YAMLError) as error:
+        raise UsageError(f"{path}: {' '.join(str(error).split())}") from None
+    if not isinstance(x, dict) or "name" not in x:
+        raise UsageError(f"{path}: no machine file: it needs `name`")
+    for section, keys in NEEDED.items():
+        values = x.get(section)
+        if not isinstance(values, dict):
+            raise UsageError(f"{path}: it needs the section `{section}`")
+        for key in keys:
+            number(path, section, key, values.get(key))
+    for section in ("inverter", "sensor", "dclink", "drive"):
+        if not isinstance(x.setdefault(section, {}), dict):
+            raise UsageError(f"{path}: `{section}` is no section")
+    return x
+
+
+def number(path, section, key, value):
+    """Of YAML, which takes 1e3 for a word; above 0."""
+    try:
+        value = float(value)
+    except (TypeError, ValueError):
+        raise UsageError(f"{path}: {section}.{key} is needed, a number") from None
+    if not 0 < value < math.inf:
+        raise UsageError(f"{path}: {section}.{key} = {value:g} is not above 0")
+    return value
+
+
+def above(value, steps):
+    """The first of a series of round numbers that is not below it."""
+    exponent = math.floor(math.log10(value))
+    return next(s * 10 ** e for e in (exponent, exponent + 1) for s in steps if s * 10 ** e >= value * (1 - 1e-9))
+
+
+def complete(x):
+    """What is not told of torque, inverter, sensors and link: {section: {key: (value, why)}}."""
+    told = {(section, key): number("", section, key, x[section][key]) for section, keys in NEEDED.items() for key in keys}
+    v, i = told["rated", "v_dc_V"], told["rated", "i_rated_A"]
+    poles, speed = told["electrical", "pole_pairs"], told["rated", "speed_rated_rad_s"]
+    low = v <= LOW_V
+    turns_Hz = 1.5 * poles * speed / (2 * math.pi)  # at the speed that trips
+    least = max(20e3 if low else 10e3, PER_TURN * turns_Hz)
+    f_pwm = next((f for f in PWM_HZ if f >= least), PWM_HZ[-1])
+    f_pwm = float(x["inverter"].get("f_pwm_Hz", f_pwm))
+    chosen = {
+        "rated": {"torque_rated_Nm": (1.5 * poles * told["electrical", "psi_m_Wb"] * i, "1.5 pole_pairs psi_m i_rated")},
+        "inverter": {
+            "f_pwm_Hz": (f_pwm, f"{PER_TURN} periods and more of a turn of the field"),
+            "timer_counts": (round(TIMER_HZ / (2 * f_pwm)), "170 MHz timer, centre-aligned"),
+            "dead_time_s": (0.5e-6 if low else 2e-6, "MOSFET board" if low else "IGBT module"),
+            "c_leg_F": (2e-9 if low else 0.5e-9, "output capacitance of a leg"),
+            "v_switch_V": (0.0 if low else 1.0, "resistive" if low else "of a few amperes"),
+            "v_diode_V": (0.0 if low else 1.0, "the channel conducts both ways" if low else "of a few amperes"),
+            "r_on_ohm": (0.02 * v / i / 10 if low else 0.0, "0.2 % of the link at rated current" if low else "in the drop"),
+        },
+        "sensor": {
+            "i_full_scale_A": (above(2.5 * i, (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8)), "2.5 times rated"),
+            "v_full_scale_V": (above(1.5 * v, (1, 1.2, 1.5, 2, 2.5, 3, 4, 4.5, 5, 6, 8)), "1.5 times the link"),
+            "noise_lsb": (0.5, "of 12 bits"),
+        },
+        "dclink": {
+            "r_source_ohm": (0.002 * v / i, "0.2 % of the link at rated current"),
+            "c_F": (above(20 * i / (v * f_pwm), (1, 2.2, 4.7)), "rated current for a period is 5 % of the link"),
+        },
+    }
+    return {section: {key: (x[section].get(key, value), "told" if key in x[section] else why)
+                      for key, (value, why) in keys.items()} for section, keys in chosen.items()}
+
+
+def drive(x, board):
+    """`drive:` as {name: (value, why)}, what is told above what is chosen."""
+    def of(section, key):
+        return float(x[section][key] if key in x[section] else board[section][key][0])
+
+    told = {name: float(value) for name, value in x["drive"].items()}
+    L_d, L_q = of("electrical", "L_d0_H"), of("electrical", "L_q0_H")
+    machine = {
+        "pole_pairs": (int(of("electrical", "pole_pairs")), "the motor's"),
+        "R_s": (of("electrical", "R_s_ohm") + of("inverter", "r_on_ohm"), "winding and one switch"),
+        "L_d": (L_d, "the motor's"), "L_q": (L_q, "the motor's"), "psi_m": (of("electrical", "psi_m_Wb"), "the motor's"),
+        "i_rated": (of("rated", "i_rated_A"), "peak of a phase"),
+        "L_q_rated": (L_q, "no saturation is told: as without current"), "L_dh_rated": (L_d, "no saturation is told"),
+        "L_qh_rated": (L_q, "no saturation is told"), "L_dqh_rated": (0.0, "no saturation is told"),
+        "cross_half": (0.0, "no saturation is told"), "J": (of("mechanics", "J_kgm2"), "with what it turns"),
+        "leg_capacitance": (of("inverter", "c_leg_F"), "the inverter's"),
+        "speed_max": (1.25 * of("rated", "speed_rated_rad_s"), tune.WHY["speed_max"]),
+    }
+    if L_q < L_d:
+        raise UsageError("L_q is below L_d: the drive takes such a machine for a round one",
+                         "tell both as their mean, (L_d + L_q) / 2")
+    known = {name: told.get(name, value) for name, (value, _) in machine.items()}
+    known.update(
+        f_pwm=of("inverter", "f_pwm_Hz"), dead_time=of("inverter", "dead_time_s"), v_dc_nominal=of("rated", "v_dc_V"),
+        device_drop=of("inverter", "v_switch_V"), i_full_scale=of("sensor", "i_full_scale_A"),
+        v_full_scale=of("sensor", "v_full_scale_V"),
+        i_noise=of("sensor", "noise_lsb") * 2 * of("sensor", "i_full_scale_A") / tune.STEPS)
+    out = dict(machine)
+    for name, value in tune.limits(known).items():
+        out[name] = value, tune.WHY[name]
+        known[name] = told.get(name, value)
+    out["offset_max"] = 0.03 * known["i_full_scale"], "3 % of the converter's range"
+    out.update((name, (value, tune.WHY[name])) for name, value in tune.values(known).items())
+    out.update((name, (value, "told")) for name, value in told.items())
+    return out
+
+
+def plain(value):
+    """Four digits, as YAML takes them for a number."""
+    if isinstance(value, (str, bool, list, dict)):
+        return yaml.safe_dump(value, default_flow_style=True).strip().removesuffix("...").strip()
+    text = f"{value:.5g}"
+    return text if "e" not in text or "." in text.split("e")[0] else text.replace("e", ".0e")
+
+
+def text_of(x):
+    """The whole machine file."""
+    board = complete(x)
+    chosen = {**board, "drive": drive(x, board)}
+    lines = [f"# {x['name']}: completed by tools/tune.py from what the motor's data are; `told` stood in the file.",
+             f"name: {plain(x['name'])}"]
+    for section in sorted(set(x) | set(chosen), key=lambda s: OTHERS.index(s) if s in OTHERS else len(OTHERS)):
+        if section == "name":
+            continue
+        if not isinstance(x.get(section, {}), dict):
+            lines += ["", f"{section}: {plain(x[section])}"]
+            continue
+        lines += ["", f"{section}:"]
+        entries = {key: (value, "told") for key, value in x.get(section, {}).items()}
+        entries.update(chosen.get(section, {}))
+        for key, (value, why) in entries.items():
+            try:
+                value = float(value)
+            except (TypeError, ValueError):
+                pass
+            lines.append(f"  {key + ': ' + plain(value):32} # {why}")
+    return "\n".join(lines) + "\n"
+
+
+def main():
+    description, _, rest = __doc__.partition("\n\n")
+    parser = argparse.ArgumentParser(description=description, epilog=rest, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("machine", help="file with the motor's values")
+    parser.add_argument("-o", "--out", help="file to be written; not there yet")
+    arguments = parser.parse_args()
+    try:
+        text = text_of(read(arguments.machine))
+        if arguments.out is None:
+            sys.stdout.write(text)
+            return 0
+        with open(arguments.out, "x", encoding="utf-8") as file:
+            file.write(text)
+    except UsageError as error:
+        print(f"tools/tune.py: {error}", file=sys.stderr)
+        return 2
+    except FileExistsError:
+        print(f"tools/tune.py: {arguments.out} is there already; nothing was written", file=sys.stderr)
+        return 2
+    print(f"{arguments.out}: run it with\n"
+          f"  pmsim run tests/unit/tune/start.yaml --set machine={arguments.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
