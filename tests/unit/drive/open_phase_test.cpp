@@ -46,7 +46,7 @@ struct Star {
     }
 };
 
-struct Run {
+struct Flow {
     double f_Hz, amplitude;
     double noise = 0, phase = 0.3;
     double share = 1, behind_deg = 0; // of what is wanted, what flows
@@ -54,7 +54,7 @@ struct Run {
 };
 
 // Milliseconds until it is found, of `most`; 0: not
-int look(const Star &star, const Run &run, int most = 2000)
+int look(const Star &star, const Flow &run, int most = 2000)
 {
     open_phase_t self;
     open_phase_reset(&self);
@@ -123,7 +123,7 @@ TEST(OpenPhase, CurrentThatFallsShortIsNotALegThatIsOff)
 {
     for (const double f : {0.5, -5.0, 25.0, -50.0, 250.0, 1000.0}) {
         for (const double share : {0.0, 0.0625, 0.25, 0.7}) {
-            Run run = {f, 0.5, 0.001};
+            Flow run = {f, 0.5, 0.001};
             run.share = share;
             run.behind_deg = std::abs(f) > 20 ? 85 : 28;
             EXPECT_EQ(look({}, run, 20000), 0) << f << ' ' << share;
@@ -136,7 +136,7 @@ TEST(OpenPhase, ARestlessReferenceIsNotALegThatIsOff)
 {
     for (const double lag_ms : {0.0, 1.6, 5.0}) {
         for (const double amplitude : {0.0, 0.1}) {
-            Run run = {2, amplitude, 0.001};
+            Flow run = {2, amplitude, 0.001};
             run.lag_ms = lag_ms;
             run.restless = 0.3;
             EXPECT_EQ(look({}, run, 100000), 0) << lag_ms << ' ' << amplitude;
