@@ -52,8 +52,9 @@ typedef struct {
 } open_loop_config_t;
 
 typedef struct {
-    drive_base_t base;
+    protection_config_t protection;
     modulator_config_t modulator;
+    drive_base_t base;
     regulator_config_t regulator;
     speed_control_config_t speed;
     mtpa_config_t mtpa;
@@ -61,7 +62,6 @@ typedef struct {
     position_config_t position;
     pulses_config_t pulses;
     open_loop_config_t open_loop;
-    protection_config_t protection;
     fault_short_config_t fault_short;
     pm_num_t pole_pairs;
     uint32_t slow_divider;   /* periods per drive_slow(): the nearest to 1 ms */

@@ -16,9 +16,9 @@ typedef enum {
     STAGE_VECTOR,    /* field-oriented control at the estimated angle */
 } drive_stage_t;
 
+/* In the order in which a period needs it: one instruction loads or stores two neighbours up to 1,020 bytes from the
+ * beginning, and one alone up to 4,095. */
 struct drive {
-    drive_config_t config;
-
     drive_fault_t fault; /* latched; while it is set, the stage is STAGE_OFF or STAGE_SHORT */
     drive_state_t state;
     drive_stage_t stage;
@@ -46,12 +46,13 @@ struct drive {
     pm_q_t omega_open;     /* its speed, which yields to a swinging rotor, */
     int32_t turn_open;     /* and the turn of a period at that speed */
 
-    /* behind what a period needs, so that this is within reach of one instruction */
     union {                    /* the stage says which: */
         pm_pll_t pll;          /* always, the first of both: angle and speed, zero below STAGE_OPEN_LOOP */
         position_t position;   /* from STAGE_OPEN_LOOP on */
         procedure_t procedure; /* in STAGE_PROCEDURE */
     };
+
+    drive_config_t config; /* begins with what a period needs, too */
 
     drive_status_t status;
     uint32_t completed; /* the last period with a current that followed from the others */

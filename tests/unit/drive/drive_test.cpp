@@ -198,8 +198,8 @@ TEST(Drive, WhatACarrierAsksOfThePeriodIsDone)
 // Behind them is the window of a sine carrier.
 TEST(Drive, StateIsSmall)
 {
-    // 44 bytes beyond in the image foc: configurations of the other sources; the budgets of a period hold
-    EXPECT_LE(offsetof(drive_t, position.injection) + sizeof(pulsating_square_t), 1020U + 52U);
+    EXPECT_LE(offsetof(drive_t, position.injection) + sizeof(pulsating_square_t), 1020U);
+    EXPECT_LE(offsetof(drive_t, config.modulator) + sizeof(modulator_config_t), 1020U + 100U);
     // 92 bytes of them say which regulator it is, what the machine is, whether the position slips, what a leg loses,
     // what the legs hold, and which of their currents are seen; 24 are the units of a command, instead of seven
     // divisions at 1 kHz, 24 what windings and bridge bear, 16 the short after a fault, and 8 the legs that do not conduct
