@@ -12,15 +12,25 @@ static pm_q_t square(pm_ab_t x)
     return pm_mul(x.alpha, x.alpha) + pm_mul(x.beta, x.beta);
 }
 
-/* One leg, where it has most of what is wanted; true when it has been missed for long. */
+static uint8_t less(uint8_t ms)
+{
+    return (uint8_t)(ms > SEEN ? ms - SEEN : 0U);
+}
+
+/* One leg; true when it has been missed for long. A leg that conducts does so at some time of the turn, also when the
+ * current is beside what is wanted. */
 static bool is_missed(uint8_t missed[2], pm_q_t half_asked, pm_q_t sixteenth, pm_q_t w, pm_q_t i)
 {
-    uint8_t *ms = &missed[w < 0 ? 1 : 0];
-    if (pm_mul(w, w) > half_asked) {
-        const uint32_t less = *ms > SEEN ? *ms - SEEN : 0U;
-        *ms = (uint8_t)(pm_mul(i, i) < sixteenth ? *ms + 1U : less);
+    const bool flows = pm_mul(i, i) >= sixteenth;
+    if (flows) {
+        uint8_t *seen = &missed[i < 0 ? 1 : 0];
+        *seen = less(*seen);
     }
-    return *ms > OPEN_PHASE_MS;
+    if (pm_mul(w, w) > half_asked) {
+        uint8_t *ms = &missed[w < 0 ? 1 : 0];
+        *ms = flows ? less(*ms) : (uint8_t)(*ms + 1U);
+    }
+    return missed[0] > OPEN_PHASE_MS || missed[1] > OPEN_PHASE_MS;
 }
 
 bool open_phase_slow(open_phase_t *self, pm_q_t least, pm_ab_t wanted, pm_ab_t i)

@@ -1,15 +1,17 @@
-/* A wire or a switch that does not conduct, by which legs the current flows through. Each millisecond, of each leg of
- * which more than 0.7 of the wanted current's amplitude is wanted, in either direction, the current must be more than a
- * quarter of the amplitude that flows: not in size, which the link may not have the voltage for, but in direction. Of a
- * leg that conducts, 45 degrees to either side of its axis, that fails beyond an error of the current's direction of 30
- * degrees. A leg with less is missed; 8 ms of it, each that is not taking 2 back, are open.
+/* A wire or a switch that does not conduct, by which legs the current flows through. Each millisecond, a leg in which
+ * more than 0.7 of the wanted current's amplitude is wanted, in either direction, must carry more than a quarter of the
+ * amplitude that flows: not in size, which the link may not have the voltage for, but in direction. Of a leg that
+ * conducts, 45 degrees to either side of its axis, that fails beyond an error of the current's direction of 30 degrees.
+ * A leg with less is missed; 12 ms of it in one direction are open. Each in which the leg carries that much in that
+ * direction takes 2 back, wanted or not, and so does each in which it is wanted there and carries anything.
  *
  * least: the square of i_rated / 64, of 8 i_noise, or of twice the zone in which dead time holds a current at zero
- * (modulator.h), whichever is more. Nothing is said where less flows, or less is wanted, or not half of
- * what flows: it is not of this control then. A wire is found within a quarter of an electrical turn and 8 ms, unless the
- * position is lost before, which is a fault too. A switch is found once its direction is wanted; later
- * where speed control goes round it: at light load and speed a leg that cannot drive current into the motor is asked to
- * take it.
+ * (modulator.h), whichever is more. Nothing is said where less flows, or less is wanted, or not half of what flows: it is
+ * not of this control then. With a wire off, A sin(delta) flows of A that is wanted delta beside the leg. So a wire is
+ * found within a quarter of an electrical turn and 0.1 s from four times the least on, and later below and where turns
+ * beat with 1 kHz, unless the position is lost before, which is a fault too. A switch is found once its direction is
+ * wanted; later where speed control goes round it: at light load and speed a leg that cannot drive current into the
+ * motor is asked to take it.
  * With two wires off nothing flows, of which nothing is said: the observer loses the position.
  *
  * open_phase_slow() at 1 kHz while current is controlled in a frame. No division. State 6 bytes.
@@ -25,7 +27,7 @@
 extern "C" {
 #endif
 
-#define OPEN_PHASE_MS 8U /* in which one has been missed */
+#define OPEN_PHASE_MS 12U /* in which one has been missed */
 
 typedef struct {
     uint8_t missed[3][2]; /* ms, of each leg: wanted into the motor and out of it */

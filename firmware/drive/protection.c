@@ -113,10 +113,12 @@ void protection_heat(drive_t *drive)
     }
 }
 
-/* References and measured currents of a frame, whichever it is. */
+/* References and measured currents of a frame, whichever it is. Not where a carrier leaves control less than half of its
+ * voltage, on a link that has sagged: then dead time has more of it than the direction of the current bears. */
 void protection_phases(drive_t *drive)
 {
-    if (drive->stage != STAGE_VECTOR && drive->stage != STAGE_OPEN_LOOP) {
+    const bool controlled = drive->stage == STAGE_VECTOR || drive->stage == STAGE_OPEN_LOOP;
+    if (!controlled || drive->v_share < drive->config.v_share / 2) {
         open_phase_reset(&drive->open_phase);
         return;
     }
