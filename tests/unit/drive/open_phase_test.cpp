@@ -158,6 +158,22 @@ TEST(OpenPhase, ARestlessReferenceIsNotALegThatIsOff)
     }
 }
 
+// A leg that conducts as it is wanted takes four milliseconds back: one of five is enough, one of eight is not.
+TEST(OpenPhase, ALegMayBeMissedInFourOfFiveMilliseconds)
+{
+    const pm_ab_t wanted = {fixed(0.5, 28), 0};
+    const pm_ab_t beside = {0, fixed(0.5, 28)};
+    for (const int of : {5, 8}) {
+        open_phase_t self;
+        open_phase_reset(&self);
+        bool open = false;
+        for (int ms = 0; ms < 1000 && !open; ++ms) {
+            open = open_phase_slow(&self, fixed(kLeast, 28), wanted, ms % of == 0 ? wanted : beside);
+        }
+        EXPECT_EQ(open, of == 8);
+    }
+}
+
 // Below what is judged: without current nothing is known of a leg.
 TEST(OpenPhase, NothingIsSaidOfNoCurrent)
 {
