@@ -22,6 +22,8 @@ ENVIRONMENTS = {
     "can": (("canopen==2.4.1", "python-can==4.6.1", "cantools==40.2.3", "eds-utils==0.3.1"), True),
     # independent readers of the pictures and measurement files of our host tool
     "recording": (("asammdf>=7,<9", "matplotlib>=3.5,<4", "plotext>=5.2,<6"), True),
+    # tools/campaign: columnar files and clusters
+    "campaign": (("pyarrow>=15,<22", "distributed>=2024.8,<2026", "matplotlib>=3.5,<4", "PyYAML>=6,<7"), False),
     # https://pypi.org/project/motulator: its models beside the plant, in tests/optional and tools/bench_motulator.py
     "motulator": (("motulator==0.5.0",), False),
 }

@@ -1,0 +1,1 @@
+"""Campaigns: many runs of pmsim with drawn machines. docs/campaigns.md is the manual."""
