@@ -2,7 +2,7 @@
 """Writes docs/results/injection.md: one set of scenarios over all low-speed position sources of injection/injections.def,
 with the settings that the file of each says under `compare`; a plot beside it.
 
-usage: injection_report.py [--machines N] [--only NAME...] [--out DIR] | --check
+usage: injection_report.py [--machines N] [--only NAME...] [--out DIR] [--scheduler ADDRESS] | --check
 """
 import argparse
 import csv
@@ -11,11 +11,13 @@ import random
 import re
 import subprocess
 import tempfile
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import observer_report as common
+from campaigns import worker
+from campaigns.draw import factors
+from campaigns.pool import Pool
 from observer_report import PMSIM, ROOT, degrees, fact, fail, methods, plt, table
 
 MACHINE = "IPM-1000"
@@ -83,7 +85,7 @@ def machines(count):
     draw = random.Random(7)
     cases = []
     for n in range(count):
-        wrong = {f"set_{key}": 1 / draw.uniform(0.9, 1.1) for key in ("R", "L_d", "L_q", "psi")}
+        wrong = {f"set_{key}": 1 / x for key, x in factors(draw, ("R", "L_d", "L_q", "psi"), 0.1).items()}
         turn = TURNS[n % 2]
         cases.append((f"machine {n}", {**wrong, "turn": turn, "load": 0.5 * turn}))
     drive = common.told(MACHINE) + ", L_dh_rated: 42.55e-3*$set_L_d, L_qh_rated: 57.32e-3*$set_L_q"
@@ -122,19 +124,18 @@ def settings(name):
     return dict(re.findall(r"(\w+): ([^,]+)", fact(file, "compare")))
 
 
-def carrier(n, chosen):
-    """(frequency, rms of the current) at standstill without load, from a trace of every period."""
+def submit_carrier(pool, n, chosen):
+    """A trace of every period at standstill without load."""
     study = standstill([("trace", {"load": 0})])
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "study.yaml"
-        path.write_text(study.text)
-        sets = [word for x in [f"injection={n}", *chosen] for word in ("--set", x)]
-        run = subprocess.run([PMSIM, "run", path, *sets, "--decimate", "1", "--out", folder], capture_output=True,
-                             text=True, check=False)
-        if run.returncode > 1:
-            fail(run.stderr or run.stdout)
-        with (Path(folder) / "trace.csv").open() as file:
-            rows = list(csv.DictReader(file))
+    return pool.submit(worker.run_file, str(PMSIM), worker.digest(PMSIM), study.text(), study.settings(n, chosen),
+                       ("--decimate", 1))
+
+
+def carrier(done):
+    """(frequency, rms of the current)."""
+    if done["code"] > 1:
+        fail(done["errors"])
+    rows = list(csv.DictReader(done["trace"].splitlines()))
     t, *rest = (np.array([float(row[key]) for row in rows])
                 for key in ("t_s", "v_alpha_V", "v_beta_V", "id_A", "iq_A"))
     last = t > t[-1] - CARRIER_S
@@ -198,24 +199,22 @@ def plot(results, path):
     plt.close(figure)
 
 
-def measure(rows, chosen, count):
+def measure(pool, rows, chosen, count):
     studies = {"standstill": standstill(), "slow": slow(), "step": load_step(), "ramp": load_ramp(),
                "reversal": reversal(), "machines": machines(count), "disturbed": disturbances()}
-    results = {}
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        jobs = {}
-        for n, (name, *_) in enumerate(rows):
-            if name in chosen:
-                own = [f"{key}={value}" for key, value in settings(name).items()]
-                jobs[name] = {key: pool.submit(study.run, n, own) for key, study in studies.items()}
-                jobs[name]["carrier"] = pool.submit(carrier, n, own)
-        for name, parts in jobs.items():
-            results[name] = {}
-            for key, job in parts.items():
-                results[name][key] = job.result()
-                if results[name][key] is None:
-                    fail(f"the drive refuses {name} for {MACHINE}")
-                print(f"{name}: {key}", flush=True)
+    results, jobs = {}, {}
+    for n, (name, *_) in enumerate(rows):
+        if name in chosen:
+            own = [f"{key}={value}" for key, value in settings(name).items()]
+            jobs[name] = {key: study.submit(pool, n, own) for key, study in studies.items()}
+            jobs[name]["carrier"] = submit_carrier(pool, n, own)
+    for name, parts in jobs.items():
+        results[name] = {}
+        for key, job in parts.items():
+            results[name][key] = carrier(job.result()) if key == "carrier" else studies[key].result(job)
+            if results[name][key] is None:
+                fail(f"the drive refuses {name} for {MACHINE}")
+            print(f"{name}: {key}", flush=True)
     return results
 
 
@@ -307,8 +306,7 @@ def page(rows, results, plot_name, values, bytes_of):
 def probe_page(names, path):
     """Half load at slow speed, forwards, every source."""
     common.check(path, [("free rotor under speed control", "50 %", f"`{name}`, forwards",
-                         lambda n=n, name=name: slow().run(n, [*(f"{key}={value}" for key, value in settings(name).items()),
-                                                               "case=0.5 1"]))
+                         slow(), (n, [f"{key}={value}" for key, value in settings(name).items()], "0.5 1"))
                         for n, name in enumerate(names)])
 
 
@@ -318,7 +316,7 @@ def main():
     parser.add_argument("--only", nargs="*")
     parser.add_argument("--out", type=Path, default=ROOT / "docs/results")
     parser.add_argument("--check", action="store_true", help="write nothing; fail when the page is not up to date")
-    options = parser.parse_args()
+    options = common.with_scheduler(parser)
     rows = methods(LIST)
     names = [row[0] for row in rows]
     chosen = options.only or names
@@ -330,7 +328,8 @@ def main():
     if options.machines < 1:
         fail("--machines is 1 or more")
     options.out.mkdir(parents=True, exist_ok=True)
-    results = measure(rows, chosen, options.machines)
+    with Pool(options.scheduler) as pool:
+        results = measure(pool, rows, chosen, options.machines)
     plot_name = f"injection_{MACHINE.lower()}.png"
     plot(results, options.out / plot_name)
     (options.out / "injection.md").write_text(page(rows, results, plot_name, defaults(), sizes(names)))

@@ -2,26 +2,29 @@
 """Writes docs/results/observers.md: one set of scenarios over all observers of observers/observers.def, 100 machines
 each, what they cost and what they need to know; plots beside it.
 
-usage: observer_report.py [--machines N] [--only NAME...] [--out DIR] | --check
+usage: observer_report.py [--machines N] [--only NAME...] [--out DIR] [--scheduler ADDRESS] | --check
 --check writes nothing: it measures a few cells of the page again, and fails when they are not what stands there.
 """
 import argparse
 import csv
 import json
 import math
-import os
 import random
 import re
 import subprocess
 import sys
 import tempfile
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
+
+import python_environment  # noqa: E402
+from campaigns import worker  # noqa: E402
+from campaigns.draw import factors  # noqa: E402
+from campaigns.pool import Pool  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
 PMSIM = ROOT / "out/build/host-release/tools/pmsim/pmsim"
@@ -33,6 +36,7 @@ SPEEDS = [0.05, 0.1, 0.2, 0.5, 1.0]
 LOADS = [0, 0.5, 1]
 USABLE_DEG = 10  # an observer is usable where its largest error at three loads stays below
 
+TOGETHER = 16  # cases that are run one after the other
 SEEN = "fault", "angle_error_mean_deg", "angle_error_rms_deg", "angle_error_max_deg"
 
 
@@ -70,45 +74,42 @@ class Study:
     def __init__(self, machine, profile, cases, start_s, end_s, drive="", sections=""):
         self.names = [name for name, _ in cases]
         keys = cases[0][1].keys()
-        lines = [f"title: comparison\nmachine: {ROOT}/sim_plant/machines/{MACHINES[machine]}"]
-        lines += [sections] if sections else []
-        lines += [f"drive: {{{self.parameter}: 0, {drive}{START[machine]}}}", f"duration_s: {end_s}",
-                  f"start: {{theta_e_deg: {self.theta_e_deg}}}", "cases:"]
-        for name, values in cases:
-            lines.append(f"  - {{name: {json.dumps(name)}, " + ", ".join(f"{k}: {values[k]:.7g}" for k in keys) + "}")
-        lines += ["profile:", profile, "expect:", "  - {metric: fault, equals: NONE, book: \"2.3.3\"}"]
+        self.head = [f"title: comparison\nmachine: {ROOT}/sim_plant/machines/{MACHINES[machine]}"]
+        self.head += [sections] if sections else []
+        self.head += [f"drive: {{{self.parameter}: 0, {drive}{START[machine]}}}", f"duration_s: {end_s}",
+                      f"start: {{theta_e_deg: {self.theta_e_deg}}}", "cases:"]
+        self.cases = [f"  - {{name: {json.dumps(name)}, " + ", ".join(f"{k}: {values[k]:.7g}" for k in keys) + "}"
+                      for name, values in cases]
+        self.tail = ["profile:", profile, "expect:", "  - {metric: fault, equals: NONE, book: \"2.3.3\"}"]
         for metric in SEEN[1:]:
-            lines.append(f"  - {{metric: {metric}, window_s: [{start_s}, {end_s}], max: 1000, book: \"2.3.3\"}}")
-        self.text = "\n".join(lines) + "\n"
+            self.tail.append(f"  - {{metric: {metric}, window_s: [{start_s}, {end_s}], max: 1000, book: \"2.3.3\"}}")
 
-    @staticmethod
-    def rows(folder):
-        """What runs.csv says of several runs, of a single one too."""
-        if (folder / "runs.csv").exists():
-            return list(csv.reader((folder / "runs.csv").open()))
-        one = json.loads((folder / "result.json").read_text())["expectations"]
-        return [[item["name"] for item in one], [item["value"] for item in one]]
+    def text(self, cases=None):
+        return "\n".join([*self.head, *(cases or self.cases), *self.tail]) + "\n"
 
-    def run(self, method, settings=()):
-        """Per case (lost, mean, rms, largest), or None where the drive refuses the method. settings: name=value."""
-        chosen = [word for setting in (f"{self.parameter}={method}", *settings) for word in ("--set", setting)]
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "study.yaml"
-            path.write_text(self.text)
-            run = subprocess.run([PMSIM, "run", path, *chosen, "--out", folder],
-                                 capture_output=True, text=True, check=False)
-            if f"refuses parameter {self.parameter}" in run.stderr:
+    def settings(self, method, others):
+        return [f"{self.parameter}={method}", *others]
+
+    def submit(self, pool, method, settings=(), only=None):
+        """Begins to run it, or one case of it, by its name. settings: name=value."""
+        cases = self.cases if only is None else [self.cases[self.names.index(only)]]
+        return [pool.submit(worker.run_file, str(PMSIM), worker.digest(PMSIM), self.text(cases[k:k + TOGETHER]),
+                            self.settings(method, settings)) for k in range(0, len(cases), TOGETHER)]
+
+    def result(self, jobs):
+        """Of what was begun, per case (lost, mean, rms, largest), or None where the drive refuses the method."""
+        found = []
+        for done in [job.result() for job in jobs]:
+            if f"refuses parameter {self.parameter}" in done["errors"]:
                 return None
-            if run.returncode > 1:
-                fail(run.stderr or run.stdout)
-            rows = self.rows(Path(folder))
-        columns = [next(k for k, name in enumerate(rows[0]) if name.startswith(metric)) for metric in SEEN]
-        result = []
-        for row in rows[1:]:
-            mean, rms, largest = (float(row[k]) for k in columns[1:])
-            lost = row[columns[0]] != "NONE" or not largest < 60
-            result.append((lost, mean, rms, largest))
-        return result
+            if done["code"] > 1:
+                fail(done["errors"])
+            head, *rows = done["rows"]
+            columns = [next(k for k, name in enumerate(head) if name.startswith(metric)) for metric in SEEN]
+            for row in rows:
+                mean, rms, largest = (float(row[k]) for k in columns[1:])
+                found.append((row[columns[0]] != "NONE" or not largest < 60, mean, rms, largest))
+        return found
 
 
 def cells(path, heading, column):
@@ -131,12 +132,14 @@ def differs(shown, result):
 
 
 def check(path, probes):
-    """probes: (heading, column, first cell, () -> result). Fails with all cells that are not what is measured now."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        jobs = [(probe, pool.submit(probe[3])) for probe in probes]
+    """probes: (heading, column, first cell, study, what to submit of it). Fails with all cells that are not what is
+    measured now."""
+    with Pool() as pool:
+        jobs = [(probe, probe[3].submit(pool, *probe[4])) for probe in probes]
+        found = [(probe, probe[3].result(job)[0]) for probe, job in jobs]
     stale = []
-    for (heading, column, first, _), job in jobs:
-        shown, result = cells(path, heading, column).get(first, "nothing"), job.result()[0]
+    for (heading, column, first, *_), result in found:
+        shown = cells(path, heading, column).get(first, "nothing")
         if shown == "nothing" or differs(shown, result):
             now = ", ".join(degrees(x) for x in result[1:])
             stale.append(f"{path.relative_to(ROOT)}: {first}, {column}: {shown}; now {'lost' if result[0] else now}")
@@ -241,9 +244,9 @@ def monte_carlo(machine, count, control, alike=False):
     cases = []
     L_d, L_q = {"IPM-1000": (43e-3, 70.835e-3), "SPM-400": (3.0e-3, 3.2966e-3)}[machine]
     for n in range(count):
-        any20 = {key: draw.uniform(0.8, 1.2) for key in ("R", "L_d", "L_q", "psi", "dead")}
+        any20 = factors(draw, ("R", "L_d", "L_q", "psi", "dead"), 0.2)
         while L_q / any20["L_q"] < L_d / any20["L_d"]:
-            any20 |= {key: draw.uniform(0.8, 1.2) for key in ("L_d", "L_q")}
+            any20 |= factors(draw, ("L_d", "L_q"), 0.2)
         if alike:
             any20["L_d"] = any20["L_q"]
         channel = {f"g{x}": draw.uniform(-0.01, 0.01) for x in "abc"} | {f"o{x}": draw.uniform(-0.02, 0.02) for x in "abc"}
@@ -319,20 +322,21 @@ def plot(machine, results, path):
     plt.close(figure)
 
 
-def measure(machine, chosen, ids, count):
+def measure(pool, machine, chosen, ids, count):
     studies = {"steady": steady(machine), "load": dynamics(machine, "load"),
                "reversal": dynamics(machine, "reversal"), "errors": errors(machine),
                "harmonics": harmonics(machine)}
-    results = {}
+    results, jobs = {}, {}
     one_inductance = [name for name, words in observers() if "(round machines)" in words]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for name in chosen:
-            own = studies | {"machines": monte_carlo(machine, count, 4, name in one_inductance),
-                             "quick": monte_carlo(machine, count, 5, name in one_inductance)}
-            got = dict(zip(own, pool.map(lambda study, n=ids[name]: study.run(n), own.values())))
-            if None not in got.values():  # the drive accepts it for this machine
-                results[name] = got
-                print(f"{machine}: {name}", flush=True)
+    for name in chosen:
+        own = studies | {"machines": monte_carlo(machine, count, 4, name in one_inductance),
+                         "quick": monte_carlo(machine, count, 5, name in one_inductance)}
+        jobs[name] = [(key, study, study.submit(pool, ids[name])) for key, study in own.items()]
+    for name in chosen:
+        got = {key: study.result(job) for key, study, job in jobs[name]}
+        if None not in got.values():  # the drive accepts it for this machine
+            results[name] = got
+            print(f"{machine}: {name}", flush=True)
     return results, studies["errors"].names
 
 
@@ -406,9 +410,17 @@ def probe_page(ids, path):
         heading = f"## {machine}"
         for first in cells(path, heading, "50 %"):
             number = ids.get(first.strip("`"), 0)
-            probes.append((heading, "50 %", first,
-                           lambda study=steady(machine), number=number: study.run(number, ["case=0.5 1"])))
+            probes.append((heading, "50 %", first, steady(machine), (number, (), "0.5 1")))
     check(path, probes)
+
+
+def with_scheduler(parser):
+    """The options, with that of a cluster, which asks for an environment with Dask."""
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster; default: all cores of this machine")
+    options = parser.parse_args()
+    if options.scheduler:
+        python_environment.enter("campaign", ROOT / "out/python-campaign")
+    return options
 
 
 def main():
@@ -417,7 +429,7 @@ def main():
     parser.add_argument("--only", nargs="*")
     parser.add_argument("--out", type=Path, default=ROOT / "docs/results")
     parser.add_argument("--check", action="store_true", help="write nothing; fail when the page is not up to date")
-    options = parser.parse_args()
+    options = with_scheduler(parser)
     found = observers()
     ids = {name: n for n, (name, _) in enumerate(found)}
     if options.check:
@@ -428,7 +440,8 @@ def main():
     options.out.mkdir(parents=True, exist_ok=True)
     all_results, plots, names = {}, {}, []
     for machine in MACHINES:
-        all_results[machine], names = measure(machine, chosen, ids, options.machines)
+        with Pool(options.scheduler) as pool:
+            all_results[machine], names = measure(pool, machine, chosen, ids, options.machines)
         plots[machine] = f"observers_{machine.lower()}.png"
         plot(machine, all_results[machine], options.out / plots[machine])
     help_of = {name: words for name, words in found if name in chosen}

@@ -73,7 +73,7 @@ def run(options):
     if options.fresh:
         results.clear()
     folder.mkdir(parents=True, exist_ok=True)
-    execute.interrupt_on_terminate()
+    execute.stop_on_signals()
     try:
         with Pool(options.scheduler, options.jobs) as pool:
             rows, timing = execute.execute(

@@ -39,6 +39,11 @@ def normal(random_, mean, deviation):
     return random_.gauss(mean, deviation)
 
 
+def factors(random_, names, spread):
+    """A factor for each of what is told wrong, up to `spread` either way."""
+    return {name: uniform(random_, 1 - spread, 1 + spread) for name in names}
+
+
 def number_or_word(text):
     """Of one_of: what is no number is a word."""
     if text in ("true", "false"):

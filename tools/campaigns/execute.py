@@ -74,13 +74,14 @@ def checked(campaign, run, result):
     return {"error": reason}
 
 
-def interrupt_on_terminate():
-    """SIGTERM as Ctrl-C: what is done is kept anyway."""
+def stop_on_signals():
+    """SIGTERM as Ctrl-C, which a shell's background processes do not hear."""
 
     def stop(*_):
         raise KeyboardInterrupt
 
-    signal.signal(signal.SIGTERM, stop)
+    for one in signal.SIGINT, signal.SIGTERM:
+        signal.signal(one, stop)
 
 
 def execute(campaign, results, program, pool, count, chunk=None, progress=True):
@@ -96,7 +97,7 @@ def execute(campaign, results, program, pool, count, chunk=None, progress=True):
     def task(runs):
         """Refused ones need no pmsim."""
         jobs = [run.job() for run in runs if not run.refusal]
-        return worker.run_chunk, str(program), digest, campaign.scenario_path.name, campaign.scenario, jobs
+        return worker.run_chunk, str(program), digest, campaign.scenario_path.name, campaign.texts["scenario"], jobs
 
     start, busy_s = time.monotonic(), 0.0
     waiting = {}

@@ -3,7 +3,7 @@
 import math
 import re
 
-from .plan import OK, OTHER, REFUSED
+from .reader import OK, OTHER, REFUSED
 
 REFUSES = "refuses"  # what the drive says of parameters that it does not run with
 CONFIDENCE = 0.95

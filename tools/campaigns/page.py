@@ -8,7 +8,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 
-from .plan import OK, REFUSED  # noqa: E402
+from .reader import OK, REFUSED  # noqa: E402
 from .store import DRAWN  # noqa: E402
 from .summary import classes_of, counted, percent  # noqa: E402
 

@@ -7,26 +7,10 @@ from pathlib import Path
 import yaml
 
 import tune
-from dictionary.source import SourceError, load
+from dictionary.source import SourceError
 
-from .draw import Source, stream
-
-KEYS = {
-    "title",
-    "scenario",
-    "runs",
-    "seed",
-    "base",
-    "groups",
-    "draw",
-    "machine",
-    "told",
-    "variables",
-    "classes",
-    "bounds",
-    "shown",
-}
-OK, REFUSED, OTHER = "ok", "refused", "other"
+from .draw import stream
+from .reader import FILES, CampaignFile
 
 
 @dataclass
@@ -41,23 +25,6 @@ class Run:
 
     def job(self):
         return {"machine": self.machine, "settings": self.settings}
-
-
-@dataclass
-class Rule:
-    """The first rule of which an expectation fails gives the class of a run."""
-
-    name: str
-    fails: list
-
-
-@dataclass
-class Bound:
-    """On the share of a class."""
-
-    name: str
-    least: float
-    most: float
 
 
 def number_text(value):
@@ -104,133 +71,21 @@ def laid_over(machine, sections):
     return result
 
 
-class Campaign:
-    """What a file says; its text and that of its scenario are kept with the results."""
-
-    def __init__(self, path, files=None):
-        """files: key -> path of what the file names, in place of what it says."""
-        self.path, self.files = Path(path), files or {}
-        table = load(self.path)
-        table.only(KEYS)
-        self.text = self.path.read_text(encoding="utf-8")
-        self.title = table.text("title")
-        self.count, self.seed = table.integer("runs"), table.integer("seed", 1)
-        if self.count < 1:
-            raise table.error("`runs` is 1 or more", "runs")
-        self.scenario_path = self._file(table, "scenario")
-        self.scenario = self.scenario_path.read_text(encoding="utf-8")
-        self.base = self._base(table) if "base" in table.nodes else None
-        self.machine, self.machine_place = self._sections(table, "machine"), table.at("machine")
-        self.told = self._sections(table, "told")
-        if self.base is not None and self.told:
-            raise table.error(
-                "`told` is what tools/tune.py is told; with `base`, whose `drive` is complete, use `machine: drive:`",
-                "told",
-            )
-        if self.base is None and not self.machine:
-            raise table.error(
-                "`machine`, for tools/tune.py to complete, or `base`, a complete machine file, is missing"
-            )
-        self.draw = self._values(table, "draw")
-        self.groups = {"": {}}
-        if "groups" in table.nodes:
-            groups = table.table("groups")
-            self.groups = {name: self._values(groups, name) for name in groups.nodes}
-            if not self.groups:
-                raise table.error("`groups` is empty", "groups")
-        self.variables = self._values(table, "variables")
-        self.rules = (
-            [self._rule(entry) for entry in table.tables("classes", "a class")] if "classes" in table.nodes else []
-        )
-        self.bounds = (
-            [self._bound(entry) for entry in table.tables("bounds", "a bound")] if "bounds" in table.nodes else []
-        )
-        self.shown = table.texts("shown") if "shown" in table.nodes else []
-        self._check_names(table)
+class Campaign(CampaignFile):
+    """A file, and its runs."""
 
     @classmethod
     def stored(cls, what):
         """As it was when the results were made, of their record (store.record)."""
         with tempfile.TemporaryDirectory() as folder:
-            files = {"scenario": Path(folder) / what["scenario_file"], "base": Path(folder) / "base.yaml"}
-            path = Path(folder) / Path(what["campaign_file"]).name
-            for file, text in (
-                (path, what["campaign"]),
-                (files["scenario"], what["scenario"]),
-                (files["base"], what["base"]),
-            ):
-                file.write_text(text, encoding="utf-8")
+            path = Path(folder) / what["campaign_file"]
+            path.write_text(what["campaign"], encoding="utf-8")
+            files = {}
+            for key in FILES:
+                if key in what:
+                    files[key] = Path(folder) / (what["scenario_file"] if key == "scenario" else f"{key}.yaml")
+                    files[key].write_text(what[key], encoding="utf-8")
             return cls(path, files)
-
-    def _file(self, table, key):
-        path = self.files.get(key) or self.path.parent / table.text(key)
-        if not path.is_file():
-            raise table.error(f"there is no file {path}", key)
-        return path
-
-    def _base(self, table):
-        path = self._file(table, "base")
-        try:
-            base = yaml.safe_load(path.read_text(encoding="utf-8"))
-        except yaml.YAMLError as error:
-            raise table.error(f"{path}: {' '.join(str(error).split())}", "base") from None
-        if not isinstance(base, dict) or "flux_map" in base:
-            raise table.error(f"{path} is no machine file with `electrical`", "base")
-        return base
-
-    @staticmethod
-    def _values(table, key):
-        if key not in table.nodes:
-            return {}
-        inner = table.table(key)
-        return {name: Source(table.place.file, node) for name, node in inner.nodes.items()}
-
-    def _sections(self, table, key):
-        if key not in table.nodes:
-            return {}
-        inner = table.table(key)
-        return {name: self._values(inner, name) for name in inner.nodes}
-
-    @staticmethod
-    def _rule(entry):
-        entry.only({"class", "fails"})
-        name = entry.text("class")
-        if name in (OK, REFUSED, OTHER):
-            raise entry.error(f"`{name}` is the class of runs to which no rule applies", "class")
-        return Rule(name, entry.texts("fails"))
-
-    def _bound(self, entry):
-        entry.only({"class", "min", "max"})
-        name, limits = entry.text("class"), []
-        if name not in {OK, REFUSED, OTHER, *(rule.name for rule in self.rules)}:
-            raise entry.error(f"there is no class `{name}`", "class")
-        for key, default in (("min", "0"), ("max", "1")):
-            try:
-                limits.append(float(entry.text(key, default)))
-            except ValueError:
-                raise entry.error(f"`{key}` is a share, 0 to 1", key) from None
-        if not 0 <= limits[0] <= limits[1] <= 1:
-            raise entry.error("shares are 0 to 1, `min` not above `max`")
-        return Bound(name, *limits)
-
-    def _check_names(self, table):
-        """That rules speak of expectations that the scenario has, under names that are there once."""
-        scenario = load(self.scenario_path)
-        self.expectations = []
-        for entry in scenario.tables("expect", "an expectation") if "expect" in scenario.nodes else []:
-            name = entry.text("name", entry.text("metric"))
-            if name in self.expectations:
-                raise entry.error(f"`{name}` stands twice; a campaign needs a `name` of its own for each")
-            self.expectations.append(name)
-        for index, rule in enumerate(self.rules):
-            for name in rule.fails:
-                if name not in self.expectations:
-                    place = table.tables("classes", "a class")[index]
-                    raise place.error(
-                        f"{self.scenario_path} has no expectation named `{name}`; it has: "
-                        f"{', '.join(self.expectations)}",
-                        "fails",
-                    )
 
     def group_of(self, number):
         names = list(self.groups)
@@ -294,7 +149,7 @@ class Campaign:
         for section, entries in self.machine.items():
             if f"{section}." in reason and entries:
                 return next(iter(entries.values())).place
-        return self.machine_place
+        return self._with("machine").at("machine")
 
     def _evaluated(self, sections, names, number):
         return {

@@ -25,6 +25,7 @@ FIXED = {
     "settings": pa.string(),
     "error": pa.string(),
 }
+NAMES = "campaign_file", "scenario_file"
 DRAWN, PASSED = "drawn.", "pass."
 
 
@@ -73,17 +74,15 @@ def record(campaign, program_digest):
     """What results are made of; others are not mixed with them."""
     return {
         "format": FORMAT,
-        "campaign": campaign.text,
-        "campaign_file": str(campaign.path),
-        "scenario": campaign.scenario,
+        "campaign_file": campaign.path.name,
         "scenario_file": campaign.scenario_path.name,
         "pmsim": program_digest,
-        "base": json.dumps(campaign.base, sort_keys=True) if campaign.base else "",
+        **campaign.texts,
     }
 
 
 def identity(what):
-    kept = {key: value for key, value in what.items() if key != "campaign_file"}
+    kept = {key: value for key, value in what.items() if key not in NAMES}
     return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()
 
 
@@ -115,7 +114,7 @@ class Store:
         if self.what is None:
             self.what = what
         elif identity(what) != identity(self.what):
-            changed = [key for key in self.what if key != "campaign_file" and what.get(key) != self.what[key]]
+            changed = [key for key in self.what if key not in NAMES and what.get(key) != self.what[key]]
             raise StoreError(
                 f"{path}: made with another {' and '.join(changed)}; take another folder (--out), or drop what is "
                 "there (--fresh)"

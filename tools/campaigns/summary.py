@@ -3,7 +3,7 @@
 from collections import Counter, defaultdict
 
 from .judge import CONFIDENCE, interval
-from .plan import OK, OTHER, REFUSED
+from .reader import OK, OTHER, REFUSED
 from .store import DRAWN
 
 NUMBERS_SHOWN = 8

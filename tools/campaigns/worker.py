@@ -1,6 +1,7 @@
 """Runs pmsim. Of the standard library alone, since it is also sent to workers that have nothing of this project but
 pmsim."""
 
+import csv
 import hashlib
 import json
 import os
@@ -84,3 +85,24 @@ def run_chunk(program, wanted, name, scenario, jobs):
         path.write_text(scenario, encoding="utf-8")
         results = [run_one(program, folder, path, job) for job in jobs]
     return results, time.monotonic() - start
+
+
+def run_file(program, wanted, scenario, settings=(), words=()):
+    """{"code", "errors", "rows", "trace"} of a scenario, which may have cases: a row a run, below one that says what the
+    columns are; the trace as text, if words ask for one. scenario: text."""
+    check_program(program, wanted)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        path, table = folder / "study.yaml", folder / "runs.csv"
+        path.write_text(scenario, encoding="utf-8")
+        code, out, errors = pmsim(program, path, settings, "--jobs", 1, "--out", folder, *words)
+        if code > 1:
+            return {"code": code, "errors": errors or out}
+        if table.exists():
+            with table.open(encoding="utf-8") as file:
+                rows = list(csv.reader(file))
+        else:
+            one = json.loads((folder / "result.json").read_text(encoding="utf-8"))["expectations"]
+            rows = [[item["name"] for item in one], [item["value"] for item in one]]
+        trace = (folder / "trace.csv").read_text(encoding="utf-8") if words else ""
+        return {"code": code, "errors": errors, "rows": rows, "trace": trace}

@@ -34,6 +34,11 @@ std::vector<WindowedMetric> make_metrics(const Scenario &scenario)
     return metrics;
 }
 
+uint64_t periods_until(double t_s, double period_s, uint64_t most)
+{
+    return t_s < double(most) * period_s ? static_cast<uint64_t>(std::ceil(t_s / period_s)) + 1 : most;
+}
+
 } // namespace
 
 RunResult run_scenario(const Scenario &scenario, const Observer &observer, std::atomic<uint64_t> *progress)
@@ -43,8 +48,14 @@ RunResult run_scenario(const Scenario &scenario, const Observer &observer, std::
     const uint64_t count = period_count(scenario);
     const double period_s = 1.0 / scenario.setup.plant.inverter.f_pwm_Hz;
     const uint64_t report = 1000;
-    for (uint64_t k = 0; k < count; ++k) {
+    uint64_t end = count;
+    bool faulty = false;
+    for (uint64_t k = 0; k < end; ++k) {
         const Sample &sample = loop.step();
+        if (sample.rig.fault != 0 && !faulty) {
+            faulty = true;
+            end = periods_until(double(k) * period_s + scenario.after_fault_s, period_s, count);
+        }
         for (WindowedMetric &windowed : metrics) {
             if (k >= windowed.first && k <= windowed.last) {
                 windowed.metric->add(sample);
@@ -59,7 +70,7 @@ RunResult run_scenario(const Scenario &scenario, const Observer &observer, std::
         }
     }
     RunResult result;
-    result.simulated_s = double(count) * period_s;
+    result.simulated_s = double(end) * period_s;
     for (size_t i = 0; i < metrics.size(); ++i) {
         result.outcomes.push_back(judge(scenario.expect[i], metrics[i].metric->value()));
     }

@@ -78,6 +78,8 @@ struct Scenario {
     uint64_t seed = 1;
     double theta_e_rad = 0.0; // rotor at the start
     double duration_s = 0.0;
+    double after_fault_s =
+        std::numeric_limits<double>::infinity(); // the run ends so long after the first fault
     std::vector<Event> profile;
     std::vector<Expectation> expect;
 };

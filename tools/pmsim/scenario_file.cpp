@@ -16,8 +16,8 @@ const char seed_key[] = "seed";
 std::vector<std::string> scenario_keys()
 {
     std::vector<std::string> keys = setup_sections();
-    for (const char *key :
-         {"title", "machine", "seed", "start", "duration_s", "profile", "expect", "sweep", "cases"}) {
+    for (const char *key : {"title", "machine", "seed", "start", "duration_s", "after_fault_s", "profile",
+                            "expect", "sweep", "cases"}) {
         keys.emplace_back(key);
     }
     return keys;
@@ -157,6 +157,9 @@ Scenario ScenarioFile::scenario(const Run &run) const
     map.at("duration_s");
     scenario.duration_s =
         value_of("duration_s")->number(1e-3, max_periods / scenario.setup.plant.inverter.f_pwm_Hz);
+    if (const auto after = map.find("after_fault_s")) {
+        scenario.after_fault_s = after->number(0.0, scenario.duration_s);
+    }
     for (const Value &item : map.at("profile").list()) {
         scenario.profile.push_back(read_event(item, scenario.setup));
     }

@@ -184,6 +184,34 @@ TEST(Runner, WindowIsThatOfTheExpectation)
     EXPECT_DOUBLE_EQ(result.simulated_s, 0.2);
 }
 
+// The rest of a run that is lost is not simulated; a window that it would have been has no sample, which fails.
+TEST(Runner, EndsAfterTheFirstFaultWhereTheScenarioSaysSo)
+{
+    const std::string text = "title: fault\n"
+                             "machine: sim_plant/machines/ipm_1000.yaml\n"
+                             "start: {theta_e_deg: 0}\n"
+                             "duration_s: 0.3\n"
+                             "after_fault_s: 0.02\n"
+                             "profile:\n"
+                             "  - {t_s: 0, mode: speed, enable: true}\n"
+                             "  - {t_s: $t, hw_fault: true}\n"
+                             "sweep: {t: [0.1]}\n"
+                             "expect:\n"
+                             "  - {metric: fault_delay_s, max: 1, book: x}\n"
+                             "  - {metric: speed_mean_rel, window_s: [0.2, 0.3], max: 1, book: x}\n";
+    const RunResult result = run_scenario(load(text));
+    EXPECT_NEAR(result.outcomes[0].value.number, 0.1, 2e-4);
+    EXPECT_NEAR(result.simulated_s, 0.12, 4e-4);
+    EXPECT_FALSE(result.outcomes[1].pass);
+    const RunResult whole = run_scenario(load(replaced(text, "after_fault_s: 0.02\n", "")));
+    EXPECT_NEAR(whole.simulated_s, 0.3, 1e-9);
+    EXPECT_TRUE(whole.outcomes[1].pass);
+    const RunResult healthy = run_scenario(load(replaced(text, "[0.1]", "[5]")));
+    EXPECT_NEAR(healthy.simulated_s, 0.3, 1e-9);
+    EXPECT_THAT(error_of([&] { load(replaced(text, "after_fault_s: 0.02", "after_fault_s: -1")); }),
+                HasSubstr("s.yaml:5"));
+}
+
 // In thousands of periods, each of 100 us.
 TEST(Runner, ProgressIsSimulatedTime)
 {
