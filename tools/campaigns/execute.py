@@ -99,7 +99,7 @@ def execute(campaign, results, program, pool, count, chunk=None, progress=True):
         jobs = [run.job() for run in runs if not run.refusal]
         return worker.run_chunk, str(program), digest, campaign.scenario_path.name, campaign.texts["scenario"], jobs
 
-    start, busy_s = time.monotonic(), 0.0
+    start = time.monotonic()
     waiting = {}
 
     def tasks():
@@ -108,26 +108,23 @@ def execute(campaign, results, program, pool, count, chunk=None, progress=True):
             waiting[id(made)] = runs
             yield made
 
-    for made, (found, seconds) in pool.each(tasks()):
+    for made, found in pool.each(tasks()):
         runs, found = waiting.pop(id(made)), iter(found)
         new = []
         for run in runs:
             result = {"error": run.refusal} if run.refusal else checked(campaign, run, next(found))
             kind, cause = (judge.REFUSED, judge.words(run.refusal)) if run.refusal else judge.class_of(campaign, result)
             new.append(store.row(run, kind, cause, result))
-        busy_s += seconds
         results.add(new)
         rows.update((one["run"], one) for one in new)
         if shown:
             shown.add(new)
     everything = [rows[number] for number in sorted(rows)]
     results.finish(everything)
-    wall_s, simulated_s = time.monotonic() - start, sum(
-        rows[number]["simulated_s"] for number in rows if number not in done
-    )
+    wall_s, new = time.monotonic() - start, [row for number, row in rows.items() if number not in done]
     return everything, {
         "wall_s": wall_s,
         "cores": pool.cores,
-        "simulated_per_wall_s": simulated_s / wall_s,
-        "at_work": busy_s / (wall_s * pool.cores),
+        "simulated_per_wall_s": sum(row["simulated_s"] for row in new) / wall_s,
+        "at_work": sum(row["wall_s"] for row in new) / (wall_s * pool.cores),  # pmsim's own seconds
     }

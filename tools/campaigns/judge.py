@@ -15,7 +15,7 @@ def refused(error):
 
 def words(error):
     """An error without the paths and numbers of this run."""
-    text = re.sub(r"^.*\.yaml:\d+(:\d+)?: |^pmsim: ", "", error.splitlines()[0])
+    text = re.sub(r"^.*\.yaml:\d+(:\d+)?: |^pmsim: |^.*(?=drive refuses)", "", error.splitlines()[0])
     return re.sub(r"-?\d+(\.\d+)?(e-?\d+)?", "#", text)
 
 

@@ -96,19 +96,19 @@ def draw_separating(axis, name, good, bad):
         )
     if every.min() > 0 and every.max() / every.min() > LOG_SPAN:
         axis.set_xscale("log")
-    axis.set(title=name.removeprefix(DRAWN), ylim=(0, 100), ylabel="% of the runs below")
+    axis.set(title=f"{name.removeprefix(DRAWN)}, as drawn", ylim=(0, 100), ylabel="% of the runs below")
     axis.grid(True, alpha=0.3, which="both")
     axis.legend(fontsize=8, frameon=False)
 
 
-def draw_shown(axis, name, rows):
+def draw_shown(axis, name, metric, rows):
     """Share of the good runs below a value."""
     values = np.sort([row[name] for row in rows if row["class"] == OK and isinstance(row.get(name), (int, float))])
     if len(values):
         axis.step(values, 100 * np.arange(1, len(values) + 1) / len(values), where="post", color=GOOD, lw=1.8)
         if values[0] > 0 and values[-1] / values[0] > LOG_SPAN:
             axis.set_xscale("log")
-    axis.set(title=f"{name}, runs that are ok", ylim=(0, 100), ylabel="% of the runs below")
+    axis.set(title=f"{name}, runs that are ok", xlabel=metric, ylim=(0, 100), ylabel="% of the runs below")
     axis.grid(True, alpha=0.3, which="both")
 
 
@@ -128,7 +128,7 @@ def draw(campaign, rows, path):
     for place, part in zip(places, differ):
         draw_separating(figure.add_subplot(grid[place]), *part)
     for place, name in zip(places[len(differ) :], campaign.shown):
-        draw_shown(figure.add_subplot(grid[place]), name, rows)
+        draw_shown(figure.add_subplot(grid[place]), name, campaign.expectations[name], rows)
     figure.suptitle(f"{campaign.title}: {len(rows)} runs", fontsize=13)
     figure.savefig(path, dpi=110, metadata={"Software": None})
     plt.close(figure)

@@ -1,4 +1,5 @@
 """Reads a campaign file. What is wrong with it is said with file and line."""
+
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -148,12 +149,12 @@ class CampaignFile:
     def _check_names(self):
         """That rules speak of expectations that the scenario has, under names that are there once."""
         scenario = load(self.scenario_path)
-        self.expectations = []
+        self.expectations = {}  # name -> metric
         for entry in scenario.tables("expect", "an expectation") if "expect" in scenario.nodes else []:
             name = entry.text("name", entry.text("metric"))
             if name in self.expectations:
                 raise entry.error(f"`{name}` stands twice; a campaign needs a `name` of its own for each")
-            self.expectations.append(name)
+            self.expectations[name] = entry.text("metric")
         there = f"{self.scenario_path} has no expectation named `%s`; it has: {', '.join(self.expectations)}"
         for rule, entry in zip(self.rules, self._entries("classes", "a class")):
             for name in rule.fails:

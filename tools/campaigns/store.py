@@ -11,6 +11,8 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+import tune
+
 KEY = b"pmdrive.campaign"
 FORMAT = 1
 FIXED = {
@@ -72,13 +74,21 @@ def column(name, rows):
 
 def record(campaign, program_digest):
     """What results are made of; others are not mixed with them."""
-    return {
+    what = {
         "format": FORMAT,
         "campaign_file": campaign.path.name,
         "scenario_file": campaign.scenario_path.name,
         "pmsim": program_digest,
         **campaign.texts,
     }
+    if campaign.base is None:
+        what["tools/tune.py"] = tuning_digest()
+    return what
+
+
+def tuning_digest():
+    """Of the rules by which machines are completed."""
+    return hashlib.sha256(b"".join(Path(module.__file__).read_bytes() for module in (tune, tune.tune))).hexdigest()
 
 
 def identity(what):
@@ -95,9 +105,6 @@ class Store:
     def _files(self):
         parts = sorted(self.parts.glob("*.parquet")) if self.parts.is_dir() else []
         return ([self.file] if self.file.is_file() else []) + parts
-
-    def there(self):
-        return bool(self._files())
 
     def clear(self):
         shutil.rmtree(self.parts, ignore_errors=True)

@@ -8,7 +8,6 @@ import os
 import signal
 import subprocess
 import tempfile
-import time
 from pathlib import Path
 
 STOPPED = signal.SIGINT, signal.SIGTERM, signal.SIGKILL
@@ -77,14 +76,12 @@ def run_one(program, folder, scenario, job, *words):
 
 
 def run_chunk(program, wanted, name, scenario, jobs):
-    """Results of some jobs, and the seconds that they took. scenario: text; name: of its file, for messages."""
+    """Results of some jobs. scenario: text; name: of its file, for messages."""
     check_program(program, wanted)
-    start = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / name
         path.write_text(scenario, encoding="utf-8")
-        results = [run_one(program, folder, path, job) for job in jobs]
-    return results, time.monotonic() - start
+        return [run_one(program, folder, path, job) for job in jobs]
 
 
 def run_file(program, wanted, scenario, settings=(), words=()):

@@ -208,6 +208,31 @@ class Files(unittest.TestCase):
         run = self.campaign(CAMPAIGN.replace("L_q0_H: L,", "L_q0_H: L / 2,")).run(0)
         self.assertIn("L_q is below L_d", run.refusal)
 
+    def test_a_campaign_may_be_like_another(self):
+        folder = Path(self.folder.name)
+        first = self.campaign().run(1)
+
+        def like(text):
+            (folder / "l.yaml").write_text("title: Like\nlike: c.yaml\n" + text, encoding="utf-8")
+            return Campaign(folder / "l.yaml")
+
+        exact = like("draw: {told_R: 1}\nbounds:\n  - {class: lost, max: 0.1}\n")
+        run = exact.run(1)
+        self.assertEqual((run.drawn["L"], run.seed, run.drawn["told_R"]), (first.drawn["L"], first.seed, 1))
+        self.assertEqual([bound.name for bound in exact.bounds], ["lost"])
+        self.assertEqual([rule.name for rule in exact.rules], ["lost"])
+        machine = yaml.safe_load(like("machine: {mechanics: {locked: true}}\n").run(1).machine)
+        self.assertEqual(machine["mechanics"], {"J_kgm2": 0.01, "locked": True})
+        for text, place in (("draw: {L: M}\n", "l.yaml:3: "), ("draw: {told_R: 1}\nlike: c.yaml\n", "l.yaml:4: ")):
+            with self.assertRaises(SourceError) as caught:
+                like(text).run(0)
+            self.assertIn(place, str(caught.exception))
+        (folder / "m.yaml").write_text("title: Like like\nlike: l.yaml\n", encoding="utf-8")
+        like("")
+        with self.assertRaises(SourceError) as caught:
+            Campaign(folder / "m.yaml")
+        self.assertIn("l.yaml:2: ", str(caught.exception))
+
     def test_classes(self):
         campaign = self.campaign()
 
