@@ -29,6 +29,9 @@ def class_of(campaign, result):
         for name in rule.fails:
             if not items[name]["pass"] and items[name]["value"] is not None:
                 return rule.name, cause(items[name])
+        for name in rule.empty:
+            if items[name]["value"] is None:
+                return rule.name, name
     failed = next((item for item in items.values() if not item["pass"]), None)
     return (OTHER, cause(failed)) if failed else (OK, "")
 

@@ -19,10 +19,11 @@ OK, REFUSED, OTHER = "ok", "refused", "other"
 
 @dataclass
 class Rule:
-    """The first rule of which an expectation fails gives the class of a run."""
+    """The first rule of which an expectation fails, or has no sample, gives the class of a run."""
 
     name: str
     fails: list
+    empty: list
 
 
 @dataclass
@@ -126,11 +127,14 @@ class CampaignFile:
 
     @staticmethod
     def _rule(entry):
-        entry.only({"class", "fails"})
+        entry.only({"class", "fails", "empty"})
         name = entry.text("class")
         if name in (OK, REFUSED, OTHER):
             raise entry.error(f"`{name}` is the class of runs to which no rule applies", "class")
-        return Rule(name, entry.texts("fails"))
+        lists = {key: entry.texts(key) if key in entry.nodes else [] for key in ("fails", "empty")}
+        if not any(lists.values()):
+            raise entry.error("`fails` or `empty`, a list of expectations, is needed")
+        return Rule(name, **lists)
 
     def _bound(self, entry):
         entry.only({"class", "min", "max"})
@@ -157,9 +161,10 @@ class CampaignFile:
             self.expectations[name] = entry.text("metric")
         there = f"{self.scenario_path} has no expectation named `%s`; it has: {', '.join(self.expectations)}"
         for rule, entry in zip(self.rules, self._entries("classes", "a class")):
-            for name in rule.fails:
-                if name not in self.expectations:
-                    raise entry.error(there % name, "fails")
+            for key, names in (("fails", rule.fails), ("empty", rule.empty)):
+                for name in names:
+                    if name not in self.expectations:
+                        raise entry.error(there % name, key)
         for name in self.shown:
             if name not in self.expectations:
                 raise self._with("shown").error(there % name, "shown")

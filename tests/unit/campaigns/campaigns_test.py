@@ -176,6 +176,8 @@ class Files(unittest.TestCase):
         self.refused("rated: {i_rated_A: 20, ", "rated: {", 10, "rated.i_rated_A")
         self.refused("drive.t_align", "drive.t_aling", 13, "t_aling")
         self.refused("fails: [fault]", "fails: [falut]", 15, "falut", "fault, angle")
+        self.refused("fails: [fault]", "empty: [falut]", 15, "falut")
+        self.refused(", fails: [fault]", "", 15, "fails")
         self.refused("class: lost,", "class: ok,", 15, "ok")
         self.refused("{class: ok, min: 0.5}", "{class: good, min: 0.5}", 17, "good")
         self.refused("min: 0.5", "min: 50", 17, "share")
@@ -248,6 +250,9 @@ class Files(unittest.TestCase):
         self.assertEqual(judge.class_of(campaign, said("STALL", 90)), ("lost", "STALL"))
         self.assertEqual(judge.class_of(campaign, said("NONE", 90)), ("other", "angle"))
         self.assertEqual(judge.class_of(campaign, said("NONE", None)), ("other", "angle"))
+        empty = self.campaign(CAMPAIGN.replace("bounds:", "  - {class: unseen, empty: [angle]}\nbounds:"))
+        self.assertEqual(judge.class_of(empty, said("NONE", None)), ("unseen", "angle"))
+        self.assertEqual(judge.class_of(empty, said("NONE", 90)), ("other", "angle"))
         kind, cause = judge.class_of(
             campaign, {"error": "pmsim: /x/y/m.yaml:3:4: drive refuses parameter i_trip: 3.5 A is too small"}
         )

@@ -20,7 +20,7 @@ import pyarrow.parquet as pq
 ROOT = Path(__file__).resolve().parents[3]
 HERE = Path(__file__).resolve().parent
 CAMPAIGN = HERE / "smoke.yaml"
-TUNED = ROOT / "tests/campaign/start.yaml"
+TUNED = ROOT / "tests/campaign/exact.yaml"  # which is like another
 PMSIM = None
 FATES = {"healthy": "ok", "broken": "lost with fault", "overhauled": "wrong direction", "wrong": "refused"}
 
@@ -220,7 +220,10 @@ class Smoke(unittest.TestCase):
         self.assertIn(done.returncode, (0, 1), done.stderr)
         (row,) = rows(folder)
         self.assertEqual(row["group"], "hub motor")
-        self.assertGreater(row["simulated_s"], 3)
+        self.assertGreater(row["simulated_s"], 0.5)
+        shown = tool("show", folder)
+        self.assertEqual(shown.returncode, done.returncode, shown.stderr)
+        self.assertIn(f"{row['class']} ", shown.stdout)
 
     def test_what_pmsim_refuses_has_its_place_in_the_campaign(self):
         text = CAMPAIGN.read_text(encoding="utf-8").replace("../../../sim_plant", str(ROOT / "sim_plant"))
