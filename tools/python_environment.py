@@ -23,7 +23,7 @@ ENVIRONMENTS = {
     # independent readers of the pictures and measurement files of our host tool
     "recording": (("asammdf>=7,<9", "matplotlib>=3.5,<4", "plotext>=5.2,<6"), True),
     # tools/campaign: columnar files and clusters
-    "campaign": (("pyarrow>=15,<22", "distributed>=2024.8,<2026", "matplotlib>=3.5,<4", "PyYAML>=6,<7"), False),
+    "campaign": (("pyarrow>=15,<22", "distributed>=2024.8,<2026", "matplotlib>=3.7,<4", "PyYAML>=6,<7"), False),
     # https://pypi.org/project/motulator: its models beside the plant, in tests/optional and tools/bench_motulator.py
     "motulator": (("motulator==0.5.0",), False),
 }

@@ -7,6 +7,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
+from matplotlib.ticker import NullFormatter  # noqa: E402
 
 from .reader import OK, REFUSED  # noqa: E402
 from .store import DRAWN  # noqa: E402
@@ -16,7 +17,7 @@ GOOD, GREY = "#4c9f70", "#9aa5b1"
 BAD = ["#e0a030", "#c8553d", "#7b3f8c", "#2f6690", "#b5838d", "#555b6e"]
 SEPARATING = 4  # drawn values that are shown
 LEAST_FAILED = 5  # below that nothing is said of in what they differ
-LOG_SPAN = 8.0  # a value that spans more is shown on a logarithmic axis
+LOG_SPAN = 30.0  # a value that spans more is shown on a logarithmic axis
 
 
 def colours(names):
@@ -44,18 +45,19 @@ def draw_groups(axis, rows, names, colour):
         total, left = sum(groups[group].values()), 0.0
         for name in names:
             width = 100 * groups[group][name] / total
-            axis.barh(y, width, left=left, color=colour[name], height=0.7, label=name if y == 0 else None)
+            axis.barh(y, width, left=left, color=colour[name], height=0.7)
             left += width
         axis.text(101, y, str(total), va="center", fontsize=8)
     axis.set_yticks(range(len(order)), order)
-    axis.set(xlim=(0, 100), xlabel="% of the group's runs", title="Groups, best at the bottom")
-    axis.legend(
-        *legend_of(names, colour), fontsize=8, loc="upper center", bbox_to_anchor=(0.45, -0.09), ncols=4, frameon=False
-    )
+    axis.set(xlim=(0, 100), xlabel="% of the group's runs", title="Groups")
+    axis.invert_yaxis()
 
 
-def legend_of(names, colour):
-    return [plt.Rectangle((0, 0), 1, 1, color=colour[name]) for name in names], names
+def logarithmic(axis, low, high):
+    """Of at least a decade and a half, so that two ticks have numbers."""
+    if low > 0 and high / low > LOG_SPAN:
+        axis.set_xscale("log")
+        axis.xaxis.set_minor_formatter(NullFormatter())
 
 
 def separation(good, bad):
@@ -94,8 +96,7 @@ def draw_separating(axis, name, good, bad):
             lw=1.8,
             label=f"{label} ({len(values)})",
         )
-    if every.min() > 0 and every.max() / every.min() > LOG_SPAN:
-        axis.set_xscale("log")
+    logarithmic(axis, every.min(), every.max())
     axis.set(title=f"{name.removeprefix(DRAWN)}, as drawn", ylim=(0, 100), ylabel="% of the runs below")
     axis.grid(True, alpha=0.3, which="both")
     axis.legend(fontsize=8, frameon=False)
@@ -106,8 +107,7 @@ def draw_shown(axis, name, metric, rows):
     values = np.sort([row[name] for row in rows if row["class"] == OK and isinstance(row.get(name), (int, float))])
     if len(values):
         axis.step(values, 100 * np.arange(1, len(values) + 1) / len(values), where="post", color=GOOD, lw=1.8)
-        if values[0] > 0 and values[-1] / values[0] > LOG_SPAN:
-            axis.set_xscale("log")
+        logarithmic(axis, values[0], values[-1])
     axis.set(title=f"{name}, runs that are ok", xlabel=metric, ylim=(0, 100), ylabel="% of the runs below")
     axis.grid(True, alpha=0.3, which="both")
 
@@ -129,6 +129,9 @@ def draw(campaign, rows, path):
         draw_separating(figure.add_subplot(grid[place]), *part)
     for place, name in zip(places[len(differ) :], campaign.shown):
         draw_shown(figure.add_subplot(grid[place]), name, campaign.expectations[name], rows)
-    figure.suptitle(f"{campaign.title}: {len(rows)} runs", fontsize=13)
+    kinds = [name for name in names if any(row["class"] == name for row in rows)]
+    patches = [plt.Rectangle((0, 0), 1, 1, color=colour[name]) for name in kinds]
+    title = {"title": f"{campaign.title}: {len(rows)} runs", "title_fontsize": 13}
+    figure.legend(patches, kinds, loc="outside upper center", ncols=len(kinds), fontsize=9, frameon=False, **title)
     figure.savefig(path, dpi=110, metadata={"Software": None})
     plt.close(figure)
