@@ -60,7 +60,7 @@ void round_only(maker_t *m)
 {
     const pm_num_t L_q = si(m, DRIVE_PARAM_L_q);
     const pm_num_t dL = pm_num_sub(L_q, si(m, DRIVE_PARAM_L_d));
-    if (pm_num_cmp(dL, pm_num_mul(L_q, pm_num_ratio(1, 8))) > 0) {
+    if (pm_num_cmp(square(dL), square(pm_num_mul(L_q, pm_num_ratio(1, 8)))) > 0) {
         refuse(m, DRIVE_PARAM_observer, "is for machines without saliency");
     }
 }

@@ -87,7 +87,12 @@ struct Cross {
 };
 
 const std::vector<Cross> kCrosses = {
-    {"L_q below L_d", {{DRIVE_PARAM_L_d, 80e-3}}, DRIVE_PARAM_L_q},
+    {"pulses and injection with L_q below L_d",
+     {{DRIVE_PARAM_L_d, 80e-3}, {DRIVE_PARAM_start_method, 1}},
+     DRIVE_PARAM_start_method},
+    {"align and injection with L_q below L_d",
+     {{DRIVE_PARAM_L_d, 80e-3}, {DRIVE_PARAM_start_method, 3}},
+     DRIVE_PARAM_start_method},
     {"cross inductance of an active machine", {{DRIVE_PARAM_L_dqh_rated, -50e-3}}, DRIVE_PARAM_L_dqh_rated},
     {"injection without saliency",
      {{DRIVE_PARAM_L_d, 75e-3}, {DRIVE_PARAM_start_method, 1}},
@@ -300,10 +305,30 @@ TEST(Config, CrossCouplingIsThatOfTheTwoPointsGiven)
 TEST(Config, AnObserverForRoundMachinesRefusesSaliency)
 {
     drive_config_t c;
-    const drive_params_t params = changed({{DRIVE_PARAM_observer, OBSERVER_back_emf}});
-    const drive_result_t result = drive_configure(&c, &params, PM_CHANNELS);
-    EXPECT_FALSE(result.ok);
-    EXPECT_EQ(result.param, DRIVE_PARAM_observer);
+    for (const double L_d : {43e-3, 120e-3}) {
+        const drive_params_t params =
+            changed({{DRIVE_PARAM_observer, OBSERVER_back_emf}, {DRIVE_PARAM_L_d, L_d}});
+        const drive_result_t result = drive_configure(&c, &params, PM_CHANNELS);
+        EXPECT_FALSE(result.ok);
+        EXPECT_EQ(result.param, DRIVE_PARAM_observer);
+    }
+}
+
+// Flux-intensifying machines: both inductances where they stand in the equations, no i_d and no injection.
+TEST(Config, LqBelowLdIsAccepted)
+{
+    const drive_config_t c = configure(changed({{DRIVE_PARAM_L_d, 120e-3}}));
+    EXPECT_FALSE(c.injection);
+    EXPECT_EQ(c.start, SEQUENCE_align);
+    EXPECT_EQ(c.mtpa.h, 0);
+    EXPECT_GT(c.machine.L_d, c.machine.L_q);
+    for (int32_t observer = 0; observer < OBSERVER_COUNT; observer++) {
+        drive_params_t p = changed({{DRIVE_PARAM_L_d, 80e-3}});
+        p.observer = observer;
+        drive_config_t one = {};
+        const drive_result_t r = drive_configure(&one, &p, PM_CHANNELS);
+        EXPECT_TRUE(r.ok) << observer << ' ' << drive_param_table[r.param].name << ' ' << r.reason;
+    }
 }
 
 TEST(Config, TheParameterNamesEveryObserverOfTheList)
