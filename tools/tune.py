@@ -42,6 +42,8 @@ LOW_V = 60  # below: MOSFETs
 FAST_HZ = 40e3  # from here on above LOW_V: silicon carbide
 PWM_HZ = (10e3, 20e3, 40e3, 60e3)
 PER_TURN = 20  # periods of a turn of the field at the speed that trips
+PER_RISE = 3  # periods of L / R
+RIPPLE = 6  # of the phase current, peak to peak: v_dc / (6 L f_pwm) at its most
 BELOW = "the motor's; below L_d: i_d = 0 and no injection, which costs less than (L_d - L_q) i / psi_m squared, half"
 OTHERS = "name", "path", "electrical", "winding", "mechanics", "rated", "inverter", "sensor", "dclink", "drive"
 
@@ -91,13 +93,14 @@ def complete(x):
     poles, speed = told["electrical", "pole_pairs"], told["rated", "speed_rated_rad_s"]
     low = v <= LOW_V
     turns_Hz = 1.5 * poles * speed / (2 * math.pi)  # at the speed that trips
-    least = max(20e3 if low else 10e3, PER_TURN * turns_Hz)
+    L = min(inductances(x))
+    least = max(20e3 if low else 10e3, PER_TURN * turns_Hz, PER_RISE * told["electrical", "R_s_ohm"] / L, v / (RIPPLE * i * L))
     f_pwm = next((f for f in PWM_HZ if f >= least), PWM_HZ[-1])
     f_pwm = float(x["inverter"].get("f_pwm_Hz", f_pwm))
     chosen = {
         "rated": {"torque_rated_Nm": (1.5 * poles * told["electrical", "psi_m_Wb"] * i, "1.5 pole_pairs psi_m i_rated")},
         "inverter": {
-            "f_pwm_Hz": (f_pwm, f"{PER_TURN} periods and more of a turn of the field"),
+            "f_pwm_Hz": (f_pwm, f"{PER_TURN} periods of a turn of the field, {PER_RISE} of L / R, ripple below rated current"),
             "timer_counts": (round(TIMER_HZ / (2 * f_pwm)), "170 MHz timer, centre-aligned"),
             "dead_time_s": (0.5e-6, "MOSFET board") if low or f_pwm >= FAST_HZ else (2e-6, "IGBT module"),
             "c_leg_F": (2e-9 if low else 0.5e-9, "output capacitance of a leg"),

@@ -6,9 +6,9 @@ import math
 
 from .errors import UsageError
 
-BOARD = ("f_pwm", "i_full_scale", "i_noise", "dead_time", "device_drop")
-MACHINE = ("pole_pairs", "i_rated", "i_max", "speed_max", "v_dc_nominal", "R_s", "L_d", "L_q", "L_q_rated", "L_qh_rated", "psi_m",
-           "J")
+BOARD = ("f_pwm", "i_full_scale", "v_full_scale", "i_noise", "dead_time", "device_drop")
+MACHINE = ("pole_pairs", "i_rated", "i_max", "speed_max", "v_dc_nominal", "v_dc_min", "R_s", "L_d", "L_q", "L_q_rated",
+           "L_qh_rated", "psi_m", "J")
 SALIENT = 0.05  # the drive's own limit for injection
 MEASURED = 0.02 # of R, L_d, L_q, psi_m and J: what identification is off by
 TOLD = 0.15     # what a data sheet is
@@ -23,10 +23,11 @@ WHY = {
     "i_trip": "2.25 times rated, at most 90 % of the converter's range",
     "speed_max": "1.25 times rated",
     "speed_trip": "1.2 times speed_max",
-    "v_dc_min": "30 % of the link, and 7 % of the converter's range",
+    "v_dc_min": "30 % of the link, and 7 % of the converter's range; more where R or L is far above what the board is made for",
     "v_dc_derate": "127 % of the link",
     "v_dc_max": "133 % of the link, at most 96 % of the converter's range",
-    "current_bandwidth": "a twentieth of f_pwm, a tenth with what saturation leaves of L_q; at most 1500 Hz",
+    "current_bandwidth": "a twentieth of f_pwm, a tenth with what saturation leaves of L_q; at most 1500 Hz, and what the link "
+                         "drives a tenth of rated current with",
     "injection_bandwidth": "slow enough for the noise of the smallest answer that leads",
     "speed_bandwidth": "six times rated torque over the inertia at rated speed; below the position's loop, also with what "
                        "saliency adds to the torque",
@@ -72,6 +73,38 @@ def _open_loop(x):
     return min(i, x["psi_m"] / (2 * dL)) if dL > 0 else i
 
 
+def _reach(x):
+    """Bandwidth at which a step of a tenth of rated current asks for the whole link, and whose gain the drive's format has, Hz."""
+    L = max(x["L_d"], x["L_q"])
+    step = 10 * x["v_dc_nominal"] / math.sqrt(3) / x["i_rated"]
+    gain = 30 * x["v_full_scale"] / x["i_full_scale"] * 2 ** _doublings(x, x["v_dc_min"])
+    return min(step, gain) / (2 * math.pi * L)
+
+
+def _times(x):
+    """By what R, or X at speed_trip, is beyond 4 v_full_scale / i_full_scale, the drive's format with a margin of 5 %."""
+    X = x["L_q"] * 1.2 * x["speed_max"] * x["pole_pairs"]
+    return max(x["R_s"], X) * 1.05 * x["i_full_scale"] / (4 * x["v_full_scale"])
+
+
+def _doublings(x, v_dc_min):
+    """Of the format's voltage by the drive: as many as R and X need and v_dc_min, an eighth of it, allows."""
+    n = 0
+    while _times(x) > 2 ** n and v_dc_min >= 0.125 * x["v_full_scale"] * 2 ** n:
+        n += 1
+    return n
+
+
+def _v_dc_min(x):
+    """As low as the link may be for the impedance to be in the format, where 0.7 of it is enough for that."""
+    v = max(0.3 * x["v_dc_nominal"], 0.07 * x["v_full_scale"])
+    for n in range(4):
+        more = 0.126 * x["v_full_scale"] * 2 ** n
+        if "L_q" in x and _times(x) > 2 ** n and more < 0.7 * x["v_dc_nominal"]:
+            v = max(v, more)
+    return v
+
+
 def _reluctance(x):
     """What most torque per ampere makes of psi_m at rated current: the speed control knows psi_m alone."""
     dL = x["L_q_rated"] - x["L_d"]
@@ -101,7 +134,7 @@ def limits(x):
                          f"its channels reach {i_scale:g} A and {v_scale:g} V")
     return {
         "i_max": 1.25 * current, "i_trip": min(2.25 * current, 0.9 * i_scale), "speed_trip": 1.2 * speed,
-        "v_dc_min": max(0.3 * link, 0.07 * v_scale), "v_dc_derate": min(1.27 * link, 0.93 * v_scale),
+        "v_dc_min": _v_dc_min(x), "v_dc_derate": min(1.27 * link, 0.93 * v_scale),
         "v_dc_max": min(1.33 * link, 0.96 * v_scale),
     }
 
@@ -123,7 +156,7 @@ def values(x, bandwidth=None, tolerance=MEASURED):
     i_open = _open_loop(x)
     low, high = _hand_over(x, i_open, leads, tolerance)
     return {
-        "current_bandwidth": bandwidth or min(x["f_pwm"] / 20, highest * x["L_qh_rated"] / x["L_q"], 1500.0),
+        "current_bandwidth": bandwidth or min(x["f_pwm"] / 20, highest * x["L_qh_rated"] / x["L_q"], 1500.0, _reach(x)),
         "injection_bandwidth": INJECTION_HZ,
         "speed_bandwidth": min(max(6 * jerk / rated_speed / (2 * math.pi), 2.0),
                                INJECTION_HZ / 3.5 / _reluctance(x) if leads else 10.0),
