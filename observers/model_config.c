@@ -7,20 +7,16 @@ static pm_q_t quotient(maker_t *m, pm_q_t x, pm_q_t y, drive_param_id_t blame)
 {
     const pm_q_t q = pm_div(x, y);
     if (pm_abs(q) > PM_Q(7.9)) {
-        refuse(m, blame, "beyond the fixed-point range: i_full_scale too far from i_rated");
+        refuse(m, blame, "beyond its format: full scales or speed_trip too far off");
     }
     return q;
 }
 
-#define LIFT_MOST 6
-
-/* The change of L_q at rated current, `change`, over the square of that current, in the least multiple of the base in
- * which it fits. */
+/* The change of L_q at rated current over the square of that current, lifted until it fits. */
 static void make_fall(maker_t *m, observer_model_t *c, pm_q_t i_rated, pm_q_t change)
 {
     pm_q_t i = i_rated;
-    c->lift = 0;
-    while (pm_abs(pm_div(change, pm_mul(i, i))) > PM_Q(7.9) && c->lift < LIFT_MOST && i < PM_Q(1.0)) {
+    while (i > 0 && pm_mul(i, i) < pm_abs(change) / 7) {
         i = pm_shl(i, 1);
         c->lift = (uint8_t)(c->lift + 1U);
     }

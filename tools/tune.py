@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """From ten values of a motor to a machine file with all that the drive needs, each choice explained in a line.
 
-    tools/tune.py my_motor.yaml                  # prints the file
-    tools/tune.py my_motor.yaml -o tuned.yaml    # writes it
+    pmsim tune my_motor.yaml                     # prints the file; or tools/tune.py
+    pmsim tune my_motor.yaml -o tuned.yaml       # writes it
     pmsim run tests/unit/tune/start.yaml --set machine=tuned.yaml
 
 my_motor.yaml, all that it must have:
@@ -13,7 +13,8 @@ my_motor.yaml, all that it must have:
     rated: {i_rated_A: 20, speed_rated_rad_s: 40, v_dc_V: 36}   # peak of a phase; mechanical
 
 What else a machine file may have is kept; inverter, sensors and link that are not told are those of a board of the motor's
-class. What `drive:` of the file says stands above what is chosen here. The rules are those of `pmdrive tune`.
+class. What `drive:` of the file says stands above what is chosen here. The rules are those of `pmdrive tune`. Saturation is
+taken from c_A_Wb5 of `electrical:`, or from L_q_rated of `drive:`. L_q may be below L_d.
 """
 import argparse
 import importlib

@@ -16,7 +16,7 @@ static bool fits(const maker_t *m, pm_num_t impedance, int32_t times)
 
 static void choose_voltage(maker_t *m, drive_config_t *config)
 {
-    static const char reason[] = "too large for this board: raise v_dc_min; L_q: or lower speed_trip";
+    static const char reason[] = "too large for this board: raise v_dc_min, or lower speed_trip";
     const pm_num_t R = si(m, DRIVE_PARAM_R_s);
     const pm_num_t X = pm_num_mul(si(m, DRIVE_PARAM_L_q), m->base.omega);
     int32_t shift = 0;

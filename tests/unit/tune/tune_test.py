@@ -212,6 +212,14 @@ class Tune(unittest.TestCase):
         twice = yaml.safe_load(self.tune(once).stdout)
         self.assertEqual(once, twice)
 
+    def test_it_is_a_command_of_pmsim(self):
+        self.told.write_text(yaml.safe_dump(motor("servo")), encoding="utf-8")
+        result = subprocess.run([PMSIM, "tune", str(self.told), "--tolerance", "0.02"], capture_output=True, text=True, check=False)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(result.stdout, self.tune(motor("servo"), "--tolerance", "0.02").stdout)
+        result = subprocess.run([PMSIM, "tune", "--help"], capture_output=True, text=True, check=False)
+        self.assertIn("--tolerance", result.stdout)
+
     def test_motors_of_many_kinds_start(self):
         for name in MOTORS:
             with self.subTest(name):
