@@ -13,8 +13,12 @@ PM_RARE pm_q_t observer_active_flux(const observer_model_t *model, pm_dq_t i)
 PM_RARE pm_q_t observer_L_q(const observer_model_t *model, pm_dq_t i)
 {
     const pm_q_t k = pm_add_sat(model->L_qd, pm_mul(model->L_qd2, i.d));
-    const pm_q_t along_q = pm_add_sat(model->L_q, pm_mul(model->L_q2, pm_mul(i.q, i.q)));
-    return pm_add_sat(along_q, pm_mul(k, i.d));
+    pm_q_t i_q = i.q;
+    for (uint32_t n = model->lift; n > 0U; n--) {
+        i_q = pm_shl_sat(i_q, 1, PM_Q_BITS + 1);
+    }
+    const pm_q_t along_q = pm_add_sat(model->L_q, pm_mul(model->L_q2, pm_mul(i_q, i_q)));
+    return pm_max(pm_add_sat(along_q, pm_mul(k, i.d)), model->L_q / 16);
 }
 
 pm_q_t observer_amplitude(const observer_model_t *model, pm_dq_t i, pm_q_t reference, pm_q_t lack)

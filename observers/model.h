@@ -1,7 +1,7 @@
 /* The machine as all observers know it, and its functions (METHODS.md 1.3.1.3, 2.2.2, 3.4).
  *
  *   k(i)   = L_qd + L_qd2 i_d
- *   L_q(i) = L_q + L_q2 i_q^2 + k i_d                                        psi_q / i_q under load
+ *   L_q(i) = L_q + L_q2 (2^lift i_q)^2 + k i_d                               psi_q / i_q under load; >= L_q/16
  *   psi_a  = psi_m + (L_d - L_q(i)) i_d + (L_qd/2 + L_qd2 i_d) i_q^2         >= psi_m/4
  * psi_a is the active flux, the part of the stator flux on the d-axis; its last term follows from that of
  * psi_q, because both derive from one energy.
@@ -27,11 +27,13 @@ extern "C" {
 typedef struct {
     pm_q_t R;
     pm_q_t L_d, L_q;
-    pm_q_t L_q2;  /* change of L_q with i_q^2, <= 0 ... */
+    pm_q_t L_q2;  /* change of L_q with the square of i_q 2^lift, which saturates at 2; <= 0 ... */
     pm_q_t L_qd;  /* ... with i_d, <= 0: k_c of 3.4.2; 0: cross-coupling is left out ... */
     pm_q_t L_qd2; /* ... and with i_d^2 */
     pm_q_t psi_m;
     pm_frac_t t_s; /* T_s w_base, Q32 */
+    uint8_t
+        lift; /* of i_q: a motor whose rated current is far below full scale saturates within a fraction of it */
 } observer_model_t;
 
 /* Adaptation of R while the position is known from another source (docs/decisions/004-resistance.md). */

@@ -7,9 +7,20 @@ static pm_q_t quotient(maker_t *m, pm_q_t x, pm_q_t y, drive_param_id_t blame)
 {
     const pm_q_t q = pm_div(x, y);
     if (pm_abs(q) > PM_Q(7.9)) {
-        refuse(m, blame, "beyond the fixed-point range with these bases");
+        refuse(m, blame, "beyond its format: full scales or speed_trip too far off");
     }
     return q;
+}
+
+/* The change of L_q at rated current over the square of that current, lifted until it fits. */
+static void make_fall(maker_t *m, observer_model_t *c, pm_q_t i_rated, pm_q_t change)
+{
+    pm_q_t i = i_rated;
+    while (i > 0 && pm_mul(i, i) < pm_abs(change) / 7) {
+        i = pm_shl(i, 1);
+        c->lift = (uint8_t)(c->lift + 1U);
+    }
+    c->L_q2 = quotient(m, change, pm_mul(i, i), DRIVE_PARAM_L_q_rated);
 }
 
 /* L_q_rated belongs to i_d of maximum torque per ampere, L_qd_weak and _strong to -+ half rated. */
@@ -23,7 +34,7 @@ static void make_saturation(maker_t *m, observer_model_t *c)
     c->L_qd2 = quotient(m, pm_sub_sat(strong, weak), i_squared, DRIVE_PARAM_L_qd_strong);
     const pm_q_t rated = per_unit(m, DRIVE_PARAM_L_q_rated, m->inductance);
     const pm_dq_t i = {.d = m->i_d_rated, .q = 0};
-    c->L_q2 = quotient(m, pm_sub_sat(rated, observer_L_q(c, i)), i_squared, DRIVE_PARAM_L_q_rated);
+    make_fall(m, c, i_rated, pm_sub_sat(rated, observer_L_q(c, i)));
 }
 
 void make_model(maker_t *m, observer_model_t *c)
@@ -35,6 +46,7 @@ void make_model(maker_t *m, observer_model_t *c)
     /* observers hold it in Q29 */
     (void)fixed(m, pm_num_div(si(m, DRIVE_PARAM_L_q), m->inductance), Q_BITS + 1, DRIVE_PARAM_L_q);
     c->L_q2 = 0;
+    c->lift = 0;
     c->L_qd = 0;
     c->L_qd2 = 0;
     if (m->params->saturation_comp != 0) {
@@ -60,7 +72,7 @@ void round_only(maker_t *m)
 {
     const pm_num_t L_q = si(m, DRIVE_PARAM_L_q);
     const pm_num_t dL = pm_num_sub(L_q, si(m, DRIVE_PARAM_L_d));
-    if (pm_num_cmp(dL, pm_num_mul(L_q, pm_num_ratio(1, 8))) > 0) {
+    if (pm_num_cmp(square(dL), square(pm_num_mul(L_q, pm_num_ratio(1, 8)))) > 0) {
         refuse(m, DRIVE_PARAM_observer, "is for machines without saliency");
     }
 }

@@ -14,7 +14,8 @@ void make_mras(maker_t *m, mras_config_t *c)
     (void)fixed(m, pm_num_div(step, L), 30, DRIVE_PARAM_L_d);
     c->k = fixed(m, mul3(PM_NUM_TWO_PI, pm_num(50), m->base.t_s), FRAC_BITS, DRIVE_PARAM_f_pwm);
     c->emf_min = pm_max(1, pm_mul(speed(m, DRIVE_PARAM_speed_low) / 4, c->model.psi_m));
-    const pm_num_t saliency = pm_num_sub(si(m, DRIVE_PARAM_L_q), si(m, DRIVE_PARAM_L_d));
+    const pm_num_t dL = pm_num_sub(si(m, DRIVE_PARAM_L_q), si(m, DRIVE_PARAM_L_d));
+    const pm_num_t saliency = pm_num_sqrt(square(dL)); /* of either sign */
     const pm_num_t needed =
         pm_num_div(pm_num_mul(saliency, si(m, DRIVE_PARAM_i_rated)), si(m, DRIVE_PARAM_psi_m));
     const pm_num_t lag = pm_num_add(pm_num_mul(pm_num(2), needed), pm_num_ratio(1, 5));

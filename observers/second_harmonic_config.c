@@ -20,7 +20,10 @@ void make_second_harmonic(maker_t *m, second_harmonic_config_t *c)
 void make_second_harmonic(maker_t *m, second_harmonic_config_t *c)
 {
     const bool ekf = m->params->position_observer == (int32_t)LOOP_SIMPLIFIED_EKF;
-    const pm_num_t w_n = pm_num_div(angular(m, DRIVE_PARAM_flux_bandwidth), m->base.omega);
+    const bool stays =
+        m->params->second_harmonic == (int32_t)SECOND_HARMONIC_STAYS; /* then gains may be beyond */
+    const pm_num_t loop = pm_num_div(angular(m, DRIVE_PARAM_flux_bandwidth), m->base.omega);
+    const pm_num_t w_n = stays ? pm_num(0) : loop;
     const pm_num_t r = pm_num_mul(LOOP_EKF_SHARE, w_n);
     const pm_num_t two = pm_num(2);
     const pm_num_t k_p = ekf ? pm_num_mul(two, r) : pm_num_mul(pm_num_ratio(9, 5), w_n);

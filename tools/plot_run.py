@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Plots a run of pmsim: speed, position error, currents and torque over one time axis.
+"""Plots a run of pmsim: speed, position error, currents, torque and link voltage over one time axis.
 
     pmsim run tests/scenario/demo.yaml --out out/demo
     tools/plot_run.py out/demo
@@ -80,6 +80,37 @@ def where(values, flags):
     return [value if flag else float("nan") for value, flag in zip(values, flags)]
 
 
+def of(run, *names):
+    """The first of these columns that the trace has: those of earlier versions have fewer."""
+    return next((run[name] for name in names if name in run), None)
+
+
+def dragged(run):
+    """Where the vector is imposed and the position is not known."""
+    flags = of(run, "open_loop")
+    return [flag > 0 for flag in flags] if flags else [False] * len(run["t_s"])
+
+
+def mark_faults(axes, run):
+    """A line where a fault comes, on every axis, with its name on the first."""
+    before = "NONE"
+    for time, fault in zip(run["t_s"], run["fault"]):
+        if fault not in ("NONE", before):
+            for axis in axes:
+                axis.axvline(time, color=RED, linewidth=1.2)
+            axes[0].annotate(fault, (time, 0.03), xycoords=("data", "axes fraction"), xytext=(3, 0), textcoords="offset points",
+                             color=RED, fontsize=8, fontweight="bold")
+        before = fault
+
+
+def plot_link(axis, run):
+    axis.plot(run["t_s"], run["v_dc_V"], color=BLUE, linewidth=0.8)
+    low, high = min(run["v_dc_V"]), max(run["v_dc_V"])
+    room = max(0.05 * high - (high - low), 0.0) / 2  # a link that stays is a flat line
+    axis.set_ylim(low - room - 0.1 * (high - low), high + room + 0.1 * (high - low))
+    axis.set_ylabel("Link (V)")
+
+
 def plot_speed(axis, run, positioned):
     rpm = {key: [RAD_S_TO_RPM * x for x in run[key]] for key in
            ("omega_ref_mech_rad_s", "omega_mech_rad_s", "omega_hat_mech_rad_s")}
@@ -97,14 +128,18 @@ def plot_error(axis, run, positioned):
     axis.plot(t, where(run["angle_error_deg"], positioned), color=BLUE, linewidth=0.8)
     axis.axhline(0.0, color="black", linewidth=0.6)
     shown = [abs(e) for e, p in zip(run["angle_error_deg"], positioned) if p]
-    limit = max(6.0, 1.15 * max(shown, default=0.0))
+    led = [abs(e) for e, p, d in zip(run["angle_error_deg"], positioned, dragged(run)) if p and not d]
+    limit = max(6.0, 1.15 * max(led or shown, default=0.0))
     axis.set_ylim(-min(limit, 180.0), min(limit, 180.0))
     entries = []
-    injection = [p and w <= 0.0 for p, w in zip(positioned, run["weight"])]
-    blend = [p and 0.0 < w < 1.0 for p, w in zip(positioned, run["weight"])]
+    open_loop = dragged(run)
+    led = [p and not o for p, o in zip(positioned, open_loop)]
+    injection = [p and w <= 0.0 for p, w in zip(led, run["weight"])]
+    blend = [p and 0.0 < w < 1.0 for p, w in zip(led, run["weight"])]
     searching = [s in ("calibrating", "finding") for s in run["state"]]
     for flags, colour, label in (
         (searching, GREY, "finding position"),
+        ([p and o for p, o in zip(positioned, open_loop)], PURPLE, "open loop"),
         (injection, SKY, "injection"),
         (blend, ORANGE, "blending"),
         ([f != "NONE" for f in run["fault"]], RED, "fault"),
@@ -129,7 +164,7 @@ def plot_current(axis, run):
 def plot_torque(axis, run):
     t = run["t_s"]
     axis.plot(t, run["torque_Nm"], color=BLUE, linewidth=0.8, label="air gap")
-    axis.plot(t, run["load_Nm"], color=RED, linestyle=(0, (4, 2)), linewidth=1.4, label="load")
+    axis.plot(t, of(run, "loads_Nm", "load_Nm"), color=RED, linestyle=(0, (4, 2)), linewidth=1.4, label="all loads")
     axis.set_ylabel("Torque (Nm)")
     axis.legend(loc="upper right", ncol=2)
 
@@ -143,15 +178,19 @@ def headroom(axis, share=0.28):
 def plot(run, title):
     positioned = [state in WITH_POSITION for state in run["state"]]
     with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(4, 1, sharex=True, figsize=(8.0, 8.6), constrained_layout=True)
+        figure, axes = plt.subplots(5, 1, sharex=True, figsize=(8.0, 9.4), constrained_layout=True,
+                                    gridspec_kw={"height_ratios": (1, 1, 1, 1, 0.45)})
         plot_speed(axes[0], run, positioned)
         plot_error(axes[1], run, positioned)
         plot_current(axes[2], run)
         plot_torque(axes[3], run)
-        for axis in axes:
+        plot_link(axes[4], run)
+        for axis in axes[:4]:
             headroom(axis)
-        axes[3].set_xlabel("Time (s)")
-        axes[3].set_xlim(run["t_s"][0], run["t_s"][-1])
+        shade(axes[0], run["t_s"], dragged(run), PURPLE)
+        mark_faults(axes, run)
+        axes[-1].set_xlabel("Time (s)")
+        axes[-1].set_xlim(run["t_s"][0], run["t_s"][-1])
         figure.align_ylabels(axes)
         if title:
             figure.suptitle(title, fontsize=10.5, fontweight="bold")

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """From ten values of a motor to a machine file with all that the drive needs, each choice explained in a line.
 
-    tools/tune.py my_motor.yaml                  # prints the file
-    tools/tune.py my_motor.yaml -o tuned.yaml    # writes it
+    pmsim tune my_motor.yaml                     # prints the file; or tools/tune.py
+    pmsim tune my_motor.yaml -o tuned.yaml       # writes it
     pmsim run tests/unit/tune/start.yaml --set machine=tuned.yaml
 
 my_motor.yaml, all that it must have:
@@ -13,13 +13,15 @@ my_motor.yaml, all that it must have:
     rated: {i_rated_A: 20, speed_rated_rad_s: 40, v_dc_V: 36}   # peak of a phase; mechanical
 
 What else a machine file may have is kept; inverter, sensors and link that are not told are those of a board of the motor's
-class. What `drive:` of the file says stands above what is chosen here. The rules are those of `pmdrive tune`.
+class. What `drive:` of the file says stands above what is chosen here. The rules are those of `pmdrive tune`. Saturation is
+taken from c_A_Wb5 of `electrical:`, or from L_q_rated of `drive:`. L_q may be below L_d.
 """
 import argparse
 import importlib
 import math
 import sys
 import types
+from decimal import Decimal
 from pathlib import Path
 
 import yaml
@@ -28,7 +30,7 @@ PACKAGE = Path(__file__).resolve().parent / "pmdrive" / "pmdrive"
 package = types.ModuleType("pmdrive")  # its modules one by one: no bus is needed, nor what talks to it
 package.__path__ = [str(PACKAGE)]
 sys.modules["pmdrive"] = package
-tune = importlib.import_module("pmdrive.tune")
+names, tune = importlib.import_module("pmdrive.names"), importlib.import_module("pmdrive.tune")
 UsageError = importlib.import_module("pmdrive.errors").UsageError
 
 NEEDED = {
@@ -38,8 +40,12 @@ NEEDED = {
 }
 TIMER_HZ = 170e6
 LOW_V = 60  # below: MOSFETs
+FAST_HZ = 40e3  # from here on above LOW_V: silicon carbide
 PWM_HZ = (10e3, 20e3, 40e3, 60e3)
 PER_TURN = 20  # periods of a turn of the field at the speed that trips
+PER_RISE = 3  # periods of L / R
+RIPPLE = 6  # of the phase current, peak to peak: v_dc / (6 L f_pwm) at its most
+BELOW = "the motor's; below L_d: i_d = 0 and no injection, which costs less than (L_d - L_q) i / psi_m squared, half"
 OTHERS = "name", "path", "electrical", "winding", "mechanics", "rated", "inverter", "sensor", "dclink", "drive"
 
 
@@ -88,15 +94,16 @@ def complete(x):
     poles, speed = told["electrical", "pole_pairs"], told["rated", "speed_rated_rad_s"]
     low = v <= LOW_V
     turns_Hz = 1.5 * poles * speed / (2 * math.pi)  # at the speed that trips
-    least = max(20e3 if low else 10e3, PER_TURN * turns_Hz)
+    L = min(inductances(x))
+    least = max(20e3 if low else 10e3, PER_TURN * turns_Hz, PER_RISE * told["electrical", "R_s_ohm"] / L, v / (RIPPLE * i * L))
     f_pwm = next((f for f in PWM_HZ if f >= least), PWM_HZ[-1])
     f_pwm = float(x["inverter"].get("f_pwm_Hz", f_pwm))
     chosen = {
         "rated": {"torque_rated_Nm": (1.5 * poles * told["electrical", "psi_m_Wb"] * i, "1.5 pole_pairs psi_m i_rated")},
         "inverter": {
-            "f_pwm_Hz": (f_pwm, f"{PER_TURN} periods and more of a turn of the field"),
+            "f_pwm_Hz": (f_pwm, f"{PER_TURN} periods of a turn of the field, {PER_RISE} of L / R, ripple below rated current"),
             "timer_counts": (round(TIMER_HZ / (2 * f_pwm)), "170 MHz timer, centre-aligned"),
-            "dead_time_s": (0.5e-6 if low else 2e-6, "MOSFET board" if low else "IGBT module"),
+            "dead_time_s": (0.5e-6, "MOSFET board") if low or f_pwm >= FAST_HZ else (2e-6, "IGBT module"),
             "c_leg_F": (2e-9 if low else 0.5e-9, "output capacitance of a leg"),
             "v_switch_V": (0.0 if low else 1.0, "resistive" if low else "of a few amperes"),
             "v_diode_V": (0.0 if low else 1.0, "the channel conducts both ways" if low else "of a few amperes"),
@@ -116,27 +123,77 @@ def complete(x):
                       for key, (value, why) in keys.items()} for section, keys in chosen.items()}
 
 
-def drive(x, board):
+def current(x, psi_d, psi_q):
+    """(i_d, i_q) of the energy form that a machine file has, docs/pmsim.md, and their derivatives by the fluxes."""
+    e = {key: float(value) for key, value in x["electrical"].items() if key != "pole_pairs"}
+    c, s = e.get("c_A_Wb5", 0.0), psi_d ** 2 + psi_q ** 2
+    i_f = e["psi_m_Wb"] / e["L_d0_H"] + c * e["psi_m_Wb"] ** 5
+    i = psi_d / e["L_d0_H"] + c * psi_d * s * s - i_f, psi_q / e["L_q0_H"] + c * psi_q * s * s
+    cross = 4 * c * s * psi_d * psi_q
+    return i, (1 / e["L_d0_H"] + c * s * (s + 4 * psi_d ** 2), 1 / e["L_q0_H"] + c * s * (s + 4 * psi_q ** 2), cross)
+
+
+def flux(x, i_d, i_q):
+    """(psi_d, psi_q) of currents and (L_dh, L_qh, L_dqh) there: Newton, which a convex energy lets converge."""
+    psi_d, psi_q = float(x["electrical"]["psi_m_Wb"]), 0.0
+    for part in range(1, 41):  # step by step up to the current, each from the solution before
+        for _ in range(8):
+            (e_d, e_q), (a, b, cross) = current(x, psi_d, psi_q)
+            e_d, e_q = i_d * part / 40 - e_d, i_q * part / 40 - e_q
+            D = a * b - cross ** 2
+            psi_d, psi_q = psi_d + (b * e_d - cross * e_q) / D, psi_q + (a * e_q - cross * e_d) / D
+    a, b, cross = current(x, psi_d, psi_q)[1]
+    D = a * b - cross ** 2
+    return (psi_d, psi_q), (b / D, a / D, -cross / D)
+
+
+def inductances(x):
+    """L_d and L_q without current."""
+    return flux(x, 0.0, 0.0)[1][:2]
+
+
+def i_d_for(psi, L_d, L_q, i_q):
+    """Of most torque per ampere, as the drive has it."""
+    h = psi / (2 * (L_q - L_d)) if L_q > 1.01 * L_d else math.inf
+    return h - math.hypot(h, i_q) if h < math.inf else 0.0
+
+
+def saturation(x, told, L_d, L_q):
+    """What rated current makes of the inductances: by c_A_Wb5, by L_q_rated of `drive:`, or nothing."""
+    i, psi = float(x["rated"]["i_rated_A"]), float(x["electrical"]["psi_m_Wb"])
+    L_d, L_q = told.get("L_d", L_d), told.get("L_q", L_q)
+    if "L_q_rated" in told:
+        why = "parabola through L_q and L_q_rated, whose slope falls three times as fast"
+        L = {"L_qh_rated": max(4 * told["L_q_rated"] - 3 * L_q, 0.3 * told["L_q_rated"]), "L_dh_rated": L_d,
+             "L_q_rated": told["L_q_rated"], "L_dqh_rated": 0.0, "cross_half": 0.0}
+    elif float(x["electrical"].get("c_A_Wb5", 0.0)) > 0:
+        why = "by c_A_Wb5, at rated current and most torque per ampere"
+        (_, psi_q), (L_dh, L_qh, L_dqh) = flux(x, i_d_for(psi, L_d, L_q, i), i)
+        half = flux(x, i_d_for(psi, L_d, L_q, i / 2), i / 2)[1]
+        L = {"L_q_rated": psi_q / i, "L_dh_rated": L_dh, "L_qh_rated": L_qh, "L_dqh_rated": L_dqh, "cross_half": half[2] / half[1]}
+    else:
+        why = "no saturation is told: as without current"
+        L = {"L_q_rated": L_q, "L_dh_rated": L_d, "L_qh_rated": L_q, "L_dqh_rated": 0.0, "cross_half": 0.0}
+    return {name: (value, why) for name, value in L.items()}
+
+
+def drive(x, board, tolerance):
     """`drive:` as {name: (value, why)}, what is told above what is chosen."""
     def of(section, key):
         return float(x[section][key] if key in x[section] else board[section][key][0])
 
     told = {name: float(value) for name, value in x["drive"].items()}
-    L_d, L_q = of("electrical", "L_d0_H"), of("electrical", "L_q0_H")
+    L_d, L_q = inductances(x)
     machine = {
         "pole_pairs": (int(of("electrical", "pole_pairs")), "the motor's"),
         "R_s": (of("electrical", "R_s_ohm") + of("inverter", "r_on_ohm"), "winding and one switch"),
-        "L_d": (L_d, "the motor's"), "L_q": (L_q, "the motor's"), "psi_m": (of("electrical", "psi_m_Wb"), "the motor's"),
+        "L_d": (L_d, "the motor's"), "L_q": (L_q, "the motor's" if L_q >= L_d else BELOW),
+        "psi_m": (of("electrical", "psi_m_Wb"), "the motor's"),
         "i_rated": (of("rated", "i_rated_A"), "peak of a phase"),
-        "L_q_rated": (L_q, "no saturation is told: as without current"), "L_dh_rated": (L_d, "no saturation is told"),
-        "L_qh_rated": (L_q, "no saturation is told"), "L_dqh_rated": (0.0, "no saturation is told"),
-        "cross_half": (0.0, "no saturation is told"), "J": (of("mechanics", "J_kgm2"), "with what it turns"),
+        **saturation(x, told, L_d, L_q), "J": (of("mechanics", "J_kgm2"), "with what it turns"),
         "leg_capacitance": (of("inverter", "c_leg_F"), "the inverter's"),
         "speed_max": (1.25 * of("rated", "speed_rated_rad_s"), tune.WHY["speed_max"]),
     }
-    if L_q < L_d:
-        raise UsageError("L_q is below L_d: the drive takes such a machine for a round one",
-                         "tell both as their mean, (L_d + L_q) / 2")
     known = {name: told.get(name, value) for name, (value, _) in machine.items()}
     known.update(
         f_pwm=of("inverter", "f_pwm_Hz"), dead_time=of("inverter", "dead_time_s"), v_dc_nominal=of("rated", "v_dc_V"),
@@ -148,9 +205,19 @@ def drive(x, board):
         out[name] = value, tune.WHY[name]
         known[name] = told.get(name, value)
     out["offset_max"] = 0.03 * known["i_full_scale"], "3 % of the converter's range"
-    out.update((name, (value, tune.WHY[name])) for name, value in tune.values(known).items())
+    out.update((name, (value, tune.WHY[name])) for name, value in tune.values(known, tolerance=tolerance).items())
     out.update((name, (value, "told")) for name, value in told.items())
-    return out
+    return {name: stored(name, *reason) for name, reason in out.items()}
+
+
+def stored(name, value, why):
+    """As the drive keeps it: four digits in whole steps, within its range."""
+    if why == "told":
+        return value, why
+    entry = names.find(name)
+    raw = entry.raw(Decimal(repr(float(f"{value:.4g}"))))
+    within = min(max(raw, entry.least), entry.most)
+    return float(within * entry.scale), why if within == raw else why + ("; no less" if within > raw else "; no more") + " is stored"
 
 
 def plain(value):
@@ -161,10 +228,10 @@ def plain(value):
     return text if "e" not in text or "." in text.split("e")[0] else text.replace("e", ".0e")
 
 
-def text_of(x):
+def text_of(x, tolerance=tune.TOLD):
     """The whole machine file."""
     board = complete(x)
-    chosen = {**board, "drive": drive(x, board)}
+    chosen = {**board, "drive": drive(x, board, tolerance)}
     lines = [f"# {x['name']}: completed by tools/tune.py from what the motor's data are; `told` stood in the file.",
              f"name: {plain(x['name'])}"]
     for section in sorted(set(x) | set(chosen), key=lambda s: OTHERS.index(s) if s in OTHERS else len(OTHERS)):
@@ -190,9 +257,14 @@ def main():
     parser = argparse.ArgumentParser(description=description, epilog=rest, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("machine", help="file with the motor's values")
     parser.add_argument("-o", "--out", help="file to be written; not there yet")
+    parser.add_argument("--tolerance", type=float, default=tune.TOLD, metavar="SHARE",
+                        help="by which each of R, L_d, L_q, psi_m and J may be off: %(default)s as on a data sheet, "
+                             f"{tune.MEASURED} where they were measured; below it less saliency is enough for a start by pulses")
     arguments = parser.parse_args()
     try:
-        text = text_of(read(arguments.machine))
+        if not 0 <= arguments.tolerance <= 0.5:
+            raise UsageError(f"--tolerance {arguments.tolerance:g}: a share from 0 to 0.5")
+        text = text_of(read(arguments.machine), arguments.tolerance)
         if arguments.out is None:
             sys.stdout.write(text)
             return 0

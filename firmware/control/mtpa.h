@@ -2,7 +2,8 @@
  *
  *   h   = psi_m / (2 (L_q - L_d))
  *   i_d = h - sqrt(h^2 + i_q^2)
- * i_d = 0 when L_q - L_d is below a hundredth of L_q (the configuration then has h = 0). Runs at 1 kHz.
+ * i_d = 0 when L_q - L_d is below a hundredth of L_q (the configuration then has h = 0). With L_q below L_d, where a
+ * positive i_d would be best, that gives away ((L_d - L_q) i / psi_m)^2 / 2 of the torque. Runs at 1 kHz.
  * Tests: tests/unit/control/mtpa_test.cpp. */
 #ifndef CONTROL_MTPA_H
 #define CONTROL_MTPA_H

@@ -16,7 +16,7 @@ static bool fits(const maker_t *m, pm_num_t impedance, int32_t times)
 
 static void choose_voltage(maker_t *m, drive_config_t *config)
 {
-    static const char reason[] = "too large for this board: raise v_dc_min";
+    static const char reason[] = "too large for this board: raise v_dc_min, or lower speed_trip";
     const pm_num_t R = si(m, DRIVE_PARAM_R_s);
     const pm_num_t X = pm_num_mul(si(m, DRIVE_PARAM_L_q), m->base.omega);
     int32_t shift = 0;
@@ -150,18 +150,16 @@ static void check_ranges(maker_t *m)
     }
 }
 
-/* dL >= 0 is assumed by MTPA, injection and pulses; the incremental inductances must be those of a passive
- * machine. */
+/* Injection and pulses need L_q above L_d; with L_q below L_d the rest takes i_d = 0 for most torque per ampere
+ * (mtpa.h). The incremental inductances must be those of a passive machine. */
 static void check_machine(maker_t *m)
 {
     const drive_params_t *p = m->params;
     const int64_t D = (int64_t)p->L_dh_rated * p->L_qh_rated - (int64_t)p->L_dqh_rated * p->L_dqh_rated;
-    if (p->L_q < p->L_d) {
-        refuse(m, DRIVE_PARAM_L_q, "below L_d: inverse saliency is not supported");
-    } else if (D <= 0) {
+    if (D <= 0) {
         refuse(m, DRIVE_PARAM_L_dqh_rated, "larger than the incremental inductances allow");
-    } else if (p->start_method % 2 == 1 && p->L_q == p->L_d) {
-        refuse(m, DRIVE_PARAM_start_method, "injection needs L_q above L_d");
+    } else if (p->start_method % 2 == 1 && p->L_q <= p->L_d) {
+        refuse(m, DRIVE_PARAM_start_method, "injection needs L_q above L_d: take 0 or 2");
     }
 }
 

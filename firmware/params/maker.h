@@ -67,7 +67,7 @@ static inline int32_t fixed(maker_t *m, pm_num_t x, int bits, drive_param_id_t b
 {
     int32_t out;
     if (!pm_num_to_fixed(x, bits, &out)) {
-        refuse(m, blame, "beyond the fixed-point range with these bases");
+        refuse(m, blame, "beyond its format: full scales or speed_trip too far off");
     }
     return out;
 }

@@ -13,6 +13,7 @@ void add_board_command(Command &app);
 void add_plant_command(Command &app);
 void add_node_command(Command &app, int &exit_code);
 void add_params_command(Command &app);
+void add_tune_command(Command &app);
 void add_metrics_command(Command &app);
 void add_methods_command(Command &app);
 void add_bench_command(Command &app);

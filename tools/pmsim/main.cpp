@@ -17,6 +17,7 @@ int main(int argc, char **argv)
     pmsim::add_plant_command(app);
     pmsim::add_node_command(app, exit_code);
     pmsim::add_params_command(app);
+    pmsim::add_tune_command(app);
     pmsim::add_metrics_command(app);
     pmsim::add_methods_command(app);
     pmsim::add_bench_command(app);

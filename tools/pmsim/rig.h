@@ -51,6 +51,7 @@ typedef struct {
     double v_dc_hat_V;
     double weight, quality;
     bool settles; /* injection, on the position that the search has found */
+    bool dragged; /* align or open loop: the vector is imposed */
     bool driven;  /* any leg, in the output of this period */
     rig_identified_t identified;
 } rig_sample_t;

@@ -108,6 +108,7 @@ void rig_fill_sample(rig_scale_t *scale, const drive_t *drive, const drive_out_t
     sample->weight = (double)status->weight / PM_ONE;
     sample->quality = (double)status->quality / PM_ONE;
     sample->settles = status->state == DRIVE_FINDING && drive->stage == STAGE_VECTOR;
+    sample->dragged = drive->stage == STAGE_OPEN_LOOP;
     sample->driven = out->legs != PM_LEGS_OFF;
     sample->identified = identified(scale, &drive->commissioning_report);
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "tools/pmsim/machine_variables.h"
 #include "tools/pmsim/metrics.h"
 #include "tools/pmsim/text.h"
 
@@ -107,9 +108,18 @@ ScenarioFile::ScenarioFile(const Value &document, Settings settings)
     check_settings(settings_, known);
 }
 
+static std::string with_name(std::string title, const std::string &machine)
+{
+    const std::string variable = "$machine";
+    const size_t at = title.find(variable);
+    return at == std::string::npos ? title : title.replace(at, variable.size(), machine);
+}
+
 std::string ScenarioFile::title() const
 {
-    return open_scenario(document_).at("title").text();
+    const Map map = open_scenario(document_.with(&runs_.front().variables));
+    const std::string title = map.at("title").text();
+    return with_name(title, title.find('$') == std::string::npos ? "" : read_layers(map, settings_).name);
 }
 
 const std::vector<Run> &ScenarioFile::runs() const
@@ -135,15 +145,20 @@ void ScenarioFile::repeat(int seeds)
 
 Scenario ScenarioFile::scenario(const Run &run) const
 {
-    const Map map = open_scenario(document_.with(&run.variables));
+    Variables variables = run.variables;
+    const Setup machine = read_layers(open_scenario(document_.with(&variables)), settings_);
+    require_drive(machine);
+    for (const auto &[name, value] : machine_variables(machine)) {
+        variables.emplace(name, value);
+    }
+    const Map map = open_scenario(document_.with(&variables));
     const auto value_of = [&](const std::string &key) {
         const auto set = setting_value(settings_, key);
         return set ? set : map.find(key);
     };
     Scenario scenario;
-    scenario.title = map.at("title").text();
-    scenario.setup = read_layers(map, settings_);
-    require_drive(scenario.setup);
+    scenario.setup = machine;
+    scenario.title = with_name(map.at("title").text(), machine.name);
     fit_board(scenario.setup);
     if (run.seed) {
         scenario.seed = *run.seed;

@@ -59,10 +59,25 @@ const Column columns[] = {
 
 #undef PM_COLUMN
 
+// All that opposes the motion, on the rotor's side of an elastic shaft as on the other.
+double loads_Nm(const plant_mech_t &mech, double pole_pairs, const Sample &sample)
+{
+    const plant_truth_t &truth = sample.rig.truth;
+    const double w = truth.omega_mech_rad_s;
+    double sum = sample.load_Nm + (mech.load_Nms + mech.load_Nms2 * std::fabs(w)) * w + mech.B_Nms * w;
+    sum += w > 0.0 ? mech.T_coulomb_Nm : (w < 0.0 ? -mech.T_coulomb_Nm : 0.0);
+    for (const plant_harmonic_t &h : mech.load_angle) {
+        sum += h.order == 0 ? 0.0
+                            : h.amplitude * std::cos(h.order * truth.theta_e_rad / pole_pairs + h.phase_rad);
+    }
+    return sum;
+}
+
 } // namespace
 
 TraceWriter::TraceWriter(const std::string &path, const Scenario &scenario, uint64_t decimate)
-    : path_(path), file_(std::fopen(path.c_str(), "w")), decimate_(decimate)
+    : path_(path), mech_(scenario.setup.plant.mech), pole_pairs_(scenario.setup.plant.machine.pole_pairs),
+      file_(std::fopen(path.c_str(), "w")), decimate_(decimate)
 {
     if (!file_) {
         throw InputError(path + ": cannot be written");
@@ -73,7 +88,7 @@ TraceWriter::TraceWriter(const std::string &path, const Scenario &scenario, uint
     for (const Column &column : columns) {
         std::fprintf(file_.get(), "%s,", column.name);
     }
-    std::fputs("driven,state,fault\n", file_.get());
+    std::fputs("loads_Nm,open_loop,driven,state,fault\n", file_.get());
 }
 
 void TraceWriter::add(const Sample &sample)
@@ -87,7 +102,8 @@ void TraceWriter::add(const Sample &sample)
         const auto room = sizeof row - static_cast<size_t>(length);
         length += std::snprintf(row + length, room, "%.*g,", column.digits, column.value(sample));
     }
-    std::fprintf(file_.get(), "%s%d,%s,%s\n", row, sample.rig.driven ? 1 : 0,
+    std::fprintf(file_.get(), "%s%.5g,%d,%d,%s,%s\n", row, loads_Nm(mech_, pole_pairs_, sample),
+                 sample.rig.dragged ? 1 : 0, sample.rig.driven ? 1 : 0,
                  name_of(state_names(), sample.rig.state).c_str(),
                  name_of(fault_names(), sample.rig.fault).c_str());
 }

@@ -29,6 +29,8 @@ class TraceWriter
     };
 
     std::string path_;
+    plant_mech_t mech_;
+    double pole_pairs_;
     std::unique_ptr<std::FILE, Closer> file_;
     uint64_t decimate_, count_ = 0;
 };

@@ -131,8 +131,16 @@ const std::string &Value::variable(const std::string &name) const
     fail("there is no variable \"$" + name + "\"" + did_you_mean(nearest(name, known)));
 }
 
-// A product of numbers and variables, with an optional leading minus: "-0.5*$load".
+// A sum, its signs between spaces, of products of numbers and variables: "-0.5*$load + 2".
 double Value::evaluate(const std::string &text) const
+{
+    const size_t plus = text.rfind(" + ");
+    return plus == std::string::npos ? product(text)
+                                     : evaluate(text.substr(0, plus)) + product(trim(text.substr(plus + 3)));
+}
+
+// With an optional leading minus: "-0.5*$load".
+double Value::product(const std::string &text) const
 {
     double product = 1.0;
     std::string rest = text;

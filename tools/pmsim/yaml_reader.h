@@ -2,8 +2,8 @@
 //
 // A Value is a node with its place; a Map is a mapping whose keys are checked when it is opened: an unknown
 // or duplicate key, and one with the wrong unit, is refused before anything is read. Any scalar may contain
-// variables of the scenario ("$load"); numbers may be a product ("-0.5*$load"). Numbers carry no unit: the
-// unit stands in the key. Tests: tests/unit/pmsim/yaml_reader_test.cpp.
+// variables of the scenario ("$load"); numbers may be a product ("-0.5*$load") or a sum of products
+// ("2*$a + 3*$b"). Numbers carry no unit: the unit stands in the key. Tests: tests/unit/pmsim/yaml_reader_test.cpp.
 #ifndef PMSIM_YAML_READER_H
 #define PMSIM_YAML_READER_H
 
@@ -66,6 +66,7 @@ class Value
   private:
     std::string scalar() const;
     double evaluate(const std::string &text) const;
+    double product(const std::string &text) const;
     const std::string &variable(const std::string &name) const;
 
     YAML::Node node_;

@@ -87,7 +87,12 @@ struct Cross {
 };
 
 const std::vector<Cross> kCrosses = {
-    {"L_q below L_d", {{DRIVE_PARAM_L_d, 80e-3}}, DRIVE_PARAM_L_q},
+    {"pulses and injection with L_q below L_d",
+     {{DRIVE_PARAM_L_d, 80e-3}, {DRIVE_PARAM_start_method, 1}},
+     DRIVE_PARAM_start_method},
+    {"align and injection with L_q below L_d",
+     {{DRIVE_PARAM_L_d, 80e-3}, {DRIVE_PARAM_start_method, 3}},
+     DRIVE_PARAM_start_method},
     {"cross inductance of an active machine", {{DRIVE_PARAM_L_dqh_rated, -50e-3}}, DRIVE_PARAM_L_dqh_rated},
     {"injection without saliency",
      {{DRIVE_PARAM_L_d, 75e-3}, {DRIVE_PARAM_start_method, 1}},
@@ -300,10 +305,30 @@ TEST(Config, CrossCouplingIsThatOfTheTwoPointsGiven)
 TEST(Config, AnObserverForRoundMachinesRefusesSaliency)
 {
     drive_config_t c;
-    const drive_params_t params = changed({{DRIVE_PARAM_observer, OBSERVER_back_emf}});
-    const drive_result_t result = drive_configure(&c, &params, PM_CHANNELS);
-    EXPECT_FALSE(result.ok);
-    EXPECT_EQ(result.param, DRIVE_PARAM_observer);
+    for (const double L_d : {43e-3, 120e-3}) {
+        const drive_params_t params =
+            changed({{DRIVE_PARAM_observer, OBSERVER_back_emf}, {DRIVE_PARAM_L_d, L_d}});
+        const drive_result_t result = drive_configure(&c, &params, PM_CHANNELS);
+        EXPECT_FALSE(result.ok);
+        EXPECT_EQ(result.param, DRIVE_PARAM_observer);
+    }
+}
+
+// Flux-intensifying machines: both inductances where they stand in the equations, no i_d and no injection.
+TEST(Config, LqBelowLdIsAccepted)
+{
+    const drive_config_t c = configure(changed({{DRIVE_PARAM_L_d, 120e-3}}));
+    EXPECT_FALSE(c.injection);
+    EXPECT_EQ(c.start, SEQUENCE_align);
+    EXPECT_EQ(c.mtpa.h, 0);
+    EXPECT_GT(c.machine.L_d, c.machine.L_q);
+    for (int32_t observer = 0; observer < OBSERVER_COUNT; observer++) {
+        drive_params_t p = changed({{DRIVE_PARAM_L_d, 80e-3}});
+        p.observer = observer;
+        drive_config_t one = {};
+        const drive_result_t r = drive_configure(&one, &p, PM_CHANNELS);
+        EXPECT_TRUE(r.ok) << observer << ' ' << drive_param_table[r.param].name << ' ' << r.reason;
+    }
 }
 
 TEST(Config, TheParameterNamesEveryObserverOfTheList)
@@ -794,6 +819,64 @@ TEST(Config, GimbalsAreAccepted)
                 EXPECT_NEAR(std::ldexp(30 / 34.283 * 65536, c.protection.v_bits - 28), 30 / v, 1e-6);
             }
         }
+    }
+}
+
+// Of a motor with rated current at a third to a sixtieth of the channels: L_q + (L_q_rated - L_q) (i/i_rated)^2.
+TEST(Config, AnInductanceThatFallsToATenthIsHeldAtAnyScale)
+{
+    const double L_q = 75e-3, L_q_rated = 7.5e-3, L_base = 450.0 / (180 * 3) / 10;
+    for (const double i_rated : {3.3, 1.0, 0.33, 0.17}) {
+        const drive_config_t c = configure(changed({{DRIVE_PARAM_L_q_rated, L_q_rated},
+                                                    {DRIVE_PARAM_L_dh_rated, 10e-3},
+                                                    {DRIVE_PARAM_L_qh_rated, 5e-3},
+                                                    {DRIVE_PARAM_L_dqh_rated, 0},
+                                                    {DRIVE_PARAM_cross_half, 0},
+                                                    {DRIVE_PARAM_start_method, 2},
+                                                    {DRIVE_PARAM_i_rated, i_rated},
+                                                    {DRIVE_PARAM_i_max, 1.25 * i_rated},
+                                                    {DRIVE_PARAM_i_fw_max, 0},
+                                                    {DRIVE_PARAM_i_open_loop, 0.8 * i_rated},
+                                                    {DRIVE_PARAM_i_pulse, i_rated}}));
+        const observer_model_t &model = c.position.observer.active_flux.model;
+        for (const double share : {0.0, 0.25, -0.5, 1.0, -1.0}) {
+            const pm_dq_t i = {0, bench::fixed(share * i_rated / 10, 28)};
+            EXPECT_NEAR(bench::real(observer_L_q(&model, i)) * L_base,
+                        L_q + (L_q_rated - L_q) * share * share, 0.002 * L_q)
+                << i_rated << ' ' << share;
+        }
+        for (const double share : {1.2, 1.5, 3.0}) { // never through zero
+            const pm_dq_t i = {0, bench::fixed(std::min(share * i_rated / 10, 1.9), 28)};
+            EXPECT_NEAR(bench::real(observer_L_q(&model, i)) * L_base, L_q / 16, 1e-6) << i_rated;
+        }
+    }
+}
+
+TEST(Config, AWindingFasterThanThePeriodNamesTheRemedy)
+{
+    const drive_params_t p =
+        changed({{DRIVE_PARAM_R_s, 100}, {DRIVE_PARAM_L_d, 9e-3}, {DRIVE_PARAM_start_method, 2}});
+    drive_config_t c = {};
+    const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
+    EXPECT_FALSE(r.ok);
+    EXPECT_EQ(r.param, DRIVE_PARAM_f_pwm);
+    EXPECT_NE(std::string(r.reason).find("raise it"), std::string::npos);
+}
+
+// What only methods that are off would use refuses nothing.
+TEST(Config, ASlowMachineIsRefusedOnlyByTheMethodThatCannotHoldIt)
+{
+    const Changes slow = {
+        {DRIVE_PARAM_i_full_scale, 20}, {DRIVE_PARAM_speed_trip, 12},        {DRIVE_PARAM_speed_max, 10},
+        {DRIVE_PARAM_speed_low, 2},     {DRIVE_PARAM_speed_high, 4},         {DRIVE_PARAM_L_d, 1},
+        {DRIVE_PARAM_L_q, 1},           {DRIVE_PARAM_L_q_rated, 1},          {DRIVE_PARAM_L_dh_rated, 1},
+        {DRIVE_PARAM_L_qh_rated, 1},    {DRIVE_PARAM_current_bandwidth, 50}, {DRIVE_PARAM_start_method, 2}};
+    for (const int32_t estimate : {SPEED_LOOP, SPEED_DIFFERENCE, SPEED_EMF_RATIO}) {
+        drive_params_t p = changed(slow);
+        p.speed_estimator = estimate;
+        drive_config_t c = {};
+        const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
+        EXPECT_EQ(r.ok, estimate != SPEED_EMF_RATIO) << estimate << ' ' << drive_param_table[r.param].name;
     }
 }
 

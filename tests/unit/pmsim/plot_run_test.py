@@ -8,7 +8,7 @@ import tempfile
 
 SCRIPT = "tools/plot_run.py"
 COLUMNS = ("t_s", "angle_error_deg", "omega_mech_rad_s", "omega_hat_mech_rad_s", "omega_ref_mech_rad_s", "ia_A",
-           "ib_A", "ic_A", "id_A", "iq_A", "torque_Nm", "load_Nm", "weight", "state", "fault")
+           "ib_A", "ic_A", "id_A", "iq_A", "torque_Nm", "load_Nm", "v_dc_V", "loads_Nm", "open_loop", "weight", "state", "fault")
 
 
 def write_trace(folder, rows):
@@ -27,10 +27,31 @@ def run(*arguments):
     return subprocess.run([sys.executable, SCRIPT, *map(str, arguments)], capture_output=True, text=True, check=False)
 
 
+def check_marks(folder):
+    """The open loop is shaded, a fault marked with its name, link and all loads drawn; an older trace has neither."""
+    sys.path.insert(0, "tools")
+    import plot_run
+
+    write_trace(folder, 1000)
+    run_data = plot_run.read_trace(folder / "trace.csv")
+    figure = plot_run.plot(run_data, "A title")
+    axes = figure.axes
+    assert "Link (V)" in [axis.get_ylabel() for axis in axes]
+    assert "STALL" in [text.get_text() for text in axes[0].texts]
+    assert all(any(line.get_color() == plot_run.RED and list(line.get_xdata()) == [0.9, 0.9] for line in axis.lines) for axis in axes)
+    assert "open loop" in [text.get_text() for text in axes[1].get_legend().get_texts()]
+    assert "all loads" in [text.get_text() for text in axes[3].get_legend().get_texts()]
+    for name in ("open_loop", "loads_Nm"):
+        del run_data[name]
+    legend = plot_run.plot(run_data, "").axes[1].get_legend()
+    assert "open loop" not in [text.get_text() for text in legend.get_texts()]
+
+
 def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         assert run(folder).returncode != 0, "there is no trace yet"
+        check_marks(folder)
         for rows in (1, 1000):
             write_trace(folder, rows)
             (folder / "summary.txt").write_text("A title\nPASS x\n")

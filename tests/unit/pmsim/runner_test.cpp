@@ -89,7 +89,7 @@ TEST(Runner, TraceHasARowEveryNthPeriodAndAllItsColumns)
     std::string header, line;
     std::getline(lines, header);
     EXPECT_THAT(header, StartsWith("t_s,theta_e_rad,theta_hat_rad,angle_error_deg,"));
-    EXPECT_THAT(header, HasSubstr(",weight,quality,limits,driven,state,fault"));
+    EXPECT_THAT(header, HasSubstr(",weight,quality,limits,loads_Nm,open_loop,driven,state,fault"));
     int rows = 0;
     while (std::getline(lines, line)) {
         ++rows;

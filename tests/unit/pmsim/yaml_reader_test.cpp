@@ -130,6 +130,10 @@ TEST(YamlReader, VariablesAndProducts)
     EXPECT_EQ(number("-$load", variables), -0.5);
     EXPECT_EQ(number("4.0*$load*$direction", variables), -2.0);
     EXPECT_EQ(number("$direction * 3", variables), -3.0);
+    EXPECT_EQ(number("12*$load + 180*$direction + 0.5", variables), -173.5);
+    EXPECT_EQ(number("1e+2", variables), 100.0);
+    EXPECT_THAT(error_of([&] { number("2 + ", variables); }), HasSubstr("expected a number"));
+    EXPECT_THAT(error_of([&] { number("2 + $word", variables); }), HasSubstr("$word is \"abc\""));
     EXPECT_EQ(error_of([&] { number("$laod", variables); }),
               "f.yaml:1:4: there is no variable \"$laod\"; did you mean \"load\"?");
     EXPECT_EQ(

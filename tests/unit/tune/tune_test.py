@@ -2,6 +2,8 @@
 
 usage: tune_test.py PMSIM
 """
+import math
+import random
 import subprocess
 import sys
 import tempfile
@@ -18,19 +20,30 @@ PMSIM = None
 # Name: R_s, L_d, L_q, psi_m, pole pairs, J, rated current, speed, link
 MOTORS = {
     "hub motor": (0.11, 0.18e-3, 0.2e-3, 0.022, 15, 0.02, 20, 40, 36),
+    "gimbal": (8.0, 3e-3, 3e-3, 14.3e-3, 11, 3e-5, 1.0, 30, 24),
     "2212 drone motor": (0.1, 20e-6, 20e-6, 1.2e-3, 7, 12e-6, 10, 700, 12),
+    "scooter": (0.05, 0.11e-3, 0.13e-3, 0.02, 15, 0.06, 35, 70, 48),
+    "e-bike, mid drive": (0.06, 80e-6, 100e-6, 8e-3, 8, 2e-4, 25, 250, 36),
+    "NEMA-23": (0.4, 0.5e-3, 0.5e-3, 8.2e-3, 4, 1.73e-5, 9, 419, 36),
+    "48 V pump": (0.04, 60e-6, 75e-6, 6e-3, 5, 4e-5, 14, 628, 48),
+    "60,000 r/min spindle": (0.3, 0.8e-3, 0.8e-3, 0.02, 1, 2e-5, 6, 6283, 310),
+    "near round": (0.8, 5e-3, 5.35e-3, 0.1, 3, 6e-4, 8, 314, 310),
+    "inverse saliency": (0.9, 7e-3, 5e-3, 0.12, 3, 8e-4, 7, 260, 310),
+    "PM-SyRM, saturated": (0.6, 10e-3, 60e-3, 0.15, 2, 4e-3, 10, 157, 310),
     "servo": (1.2, 4e-3, 4.4e-3, 0.06, 4, 1e-4, 4, 314, 160),
     "compressor": (0.35, 6e-3, 11e-3, 0.09, 3, 8e-4, 12, 377, 310),
     "traction, linear": (0.02, 0.2e-3, 0.6e-3, 0.08, 4, 0.05, 150, 300, 350),
     "washer, direct drive": (3.0, 16e-3, 18e-3, 0.09, 24, 0.05, 3, 30, 310),
 }
+C_A_WB5 = {"PM-SyRM, saturated": 1316}  # L_q at rated current is 0.55 of that without
 
 
 def motor(name):
     R, L_d, L_q, psi, poles, J, i, speed, v = MOTORS[name]
     return {
         "name": name,
-        "electrical": {"R_s_ohm": R, "L_d0_H": L_d, "L_q0_H": L_q, "psi_m_Wb": psi, "pole_pairs": poles},
+        "electrical": {"R_s_ohm": R, "L_d0_H": L_d, "L_q0_H": L_q, "psi_m_Wb": psi, "pole_pairs": poles,
+                       **({"c_A_Wb5": C_A_WB5[name]} if name in C_A_WB5 else {})},
         "mechanics": {"J_kgm2": J},
         "rated": {"i_rated_A": i, "speed_rated_rad_s": speed, "v_dc_V": v},
     }
@@ -73,11 +86,98 @@ class Tune(unittest.TestCase):
 
     def test_what_cannot_be_is_said(self):
         told = motor("servo")
-        told["electrical"]["L_q0_H"] = 3e-3
-        self.refused(told, "L_q is below L_d", "mean")
-        told = motor("servo")
         told["sensor"] = {"i_full_scale_A": 5}
         self.refused(told, "cannot measure")
+
+    def drive(self, told, *words):
+        return yaml.safe_load(self.tune(told, *words).stdout)["drive"]
+
+    def test_saliency_that_the_tolerance_could_undo_is_not_relied_on(self):
+        self.assertEqual(self.drive(motor("compressor"))["start_method"], 0)
+        self.assertEqual(self.drive(motor("servo"))["start_method"], 2)
+        self.assertEqual(self.drive(motor("servo"), "--tolerance", "0.02")["start_method"], 0)
+        self.assertEqual(self.drive(motor("near round"), "--tolerance", "0.1")["start_method"], 2)
+        self.assertIn("below L_d", self.tune(motor("inverse saliency")).stdout)
+        self.assertEqual(self.tune(motor("servo"), "--tolerance", "2").returncode, 2)
+
+    def test_saturation_is_that_of_the_energy_form(self):
+        """IPM-1000's file has the same values from elsewhere."""
+        machine = yaml.safe_load((ROOT / "sim_plant" / "machines" / "ipm_1000.yaml").read_text(encoding="utf-8"))
+        known = machine.pop("drive")
+        found = self.drive(machine)
+        for name in ("L_d", "L_q", "L_q_rated", "L_dh_rated", "L_qh_rated", "L_dqh_rated", "cross_half"):
+            self.assertAlmostEqual(found[name] / known[name], 1, delta=0.002, msg=name)
+
+    def test_saturation_that_is_told_gives_the_rest(self):
+        told = motor("compressor")
+        told["drive"] = {"L_q_rated": 10e-3}
+        found = self.drive(told)
+        self.assertAlmostEqual(found["L_qh_rated"], 4 * 10e-3 - 3 * 11e-3)
+        self.assertEqual(found["flux_gain"], 0.5)
+        self.assertLess(found["current_bandwidth"], 10e3 / 10 * 0.65)  # what is left of L_q, 0.64
+
+    def test_a_vector_turns_no_rotor_away(self):
+        """psi_m i - (L_q - L_d) i^2, its stiffness, is positive and falls beyond psi_m / (2 (L_q - L_d))."""
+        told = motor("PM-SyRM, saturated")
+        found = self.drive(told)
+        self.assertAlmostEqual(found["i_open_loop"], 0.15 / (2 * (found["L_q"] - found["L_d"])), places=2)
+
+    def test_the_emf_at_the_hand_over_is_above_what_is_not_known(self):
+        for name in MOTORS:
+            tuned = yaml.safe_load(self.tune(motor(name)).stdout)
+            d, b, rated = tuned["drive"], tuned["inverter"], tuned["rated"]
+            if d["start_method"] == 2 and d["speed_high"] < 0.39 * rated["speed_rated_rad_s"]:
+                lost = b["v_switch_V"] + b["dead_time_s"] * b["f_pwm_Hz"] * rated["v_dc_V"]
+                emf = d["speed_high"] * d["pole_pairs"] * d["psi_m"]
+                self.assertGreater(1.001 * emf, lost + 0.5 * d["R_s"] * d["i_open_loop"], name)
+
+    def test_small_currents_are_whole_steps(self):
+        told = motor("gimbal")
+        told["rated"]["i_rated_A"] = 0.4
+        for name, value in self.drive(told).items():
+            if name in ("comp_zone", "i_d_light", "i_open_loop"):
+                self.assertAlmostEqual(1000 * value, round(1000 * value), places=6, msg=name)
+
+    def test_five_decades_are_accepted_by_the_drive(self):
+        """R_s from milliohms to 100 ohm, L from microhenries up; with and without saturation to a tenth; a board of the motor's
+        own and the drive board, whose channels are 60 A and 34 V."""
+        draw = random.Random(5)
+
+        def log(least, most):
+            return math.exp(draw.uniform(math.log(least), math.log(most)))
+
+        seen = []
+        for n in range(60):
+            own = n % 2 == 0
+            v, i = (log(12, 800), log(0.1, 600)) if own else (log(12, 24), log(0.5, 24))
+            poles, omega = draw.choice((1, 2, 4, 7, 15, 28)), log(60, 6000)
+            phase = v / math.sqrt(3)
+            R, L_q = phase * log(0.002, 0.2) / i, phase * log(0.03, 0.6) / omega / i
+            psi, L_d = phase * log(0.4, 0.9) / omega, L_q * log(0.3, 1.5)
+            J = 1.5 * poles * psi * i / (omega / poles) * log(0.003, 0.3)
+            told = {
+                "name": f"draw {n}",
+                "electrical": {"R_s_ohm": R, "L_d0_H": L_d, "L_q0_H": L_q, "psi_m_Wb": psi, "pole_pairs": poles},
+                "mechanics": {"J_kgm2": min(J, 900)},
+                "rated": {"i_rated_A": i, "speed_rated_rad_s": omega / poles, "v_dc_V": v},
+            }
+            if n % 4 < 2:
+                told["drive"] = {"L_q_rated": max(0.1 * L_q, 1e-6)}
+            if not own:
+                told["sensor"] = {"i_full_scale_A": 60.16, "v_full_scale_V": 34.28}
+            tuned, page = Path(self.folder.name) / f"{n}.yaml", Path(self.folder.name) / f"{n}.bin"
+            tuned.write_text(self.tune(told).stdout, encoding="utf-8")
+            result = subprocess.run([PMSIM, "params", "--machine", str(tuned), "--page", str(page)], capture_output=True, text=True,
+                                    check=False)
+            with self.subTest(told=told):
+                if result.returncode and not own:  # what a board for 34 V and 60 A has no format for is said with the remedy
+                    self.assertIn("raise v_dc_min", result.stderr)
+                    continue
+                self.assertEqual(result.returncode, 0, result.stderr)
+                seen += [R, L_q]
+        self.assertGreater(len(seen), 2 * 54)
+        self.assertGreater(max(seen[0::2]) / min(seen[0::2]), 1e4)
+        self.assertGreater(max(seen[1::2]) / min(seen[1::2]), 1e4)
 
     def test_what_is_told_stands(self):
         told = motor("servo")
@@ -111,6 +211,14 @@ class Tune(unittest.TestCase):
         once = yaml.safe_load(self.tune(motor("compressor")).stdout)
         twice = yaml.safe_load(self.tune(once).stdout)
         self.assertEqual(once, twice)
+
+    def test_it_is_a_command_of_pmsim(self):
+        self.told.write_text(yaml.safe_dump(motor("servo")), encoding="utf-8")
+        result = subprocess.run([PMSIM, "tune", str(self.told), "--tolerance", "0.02"], capture_output=True, text=True, check=False)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(result.stdout, self.tune(motor("servo"), "--tolerance", "0.02").stdout)
+        result = subprocess.run([PMSIM, "tune", "--help"], capture_output=True, text=True, check=False)
+        self.assertIn("--tolerance", result.stdout)
 
     def test_motors_of_many_kinds_start(self):
         for name in MOTORS:

@@ -6,11 +6,16 @@ import math
 
 from .errors import UsageError
 
-BOARD = ("f_pwm", "i_full_scale", "i_noise", "dead_time", "device_drop")
-MACHINE = ("pole_pairs", "i_rated", "i_max", "speed_max", "v_dc_nominal", "R_s", "L_d", "L_q", "L_q_rated", "psi_m", "J")
+BOARD = ("f_pwm", "i_full_scale", "v_full_scale", "i_noise", "dead_time", "device_drop")
+MACHINE = ("pole_pairs", "i_rated", "i_max", "speed_max", "v_dc_nominal", "v_dc_min", "R_s", "L_d", "L_q", "L_q_rated",
+           "L_qh_rated", "psi_m", "J")
 SALIENT = 0.05  # the drive's own limit for injection
+MEASURED = 0.02 # of R, L_d, L_q, psi_m and J: what identification is off by
+TOLD = 0.15     # what a data sheet is
 STEPS = 4096    # of the converter
 INJECTION_HZ = 25.0  # of the position by injection: slow enough for the noise of the smallest answer that leads
+LAG = 0.12           # rad that the estimate may be behind an acceleration
+SPEED_MOST = 0.4     # of rated speed: hand-over of a machine whose EMF is small at any speed
 
 # Why each value is what it is, in a line.
 WHY = {
@@ -18,40 +23,106 @@ WHY = {
     "i_trip": "2.25 times rated, at most 90 % of the converter's range",
     "speed_max": "1.25 times rated",
     "speed_trip": "1.2 times speed_max",
-    "v_dc_min": "30 % of the link, and 7 % of the converter's range",
+    "v_dc_min": "30 % of the link, and 7 % of the converter's range; more where R or L is far above what the board is made for",
     "v_dc_derate": "127 % of the link",
     "v_dc_max": "133 % of the link, at most 96 % of the converter's range",
-    "current_bandwidth": "a twentieth of f_pwm, at most 1500 Hz",
+    "current_bandwidth": "a twentieth of f_pwm, a tenth with what saturation leaves of L_q; at most 1500 Hz, and what the link "
+                         "drives a tenth of rated current with",
     "injection_bandwidth": "slow enough for the noise of the smallest answer that leads",
-    "speed_bandwidth": "six times rated torque over the inertia at rated speed; below the position's loop",
-    "acceleration": "0.3 of rated torque, at most what the position's loop follows 0.12 rad behind",
+    "speed_bandwidth": "six times rated torque over the inertia at rated speed; below the position's loop, also with what "
+                       "saliency adds to the torque",
+    "acceleration": "0.3 of rated torque, over what saliency adds to it; at most what the slower position loop "
+                    "follows 0.12 rad behind",
     "flux_bandwidth": "follows 0.8 of rated torque within a radian",
     "flux_gain": "half where the machine saturates; damping costs nothing where it does not",
-    "speed_low": "15 % of rated speed with injection, 4 % without",
-    "speed_high": "27 % of rated speed with injection, 8 % without",
+    "speed_low": "with injection 15 % of rated speed; without 4 %, and half of speed_high",
+    "speed_high": "with injection 27 % of rated speed; without 8 %, and an EMF above what a leg loses and R i is off by",
     "i_d_light": "a tenth of rated: light load stays out of what dead time does to small currents",
     "i_fw_max": "half of rated",
     "comp_zone": "a dozen steps of the converter",
     "v_injection": "seven steps of the converter as an answer, 14 times what a leg loses; as the link leaves room",
     "i_pulse": "rated current, which saturates",
-    "start_method": "0: pulses and injection, as the saliency is seen; 2: align and open loop, as it is not",
-    "i_open_loop": "0.8 of rated: bears half the rated torque 39 degrees behind",
+    "start_method": "0: pulses and injection, as the saliency is sure and seen; 2: align and open loop, as it is not",
+    "i_open_loop": "0.8 of rated, bears half the rated torque 39 degrees behind; at most psi_m/(2 (L_q - L_d)), or saliency "
+                   "turns the rotor away",
     "t_align": "half a second",
     "open_loop_acceleration": "a twentieth of rated torque; hands over within 0.6 s where that allows it",
 }
 
 
-def _injection(x):
+def _lost(x):
+    """What a leg loses by dead time and drops, V."""
+    return x["device_drop"] + x["dead_time"] * x["f_pwm"] * x["v_dc_nominal"]
+
+
+def _injection(x, tolerance):
     """Seven steps of the converter as an answer 45 degrees off, and fourteen times what a leg loses, which at light load
     comes and goes with the carrier; as far as the link leaves room. And whether it may lead."""
     step, dL = 2 * x["i_full_scale"] / STEPS, x["L_q"] - x["L_d"]
     top = 0.57 * x["v_dc_nominal"] / math.sqrt(3)
-    if dL <= SALIENT * x["L_q"]:
+    if dL <= max(SALIENT, 2 * tolerance / (1 + tolerance)) * x["L_q"]:  # both may be off, either way
         return 0.2 * top, False
-    lost = x["device_drop"] + x["dead_time"] * x["f_pwm"] * x["v_dc_nominal"]
-    v = max(7 * step * 2 * x["L_d"] * x["L_q"] * x["f_pwm"] / dL, 14 * lost)
+    v = max(7 * step * 2 * x["L_d"] * x["L_q"] * x["f_pwm"] / dL, 14 * _lost(x))
     answer = min(v, top) * dL / (2 * x["L_d"] * x["L_q"] * x["f_pwm"])
     return min(v, top), answer > max(4 * x["i_noise"], 2 * step)
+
+
+def _open_loop(x):
+    """Current of the vector. Its stiffness is psi_m i - (L_q - L_d) i^2, at its most for psi_m / (2 (L_q - L_d))."""
+    i, dL = 0.8 * x["i_rated"], x["L_q"] - x["L_d"]
+    return min(i, x["psi_m"] / (2 * dL)) if dL > 0 else i
+
+
+def _reach(x):
+    """Bandwidth at which a step of a tenth of rated current asks for the whole link, and whose gain the drive's format has, Hz."""
+    L = max(x["L_d"], x["L_q"])
+    step = 10 * x["v_dc_nominal"] / math.sqrt(3) / x["i_rated"]
+    gain = 30 * x["v_full_scale"] / x["i_full_scale"] * 2 ** _doublings(x, x["v_dc_min"])
+    return min(step, gain) / (2 * math.pi * L)
+
+
+def _times(x):
+    """By what R, or X at speed_trip, is beyond 4 v_full_scale / i_full_scale, the drive's format with a margin of 5 %."""
+    X = x["L_q"] * 1.2 * x["speed_max"] * x["pole_pairs"]
+    return max(x["R_s"], X) * 1.05 * x["i_full_scale"] / (4 * x["v_full_scale"])
+
+
+def _doublings(x, v_dc_min):
+    """Of the format's voltage by the drive: as many as R and X need and v_dc_min, an eighth of it, allows."""
+    n = 0
+    while _times(x) > 2 ** n and v_dc_min >= 0.125 * x["v_full_scale"] * 2 ** n:
+        n += 1
+    return n
+
+
+def _v_dc_min(x):
+    """As low as the link may be for the impedance to be in the format, where 0.7 of it is enough for that."""
+    v = max(0.3 * x["v_dc_nominal"], 0.07 * x["v_full_scale"])
+    for n in range(4):
+        more = 0.126 * x["v_full_scale"] * 2 ** n
+        if "L_q" in x and _times(x) > 2 ** n and more < 0.7 * x["v_dc_nominal"]:
+            v = max(v, more)
+    return v
+
+
+def _reluctance(x):
+    """What most torque per ampere makes of psi_m at rated current: the speed control knows psi_m alone."""
+    dL = x["L_q_rated"] - x["L_d"]
+    if dL <= 0:
+        return 1.0
+    h = x["psi_m"] / (2 * (x["L_q"] - x["L_d"]))  # as the drive has it
+    return 1 + dL * (math.hypot(h, x["i_rated"]) - h) / x["psi_m"]
+
+
+def _hand_over(x, i_open, leads, tolerance):
+    """speed_low and speed_high. Without injection the EMF must stand out from what R and dead time are not known to:
+    an error of R by the tolerance turns the estimate by 0.3 rad at most."""
+    rated = 0.8 * x["speed_max"]
+    if leads:
+        return 0.15 * rated, 0.27 * rated
+    seen = (_lost(x) + tolerance / 0.3 * x["R_s"] * i_open) / (x["psi_m"] * x["pole_pairs"])
+    high = min(max(0.08 * rated, seen), SPEED_MOST * rated)
+    return max(0.04 * rated, 0.5 * high), high
 
 
 def limits(x):
@@ -63,42 +134,46 @@ def limits(x):
                          f"its channels reach {i_scale:g} A and {v_scale:g} V")
     return {
         "i_max": 1.25 * current, "i_trip": min(2.25 * current, 0.9 * i_scale), "speed_trip": 1.2 * speed,
-        "v_dc_min": max(0.3 * link, 0.07 * v_scale), "v_dc_derate": min(1.27 * link, 0.93 * v_scale),
+        "v_dc_min": _v_dc_min(x), "v_dc_derate": min(1.27 * link, 0.93 * v_scale),
         "v_dc_max": min(1.33 * link, 0.96 * v_scale),
     }
 
 
-def values(x, bandwidth=None):
-    """{name: SI value} from {name: SI value} of BOARD and MACHINE. Bandwidth of the current control in Hz."""
+def values(x, bandwidth=None, tolerance=MEASURED):
+    """{name: SI value} from {name: SI value} of BOARD and MACHINE. Bandwidth of the current control in Hz; tolerance: by
+    what share of itself each of R, L_d, L_q, psi_m and J may be off."""
     highest = x["f_pwm"] / 10
     if bandwidth is not None and not 10 <= bandwidth <= highest:
         raise UsageError(f"{bandwidth:g} Hz is no bandwidth for the current", f"10 to {highest:g} Hz, a tenth of f_pwm")
     rated_speed = 0.8 * x["speed_max"]
     torque = 1.5 * x["pole_pairs"] * x["psi_m"] * x["i_rated"]
     jerk = torque / x["J"]  # rad/s2 at rated torque
-    v_injection, leads = _injection(x)
+    v_injection, leads = _injection(x, tolerance)
     position_Hz = min(max(math.sqrt(0.8 * jerk * x["pole_pairs"]) / (2 * math.pi), 25.0), 60.0)
-    lag = 0.12 * (2 * math.pi * position_Hz) ** 2 / x["pole_pairs"]  # acceleration for 0.12 rad behind
+    slower = min(position_Hz, INJECTION_HZ) if leads else position_Hz
+    behind = LAG * (2 * math.pi * slower) ** 2 / x["pole_pairs"]
     ripple = x["v_dc_nominal"] / (x["L_d"] * x["f_pwm"])  # of the current by the pulses: light load must be beyond it
-    low, high = (0.15, 0.27) if leads else (0.04, 0.08)
+    i_open = _open_loop(x)
+    low, high = _hand_over(x, i_open, leads, tolerance)
     return {
-        "current_bandwidth": bandwidth or min(x["f_pwm"] / 20, 1500.0),
+        "current_bandwidth": bandwidth or min(x["f_pwm"] / 20, highest * x["L_qh_rated"] / x["L_q"], 1500.0, _reach(x)),
         "injection_bandwidth": INJECTION_HZ,
-        "speed_bandwidth": min(max(6 * jerk / rated_speed / (2 * math.pi), 2.0), INJECTION_HZ / 3.5 if leads else 10.0),
-        "acceleration": min(0.3 * jerk, lag),
+        "speed_bandwidth": min(max(6 * jerk / rated_speed / (2 * math.pi), 2.0),
+                               INJECTION_HZ / 3.5 / _reluctance(x) if leads else 10.0),
+        "acceleration": min(0.3 * jerk / _reluctance(x), behind),
         "flux_bandwidth": position_Hz,
         "flux_gain": 0.5 if x["L_q_rated"] < 0.985 * x["L_q"] else 1.0,
-        "speed_low": low * rated_speed,
-        "speed_high": high * rated_speed,
+        "speed_low": low,
+        "speed_high": high,
         "i_d_light": min(max(0.1 * x["i_rated"], 0.05 * ripple), 0.2 * x["i_rated"]),
         "i_fw_max": 0.5 * x["i_rated"],
         "comp_zone": 12 * 2 * x["i_full_scale"] / STEPS,
         "v_injection": v_injection,
         "i_pulse": x["i_rated"],
         "start_method": 0 if leads else 2,
-        "i_open_loop": 0.8 * x["i_rated"],  # the vector bears half the rated torque 39 degrees behind
+        "i_open_loop": i_open,
         "t_align": 0.5,
-        "open_loop_acceleration": min(0.05 * jerk, high * rated_speed / 0.6),
+        "open_loop_acceleration": min(0.05 * jerk, high / 0.6),
     }
 
 
