@@ -12,14 +12,14 @@ void four_pulses_reset(four_pulses_t *self)
     *self = (four_pulses_t){0};
 }
 
-/* That whose two poles are nearest: within 30 degrees of the axis, or of its opposite. */
+/* That whose two poles are nearest: within 30 degrees of the axis, or of its opposite; 2 theta is then within 60 of twice
+ * the axis: 0, 240 for the second, 120 for the third. No arctangent: it is within a period of control. */
 static uint16_t nearest(pm_ab_t y)
 {
-    const pm_angle_t theta = pm_atan2(y.beta, y.alpha) / 2U; /* 0 ... 180 degrees */
-    if (theta < PM_TURN(1.0 / 12) || theta >= PM_TURN(5.0 / 12)) {
-        return 0; /* 0 and 180 */
+    if (pm_mul(PM_Q(1.7320508), y.alpha) >= pm_abs(y.beta)) {
+        return 0;
     }
-    return theta < PM_TURN(1.0 / 4) ? 2U : 1U; /* 60 is the opposite of 240, 120 */
+    return y.beta > 0 ? 2U : 1U;
 }
 
 pm_procedure_t four_pulses_step(four_pulses_t *self, const pulses_config_t *config, pm_abc_t i,

@@ -13,14 +13,6 @@
 
 const pm_angle_t pulses_axis[PULSES_AXES] = {0, 1431655765U, 2863311531U}; /* 0, 120, 240 degrees */
 
-static void apply(const pulses_config_t *config, uint32_t axis, bool reverse, pulses_out_t *out)
-{
-    for (uint32_t k = 0; k < PULSES_AXES; k++) {
-        out->duty[k] = ((k == axis) != reverse) ? config->duty : 0;
-    }
-    out->driven = true;
-}
-
 static bool is_zero(const pulses_config_t *config, pm_abc_t i)
 {
     return pm_abs(i.a) < config->i_zero && pm_abs(i.b) < config->i_zero && pm_abs(i.c) < config->i_zero;
@@ -32,7 +24,7 @@ static pm_procedure_t drive_pulse(pulses_t *self, const pulses_config_t *config,
                                   pm_abc_t i, pulses_out_t *out)
 {
     if (self->timer <= config->periods) {
-        apply(config, axis, reverse, out);
+        pulses_apply(out, axis, reverse, config->duty);
     } else if (self->timer > config->periods + 1U) {
         if (is_zero(config, i)) {
             return PM_FAILED_TIMEOUT; /* nothing connected */

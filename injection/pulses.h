@@ -78,6 +78,15 @@ static inline pm_q_t pulses_leg(const pm_abc_t *i, uint32_t leg)
 
 extern const pm_angle_t pulses_axis[PULSES_AXES];
 
+/* A period of the pulse along `axis`. */
+static inline void pulses_apply(pulses_out_t *out, uint32_t axis, bool reverse, pm_q_t duty)
+{
+    for (uint32_t k = 0; k < PULSES_AXES; k++) {
+        out->duty[k] = ((k == axis) != reverse) ? duty : 0;
+    }
+    out->driven = true;
+}
+
 /* One period of the pulse along `axis`. PM_DONE: it is over, self->i are its currents and the next step begins
  * another; PM_FAILED_TIMEOUT: the current did not rise or fall in time. */
 pm_procedure_t pulses_step(pulses_t *self, const pulses_config_t *config, uint32_t axis, bool reverse,

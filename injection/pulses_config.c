@@ -1,12 +1,13 @@
-#include "firmware/params/maker.h"
+#include "injection/pulse_choice.h"
 #include "injection/pulses.h"
 
-/* Flux that gives i_pulse along the d-axis, by whole periods at a duty at which the currents are seen. */
+/* Flux that gives the pulse current along the d-axis, by whole periods at a duty at which the currents are seen. */
 void make_pulses(maker_t *m, pulses_config_t *c)
 {
     const pm_num_t L_d = si(m, DRIVE_PARAM_L_d);
     const pm_num_t L_q = si(m, DRIVE_PARAM_L_q);
-    const pm_num_t flux = pm_num_mul(si(m, DRIVE_PARAM_i_pulse), L_d);
+    const pm_num_t i_peak = pulse_choice_current(m);
+    const pm_num_t flux = pm_num_mul(i_peak, L_d);
     const pm_num_t per_period = mul3(pm_num_ratio(2, 3), si(m, DRIVE_PARAM_v_dc_nominal), m->base.t_s);
     const pm_num_t exact = pm_num_div(flux, per_period);
     const pm_num_t most = pm_num_ratio(seen_on_time(m), PM_SHARE_ONE);
@@ -26,7 +27,7 @@ void make_pulses(maker_t *m, pulses_config_t *c)
     c->i_zero = pm_max(c->i_zero, PM_Q(8.0 / 4096.0));
     /* y of the unsaturated machine is 3 i_pulse (L_q - L_d) / L_q */
     const pm_num_t share = pm_num_div(pm_num_sub(L_q, L_d), L_q);
-    const pm_num_t i_pulse = pm_num_div(si(m, DRIVE_PARAM_i_pulse), m->base.i);
+    const pm_num_t i_pulse = pm_num_div(i_peak, m->base.i);
     c->y_min = fixed(m, mul3(share, i_pulse, pm_num_ratio(3, 4)), Q_BITS, DRIVE_PARAM_i_pulse);
     const pm_num_t v_dc = si(m, DRIVE_PARAM_v_dc_nominal);
     const pm_num_t edges =

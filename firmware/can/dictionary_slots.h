@@ -271,8 +271,19 @@ enum {
     OD_PARAMETER_F_INJECTION,
     OD_PARAMETER_INJECTION_POST_COMP,
 #endif
-#if PM_HAS(four_pulses)
+#if PM_HAS(four_pulses) || PM_HAS(basic_pulses) || PM_HAS(boundary_detection) || PM_HAS(dc_link_pulses)
     OD_PARAMETER_POSITION_PULSES,
+#endif
+#if PM_HAS(pulse_choice)
+    OD_PARAMETER_PULSE_CHOICE,
+#endif
+#if PM_HAS(boundary_detection)
+    OD_PARAMETER_BOUNDARY_THRESHOLD,
+#endif
+#if PM_HAS(dc_link_pulses)
+    OD_PARAMETER_DC_RESISTANCE,
+    OD_PARAMETER_DC_CAPACITANCE,
+    OD_PARAMETER_DC_LINK_REPEATS,
 #endif
     OD_PARAMETER_I_TRIP,
     OD_PARAMETER_V_DC_MAX,

@@ -13,8 +13,11 @@
 #include "firmware/drive/fault_short.h"
 #include "firmware/drive/position.h"
 #include "firmware/drive/procedures/sequence.h"
+#include "firmware/math/image.h"
 #include "firmware/math/num.h"
 #include "firmware/params/types.h"
+#include "injection/boundary_detection.h"
+#include "injection/dc_link_pulses.h"
 #include "injection/pulses.h"
 
 #ifdef __cplusplus
@@ -61,6 +64,8 @@ typedef struct {
     field_weakening_config_t field_weakening;
     position_config_t position;
     pulses_config_t pulses;
+    PM_IN_IMAGE(boundary_detection, boundary_detection_config_t boundary_detection;)
+    PM_IN_IMAGE(dc_link_pulses, dc_link_pulses_config_t dc_link_pulses;)
     open_loop_config_t open_loop;
     fault_short_config_t fault_short;
     pm_num_t pole_pairs;

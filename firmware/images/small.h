@@ -11,9 +11,13 @@
 #define PM_WITHOUT_deadbeat 1
 #define PM_WITHOUT_finite_set 1
 #define PM_WITHOUT_four_pulses 1
+#define PM_WITHOUT_basic_pulses 1
+#define PM_WITHOUT_boundary_detection 1
+#define PM_WITHOUT_dc_link_pulses 1
 #define PM_WITHOUT_stored_eds 1
 #define PM_WITHOUT_mismatch 1
 #define PM_WITHOUT_second_harmonic 1
+#define PM_WITHOUT_pulse_choice 1
 #define PM_WITHOUT_back_emf 1
 #define PM_WITHOUT_extended_emf 1
 #define PM_WITHOUT_extended_emf_ab 1

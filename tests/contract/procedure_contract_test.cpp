@@ -30,10 +30,25 @@ constexpr int kLongest_ms = 30000;
 class Procedure : public ::testing::TestWithParam<Row>
 {
   protected:
+    // Parameters of a start whose pulses are this procedure, if it is one.
+    static drive_params_t params()
+    {
+        drive_params_t p = direct::params(1);
+        for (p.position_pulses = 0;; ++p.position_pulses) {
+            drive_config_t config = {};
+            if (!drive_configure(&config, &p, PM_ALL).ok) {
+                return direct::params(1);
+            }
+            if (config.find == GetParam().id) {
+                return p;
+            }
+        }
+    }
+
     // The drive stands calibrated with this procedure at work, whatever sequence it belongs to.
     static Drive begun()
     {
-        Drive x(direct::params(1));
+        Drive x(params());
         x.d.zero[0] = x.d.zero[1] = x.d.zero[2] = PM_ONE;
         x.command.current_mA = 1000;
         x.command.speed_mrad_s = 30000;

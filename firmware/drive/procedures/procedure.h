@@ -31,6 +31,9 @@
 #include "firmware/drive/procedures/charge.h"
 #include "firmware/math/pll.h"
 #include "firmware/math/procedure.h"
+#include "injection/basic_pulses.h"
+#include "injection/boundary_detection.h"
+#include "injection/dc_link_pulses.h"
 #include "injection/four_pulses.h"
 #include "injection/initial_pulses.h"
 

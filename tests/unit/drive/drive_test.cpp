@@ -202,8 +202,9 @@ TEST(Drive, StateIsSmall)
     EXPECT_LE(offsetof(drive_t, config.modulator) + sizeof(modulator_config_t), 1020U + 100U);
     // 92 bytes of them say which regulator it is, what the machine is, whether the position slips, what a leg loses,
     // what the legs hold, and which of their currents are seen; 24 are the units of a command, instead of seven
-    // divisions at 1 kHz, 24 what windings and bridge bear, 16 the short after a fault, and 8 the legs that do not conduct
-    EXPECT_LE(sizeof(drive_t), 1472U + sizeof(injection_t));
+    // divisions at 1 kHz, 24 what windings and bridge bear, 16 the short after a fault, 8 the legs that do not conduct,
+    // and 32 how boundary detection and the DC link's voltage read the pulses of a start
+    EXPECT_LE(sizeof(drive_t), 1504U + sizeof(injection_t));
 }
 
 TEST(Drive, StaysOffWithoutACommand)

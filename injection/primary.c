@@ -1,0 +1,31 @@
+#include "injection/primary.h"
+
+#include "firmware/math/root.h"
+#include "firmware/math/trig.h"
+
+pm_procedure_t primary_polarity(const pm_q_t difference[PULSES_AXES], const primary_config_t *config,
+                                pulses_found_t *found)
+{
+    const pm_ab_t w = pm_clarke((pm_abc_t){.a = difference[0], .b = difference[1], .c = difference[2]});
+    const pm_q_t along = pm_park(w, pm_dir(found->theta)).d;
+    const pm_sigma_t polarity = pulses_polarity(along, config->bridge, config->noise);
+    if (polarity < PULSES_SURE) {
+        return PM_FAILED_POLARITY;
+    }
+    found->theta += along < 0 ? PM_TURN(0.5) : 0U;
+    found->margin = pm_min(polarity, found->margin);
+    return PM_DONE;
+}
+
+pm_procedure_t primary_locate(const primary_t *self, const primary_config_t *config, pulses_found_t *found)
+{
+    /* twice 120 degrees are 240, twice 240 are 120 */
+    const pm_ab_t y = pm_clarke((pm_abc_t){.a = self->sum[0], .b = self->sum[2], .c = self->sum[1]});
+    const pm_q_t length = pm_hypot(y.alpha, y.beta);
+    if (length < config->y_min) {
+        return PM_FAILED_SALIENCY;
+    }
+    found->theta = pm_atan2(y.beta, y.alpha) / 2U;
+    found->margin = pulses_margin(length, config->noise);
+    return primary_polarity(self->difference, config, found);
+}
