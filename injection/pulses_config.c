@@ -1,13 +1,11 @@
 #include "injection/pulse_choice.h"
 #include "injection/pulses.h"
 
-/* Flux that gives the pulse current along the d-axis, by whole periods at a duty at which the currents are seen. */
-void make_pulses(maker_t *m, pulses_config_t *c)
+/* Flux that gives the pulse current along the d-axis, by whole periods at a duty at which the currents are seen.
+ * Each part is apart: their numbers would be on the stack at once. */
+PM_APART static bool make_duration(maker_t *m, pm_num_t i_peak, pulses_config_t *c)
 {
-    const pm_num_t L_d = si(m, DRIVE_PARAM_L_d);
-    const pm_num_t L_q = si(m, DRIVE_PARAM_L_q);
-    const pm_num_t i_peak = pulse_choice_current(m);
-    const pm_num_t flux = pm_num_mul(i_peak, L_d);
+    const pm_num_t flux = pm_num_mul(i_peak, si(m, DRIVE_PARAM_L_d));
     const pm_num_t per_period = mul3(pm_num_ratio(2, 3), si(m, DRIVE_PARAM_v_dc_nominal), m->base.t_s);
     const pm_num_t exact = pm_num_div(flux, per_period);
     const pm_num_t most = pm_num_ratio(seen_on_time(m), PM_SHARE_ONE);
@@ -15,26 +13,47 @@ void make_pulses(maker_t *m, pulses_config_t *c)
     if (!pm_num_to_fixed(pm_num_add(pm_num_div(exact, most), pm_num_ratio(1, 2)), 0, &whole) ||
         whole > 10000) {
         refuse(m, DRIVE_PARAM_i_pulse, "pulse longer than 10000 periods");
-        return;
+        return false;
     }
     whole = whole < 1 ? 1 : whole;
     c->periods = (uint16_t)whole;
     c->timeout = (uint16_t)(8 * whole + 50);
     c->duty = fixed(m, least(pm_num_div(exact, pm_num(whole)), most), Q_BITS, DRIVE_PARAM_i_pulse);
+    return true;
+}
+
+/* y of the unsaturated machine is 3 i_pulse (L_q - L_d) / L_q. */
+PM_APART static void make_y_min(maker_t *m, pm_num_t i_peak, pulses_config_t *c)
+{
+    const pm_num_t L_q = si(m, DRIVE_PARAM_L_q);
+    const pm_num_t share = pm_num_div(pm_num_sub(L_q, si(m, DRIVE_PARAM_L_d)), L_q);
+    const pm_num_t i_pulse = pm_num_div(i_peak, m->base.i);
+    c->y_min = fixed(m, mul3(share, i_pulse, pm_num_ratio(3, 4)), Q_BITS, DRIVE_PARAM_i_pulse);
+}
+
+/* Currents that noise and bridge make by themselves. */
+PM_APART static void make_errors(maker_t *m, pulses_config_t *c)
+{
     const pm_num_t noise = pm_num_div(si(m, DRIVE_PARAM_i_noise), m->base.i);
     /* five times the noise, and no less than four steps of a 12-bit converter */
     c->i_zero = fixed(m, pm_num_mul(pm_num(5), noise), Q_BITS, DRIVE_PARAM_i_noise);
     c->i_zero = pm_max(c->i_zero, PM_Q(8.0 / 4096.0));
-    /* y of the unsaturated machine is 3 i_pulse (L_q - L_d) / L_q */
-    const pm_num_t share = pm_num_div(pm_num_sub(L_q, L_d), L_q);
-    const pm_num_t i_pulse = pm_num_div(i_peak, m->base.i);
-    c->y_min = fixed(m, mul3(share, i_pulse, pm_num_ratio(3, 4)), Q_BITS, DRIVE_PARAM_i_pulse);
-    const pm_num_t v_dc = si(m, DRIVE_PARAM_v_dc_nominal);
+    c->i_noise = pm_max(fixed(m, noise, Q_BITS, DRIVE_PARAM_i_noise), 1);
+    const pm_num_t L_d = si(m, DRIVE_PARAM_L_d);
     const pm_num_t edges =
-        pm_num_mul(pm_num_ratio(4 * whole, 3), pm_num_div(si(m, DRIVE_PARAM_dead_time), L_d));
+        pm_num_mul(pm_num_ratio(4 * c->periods, 3), pm_num_div(si(m, DRIVE_PARAM_dead_time), L_d));
     const pm_num_t ringing =
         pm_num_sqrt(pm_num_div(pm_num_mul(pm_num(4), si(m, DRIVE_PARAM_leg_capacitance)), L_d));
+    const pm_num_t v_dc = si(m, DRIVE_PARAM_v_dc_nominal);
     c->i_bridge = fixed(m, pm_num_div(pm_num_mul(v_dc, pm_num_add(edges, ringing)), m->base.i), Q_BITS,
                         DRIVE_PARAM_i_pulse);
-    c->i_noise = pm_max(fixed(m, noise, Q_BITS, DRIVE_PARAM_i_noise), 1);
+}
+
+void make_pulses(maker_t *m, pulses_config_t *c)
+{
+    const pm_num_t i_peak = pulse_choice_current(m);
+    if (make_duration(m, i_peak, c)) {
+        make_y_min(m, i_peak, c);
+        make_errors(m, c);
+    }
 }

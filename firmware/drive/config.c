@@ -195,36 +195,6 @@ static void make_limits(maker_t *m, drive_config_t *config)
     config->machine.psi_m = per_unit(m, DRIVE_PARAM_psi_m, m->base.psi);
 }
 
-/* The procedure that position_pulses names. */
-static procedure_id_t pulses_of(const drive_params_t *params)
-{
-    static const uint8_t procedures[] = {PROCEDURE_initial_pulses, PROCEDURE_four_pulses,
-                                         PROCEDURE_basic_pulses, PROCEDURE_boundary_detection,
-                                         PROCEDURE_dc_link_pulses};
-    return (procedure_id_t)procedures[params->position_pulses];
-}
-
-static void make_find(maker_t *m, drive_config_t *config)
-{
-    make_pulses(m, &config->pulses);
-    PM_IN_IMAGE(
-        boundary_detection, if (config->find == (uint8_t)PROCEDURE_boundary_detection) {
-            make_boundary_detection(m, &config->boundary_detection);
-        })
-    PM_IN_IMAGE(
-        dc_link_pulses, if (config->find == (uint8_t)PROCEDURE_dc_link_pulses) {
-            make_dc_link_pulses(m, &config->pulses, &config->dc_link_pulses);
-        })
-}
-
-static sequence_id_t start_of(const drive_params_t *params, bool injection)
-{
-    if (!injection || params->start_method == 3) {
-        return SEQUENCE_align;
-    }
-    return params->start_fallback == 0 ? SEQUENCE_pulses : SEQUENCE_pulses_align;
-}
-
 /* What is beyond the range is refused by those who use it. */
 static pm_q_t i_d_rated(const maker_t *m, const mtpa_config_t *mtpa)
 {
@@ -250,11 +220,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     config->slow_divider = m.slow_divider;
     config->injection =
         params->start_method % 2 == 1 || (params->start_method == 0 && injection_sees_saliency(&m));
-    config->start = (uint8_t)start_of(params, config->injection);
-    config->find = (uint8_t)pulses_of(params);
-    config->charge_periods =
-        (channels & PM_BOOTSTRAP) != 0U ? (uint16_t)(m.slow_divider * (uint32_t)CHARGE_MS) : 0U;
-    require(&m, sequence_needs((sequence_id_t)config->start, config->find), DRIVE_PARAM_start_method);
+    choose_start(&m, config, channels);
     if (config->injection) {
         m.comp_zone = injection_limits(&m).comp_zone;
     }
@@ -272,7 +238,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     make_field_weakening(&m, &config->field_weakening);
     make_position(&m, &config->position, config->injection);
     if (config->start != (uint8_t)SEQUENCE_align) {
-        make_find(&m, config);
+        make_start(&m, config);
     }
     make_open_loop(&m, &config->open_loop);
     make_protection(&m, &config->protection);

@@ -18,7 +18,9 @@
 #include "firmware/params/types.h"
 #include "injection/boundary_detection.h"
 #include "injection/dc_link_pulses.h"
+#include "injection/dual_pulses.h"
 #include "injection/pulses.h"
+#include "injection/three_phase_hf.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -66,13 +68,21 @@ typedef struct {
     pulses_config_t pulses;
     PM_IN_IMAGE(boundary_detection, boundary_detection_config_t boundary_detection;)
     PM_IN_IMAGE(dc_link_pulses, dc_link_pulses_config_t dc_link_pulses;)
+#if SEQUENCE_HAS_POLARITY
+    polarity_config_t polarity;
+    dual_pulses_config_t dual_pulses;
+    three_phase_hf_config_t three_phase_hf;
+#endif
     open_loop_config_t open_loop;
     fault_short_config_t fault_short;
     pm_num_t pole_pairs;
-    uint32_t slow_divider;   /* periods per drive_slow(): the nearest to 1 ms */
-    bool injection;          /* injection leads at low speed; else open-loop start */
-    uint8_t start;           /* SEQUENCE_...: how the initial position is found ... */
-    uint8_t find;            /* PROCEDURE_...: ... and by which pulses */
+    uint32_t slow_divider; /* periods per drive_slow(): the nearest to 1 ms */
+    bool injection;        /* injection leads at low speed; else open-loop start */
+    uint8_t start;         /* SEQUENCE_...: how the initial position is found ... */
+    uint8_t find;          /* PROCEDURE_...: ... by which of them ... */
+#if SEQUENCE_HAS_POLARITY
+    uint8_t pole; /* PROCEDURE_...: ... and what tells the pole afterwards, or none */
+#endif
     uint16_t charge_periods; /* of the upper switches' supply; 0: needs none */
     int32_t k_theta;         /* pm_omega_to_angle() */
     pm_q_t i_max;
@@ -81,6 +91,20 @@ typedef struct {
     pm_unit_t v_share; /* share of v_dc that the voltage vector may reach */
     pm_machine_t machine;
 } drive_config_t;
+
+static inline uint8_t config_pole(const drive_config_t *config)
+{
+#if SEQUENCE_HAS_POLARITY
+    return config->pole;
+#else
+    (void)config;
+    return 0;
+#endif
+}
+
+/* Of the start, where the configuration is made: which sequence and which procedures; what they are told. */
+void choose_start(maker_t *m, drive_config_t *config, uint32_t channels);
+void make_start(maker_t *m, drive_config_t *config);
 
 /* channels: what the board has, hal_channels(). */
 drive_result_t drive_configure(drive_config_t *config, const drive_params_t *params, uint32_t channels);

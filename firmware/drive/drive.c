@@ -400,4 +400,10 @@ PM_RARE void drive_prepare(drive_t *drive)
     prepare_current_control(drive);
     drive->modulator.all = drive->carrier;
     modulator_slow(&drive->modulator, &c->modulator, pm_max(v_dc, V_DC_LEAST));
+#if SEQUENCE_HAS_POLARITY
+    if (procedure_without_current(drive)) {
+        drive->modulator.near = 0;
+        drive->modulator.far = 0;
+    }
+#endif
 }

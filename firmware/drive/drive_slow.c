@@ -35,7 +35,8 @@ PM_RARE static void begin_step(drive_t *drive)
     drive->lost_ms = 0;
     drive->sum_ms = 0;
     const sequence_step_t *step = sequence_step((sequence_id_t)self->id, self->step);
-    procedure_begin(drive, (procedure_id_t)sequence_procedure(step, drive->config.find));
+    procedure_begin(
+        drive, (procedure_id_t)sequence_procedure(step, drive->config.find, config_pole(&drive->config)));
 }
 
 static void begin_sequence(drive_t *drive)
@@ -62,9 +63,45 @@ static void begin_injection(drive_t *drive, pm_angle_t theta)
     drive->state_ms = 0;
 }
 
+/* Current and voltage stay as they are; both have other coordinates in the frame that was put right. */
+PM_RARE static void turn_frame(drive_t *drive, pm_angle_t turn, pm_dq_t v)
+{
+    const pm_dir_t dir = pm_dir(turn);
+    const pm_dq_t i = pm_park((pm_ab_t){.alpha = drive->status.i.d, .beta = drive->status.i.q}, dir);
+    const pm_dq_t now = pm_park((pm_ab_t){.alpha = v.d, .beta = v.q}, dir);
+    regulator_reset(&drive->regulator, &drive->config.regulator, now, i, drive->position.pll.omega);
+    reference_reset(drive, i.q);
+    if (drive->position.slip.count > SLIP_MOST) {
+        drive_trip(drive, DRIVE_FAULT_POSITION_LOST);
+    }
+}
+
+#if SEQUENCE_HAS_POLARITY
+/* A step of the start has run on top of injection, which goes on; at the other pole, if that is the north. The observer,
+ * which has followed neither, starts from there. */
+PM_RARE static void go_on(drive_t *drive)
+{
+    const drive_config_t *c = &drive->config;
+    const pm_angle_t theta = drive->sequence.theta;
+    const bool south = pm_abs(pm_angle_diff(theta, drive->position.pll.theta)) > (int32_t)PM_TURN(0.25);
+    const pm_angle_t turn = south ? PM_TURN(0.5) : 0U;
+    const pm_dq_t v = {.d = pm_narrow(drive->voltage.v.d), .q = pm_narrow(drive->voltage.v.q)};
+    position_turn(&drive->position, &c->position, turn, drive->i_ab);
+    turn_frame(drive, turn, v);
+    drive->status.theta = drive->position.pll.theta;
+    drive->state = DRIVE_RUNNING;
+}
+#endif
+
 /* The sequence has come to its end: injection from there on, or the open loop that aligned the rotor. */
 static void begin_running(drive_t *drive)
 {
+#if SEQUENCE_HAS_POLARITY
+    if (drive->stage == STAGE_VECTOR) {
+        go_on(drive);
+        return;
+    }
+#endif
     if (drive->config.injection && drive->command.mode != DRIVE_MODE_CURRENT) {
         begin_injection(drive, drive->sequence.theta);
     } else {
@@ -124,6 +161,11 @@ static void start(drive_t *drive)
     if (!drive->command.enable || (working && drive->stage == STAGE_OFF)) {
         switch_off(drive);
     } else if (working) {
+#if SEQUENCE_HAS_POLARITY
+        if (drive->stage == STAGE_VECTOR) {
+            position_slow(&drive->position, &drive->config.position, drive->i_ab, drive->status.i);
+        }
+#endif
         const pm_procedure_t result = procedure_slow(drive);
         if (result != PM_RUNNING) {
             advance(drive, result);
@@ -132,19 +174,6 @@ static void start(drive_t *drive)
         settle(drive);
     } else {
         /* waits until enable is taken back */
-    }
-}
-
-/* Current and voltage stay as they are; both have other coordinates in the frame that was put right. */
-PM_RARE static void turn_frame(drive_t *drive, pm_angle_t turn, pm_dq_t v)
-{
-    const pm_dir_t dir = pm_dir(turn);
-    const pm_dq_t i = pm_park((pm_ab_t){.alpha = drive->status.i.d, .beta = drive->status.i.q}, dir);
-    const pm_dq_t now = pm_park((pm_ab_t){.alpha = v.d, .beta = v.q}, dir);
-    regulator_reset(&drive->regulator, &drive->config.regulator, now, i, drive->position.pll.omega);
-    reference_reset(drive, i.q);
-    if (drive->position.slip.count > SLIP_MOST) {
-        drive_trip(drive, DRIVE_FAULT_POSITION_LOST);
     }
 }
 

@@ -123,6 +123,9 @@ pm_unit_t position_current_share(const position_t *self, const position_config_t
 pm_angle_t position_resolve_slip(position_t *self, const position_config_t *config,
                                  const pm_machine_t *machine, pm_dq_t v, pm_ab_t i);
 
+/* The position turns by `turn`, speed as it is; both sources start anew from there. */
+void position_turn(position_t *self, const position_config_t *config, pm_angle_t turn, pm_ab_t i);
+
 /* config_position.c; injection: a low-speed source leads at low speed. */
 void make_position(maker_t *m, position_config_t *c, bool injection);
 

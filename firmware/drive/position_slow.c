@@ -78,7 +78,7 @@ pm_unit_t position_current_share(const position_t *self, const position_config_t
     return blend(config->current_low, PM_UNIT_MAX, self->weight);
 }
 
-PM_RARE static void turn_by(position_t *self, const position_config_t *config, pm_angle_t turn, pm_ab_t i)
+PM_RARE void position_turn(position_t *self, const position_config_t *config, pm_angle_t turn, pm_ab_t i)
 {
     self->pll.theta += turn;
     const pm_dir_t dir = pm_dir(self->pll.theta);
@@ -102,7 +102,7 @@ pm_angle_t position_resolve_slip(position_t *self, const position_config_t *conf
                           .i = pm_park(i, pm_dir(self->pll.theta))};
     const pm_angle_t turn = slip_slow(&self->slip, machine, &in);
     if (turn != 0U) {
-        turn_by(self, config, turn, i);
+        position_turn(self, config, turn, i);
     }
     return turn;
 }

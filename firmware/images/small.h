@@ -14,6 +14,11 @@
 #define PM_WITHOUT_basic_pulses 1
 #define PM_WITHOUT_boundary_detection 1
 #define PM_WITHOUT_dc_link_pulses 1
+#define PM_WITHOUT_lock 1
+#define PM_WITHOUT_d_current 1
+#define PM_WITHOUT_secondary_current 1
+#define PM_WITHOUT_dual_pulses 1
+#define PM_WITHOUT_three_phase_hf 1
 #define PM_WITHOUT_stored_eds 1
 #define PM_WITHOUT_mismatch 1
 #define PM_WITHOUT_second_harmonic 1

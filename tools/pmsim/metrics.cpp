@@ -203,6 +203,8 @@ static const std::vector<SpecialMetric> &special_metrics()
         list.insert(list.end(), drive.begin(), drive.end());
         const std::vector<SpecialMetric> identify = identify_metrics();
         list.insert(list.end(), identify.begin(), identify.end());
+        const std::vector<SpecialMetric> start = start_metrics();
+        list.insert(list.end(), start.begin(), start.end());
         const std::vector<SpecialMetric> voltage = voltage_metrics();
         list.insert(list.end(), voltage.begin(), voltage.end());
         return list;

@@ -21,6 +21,7 @@ bool has_position(const Sample &sample);
 std::vector<SpecialMetric> motion_metrics();   // metrics_motion.cpp
 std::vector<SpecialMetric> drive_metrics();    // metrics_drive.cpp
 std::vector<SpecialMetric> identify_metrics(); // metrics_identify.cpp
+std::vector<SpecialMetric> start_metrics();    // metrics_start.cpp
 std::vector<SpecialMetric> voltage_metrics();  // metrics_voltage.cpp
 
 } // namespace pmsim

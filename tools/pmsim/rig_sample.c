@@ -109,6 +109,8 @@ void rig_fill_sample(rig_scale_t *scale, const drive_t *drive, const drive_out_t
     sample->quality = (double)status->quality / PM_ONE;
     sample->settles = status->state == DRIVE_FINDING && drive->stage == STAGE_VECTOR;
     sample->dragged = drive->stage == STAGE_OPEN_LOOP;
+    sample->margin = (double)drive->sequence.margin / PM_SIGMA_ONE;
+    sample->refusal = (int)status->refusal.reason;
     sample->driven = out->legs != PM_LEGS_OFF;
     sample->identified = identified(scale, &drive->commissioning_report);
 }

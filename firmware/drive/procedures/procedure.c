@@ -29,12 +29,26 @@ static drive_state_t state_of(procedure_id_t id)
     return (drive_state_t)states[id];
 }
 
+/* Position control by injection runs already, and is what the procedure begins with. */
+static bool goes_on(const drive_t *drive, procedure_id_t id)
+{
+#if SEQUENCE_HAS_POLARITY
+    return drive->stage == STAGE_VECTOR && (id == PROCEDURE_d_current || id == PROCEDURE_secondary_current);
+#else
+    (void)drive;
+    (void)id;
+    return false;
+#endif
+}
+
 void procedure_begin(drive_t *drive, procedure_id_t id)
 {
     drive->state = state_of(id);
-    drive->stage = STAGE_PROCEDURE;
     drive->sequence.procedure = (uint8_t)id;
-    drive->procedure = (procedure_t){.result = PM_RUNNING};
+    if (!goes_on(drive, id)) {
+        drive->stage = STAGE_PROCEDURE;
+        drive->procedure = (procedure_t){.result = PM_RUNNING};
+    }
     switch (id) {
 #define PM_METHOD(name, help, traits, needs)                                                                 \
     PM_IN_IMAGE(name, case PROCEDURE_##name : procedure_##name##_begin(drive); break;)
@@ -62,6 +76,12 @@ pm_procedure_t procedure_slow(drive_t *drive)
     default:
         return PM_RUNNING;
     }
+}
+
+bool procedure_without_current(const drive_t *drive)
+{
+    const uint8_t id = drive->sequence.procedure;
+    return id == (uint8_t)PROCEDURE_lock || id == (uint8_t)PROCEDURE_secondary_current;
 }
 
 static void report_identification(drive_t *drive, commissioning_state_t state, commissioning_reason_t reason)

@@ -15,8 +15,8 @@
  * The traits say who drives the legs:
  *   BARE      nobody: the current sensors' offsets are not known yet. State CALIBRATING
  *   LEGS      its step, duty by duty, off in between. State FINDING
- *   CONTROL   current control, at an angle that its slow part imposes, or on top of the estimated one; begin
- *             chooses the stage. State FINDING
+ *   CONTROL   current control, at an angle that its slow part imposes, or on top of the estimated one, whose
+ *             millisecond comes before it; begin chooses the stage. State FINDING
  *   ALONE     its step, and it is not part of a start. State RUNNING
  * The state of CONTROL lies beside the position sources, which run meanwhile; that of the others in their
  * place. Only procedures in the image cost anything (firmware/math/image.h).
@@ -29,13 +29,18 @@
 #include "firmware/drive/procedures/align.h"
 #include "firmware/drive/procedures/calibrate.h"
 #include "firmware/drive/procedures/charge.h"
+#include "firmware/drive/procedures/d_current.h"
+#include "firmware/drive/procedures/lock.h"
+#include "firmware/drive/procedures/secondary_current.h"
 #include "firmware/math/pll.h"
 #include "firmware/math/procedure.h"
 #include "injection/basic_pulses.h"
 #include "injection/boundary_detection.h"
 #include "injection/dc_link_pulses.h"
+#include "injection/dual_pulses.h"
 #include "injection/four_pulses.h"
 #include "injection/initial_pulses.h"
+#include "injection/three_phase_hf.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -57,7 +62,7 @@ typedef enum {
 #define PROCEDURE_BESIDE_BARE(name)
 #define PROCEDURE_BESIDE_LEGS(name)
 #define PROCEDURE_BESIDE_ALONE(name)
-#define PROCEDURE_BESIDE_CONTROL(name) name##_t name;
+#define PROCEDURE_BESIDE_CONTROL(name) PM_IN_IMAGE(name, name##_t name;)
 
 /* In the place of the position sources, in STAGE_PROCEDURE; which one: drive->sequence.procedure. */
 typedef struct {
@@ -84,6 +89,10 @@ typedef union {
     void procedure_##name##_abort(drive_t *drive);
 #include "firmware/drive/procedures/procedures.def"
 #undef PM_METHOD
+
+/* Current control holds zero, so that the carrier alone makes the signs of the currents. A compensation of dead time by the
+ * mean current would make that swing: it takes more than the dead time then does. */
+bool procedure_without_current(const drive_t *drive);
 
 /* The one of drive->sequence.procedure; nothing with PROCEDURE_NONE. */
 void procedure_begin(drive_t *drive, procedure_id_t id); /* the drive's state and stage, too */

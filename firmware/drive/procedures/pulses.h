@@ -18,7 +18,8 @@ static inline void write_pulse(drive_t *drive, const pulses_out_t *pulse, drive_
 
 static inline void leave_position(drive_t *drive, pm_procedure_t result, const pulses_found_t *found)
 {
-    if (result == PM_DONE) {
+    if (result == PM_DONE || (SEQUENCE_HAS_POLARITY != 0 && result == PM_FAILED_POLARITY)) {
+        /* another step may find the pole */
         drive->sequence.theta = found->theta;
         drive->sequence.margin = found->margin;
     }

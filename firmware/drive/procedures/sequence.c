@@ -12,8 +12,12 @@
     {                                                                                                        \
         PROCEDURE_charge, 2, FAULT_ALWAYS                                                                    \
     }
+#define FIND_AXIS                                                                                            \
+    {                                                                                                        \
+        SEQUENCE_FIND, 3, 3, PM_FAILED_POLARITY                                                              \
+    }
 
-static const sequence_step_t steps[SEQUENCE_COUNT][SEQUENCE_STEPS] = {
+static const sequence_step_t steps[SEQUENCE_KINDS][SEQUENCE_STEPS] = {
     [SEQUENCE_align] = {CALIBRATE, CHARGE, {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
     [SEQUENCE_pulses] = {CALIBRATE, CHARGE, {SEQUENCE_FIND, SEQUENCE_RUN, FAULT_ALWAYS}},
     [SEQUENCE_pulses_align] = {CALIBRATE,
@@ -23,6 +27,14 @@ static const sequence_step_t steps[SEQUENCE_COUNT][SEQUENCE_STEPS] = {
     [SEQUENCE_identify] = {CALIBRATE,
                            CHARGE,
                            {PROCEDURE_identify, SEQUENCE_WAIT, SEQUENCE_WAIT, SEQUENCE_ANY}},
+#if SEQUENCE_HAS_POLARITY
+    [SEQUENCE_pole] = {CALIBRATE, CHARGE, FIND_AXIS, {SEQUENCE_POLE, SEQUENCE_RUN, FAULT_ALWAYS}},
+    [SEQUENCE_pole_align] = {CALIBRATE,
+                             CHARGE,
+                             FIND_AXIS,
+                             {SEQUENCE_POLE, SEQUENCE_RUN, 4, PM_FAILED_POLARITY},
+                             {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
+#endif
 };
 
 const sequence_step_t *sequence_step(sequence_id_t id, uint32_t step)
@@ -30,8 +42,15 @@ const sequence_step_t *sequence_step(sequence_id_t id, uint32_t step)
     return &steps[id][step];
 }
 
-uint8_t sequence_procedure(const sequence_step_t *step, uint8_t find)
+uint8_t sequence_procedure(const sequence_step_t *step, uint8_t find, uint8_t pole)
 {
+#if SEQUENCE_HAS_POLARITY
+    if (step->procedure == SEQUENCE_POLE) {
+        return pole;
+    }
+#else
+    (void)pole;
+#endif
     return step->procedure == SEQUENCE_FIND ? find : step->procedure;
 }
 
@@ -46,11 +65,11 @@ static uint32_t procedure_needs(uint8_t procedure)
     return needed[procedure];
 }
 
-uint32_t sequence_needs(sequence_id_t id, uint8_t find)
+uint32_t sequence_needs(sequence_id_t id, uint8_t find, uint8_t pole)
 {
     uint32_t needs = 0;
     for (uint32_t step = 0; step < SEQUENCE_STEPS; step++) {
-        needs |= procedure_needs(sequence_procedure(&steps[id][step], find));
+        needs |= procedure_needs(sequence_procedure(&steps[id][step], find, pole));
     }
     return needs;
 }

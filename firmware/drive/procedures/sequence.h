@@ -4,7 +4,9 @@
  *   pulses         calibrate, charge, find
  *   pulses_align   calibrate, charge, find; align, if that found no polarity
  *   identify       calibrate, charge, identify
- * find is the procedure of drive_config_t.find. On boards without PM_BOOTSTRAP charge is passed over, without a
+ *   pole           calibrate, charge, find; then, whether that found a polarity or not, pole
+ *   pole_align     the same; align, if pole found none
+ * find and pole are the procedures of drive_config_t. On boards without PM_BOOTSTRAP charge is passed over, without a
  * period of its own.
  * The fall-back is for what alignment can replace: without saliency injection has nothing to go by, and
  * without a current nothing is connected; those are faults in all of them.
@@ -15,6 +17,7 @@
 #include <stdbool.h>
 
 #include "firmware/math/frames.h"
+#include "firmware/math/image.h"
 #include "firmware/math/procedure.h"
 
 #ifdef __cplusplus
@@ -26,10 +29,22 @@ typedef enum {
     SEQUENCE_pulses,
     SEQUENCE_pulses_align,
     SEQUENCE_identify,
+    SEQUENCE_pole,
+    SEQUENCE_pole_align,
     SEQUENCE_COUNT,
 } sequence_id_t;
 
+/* Whether the image has a step for the polarity alone. */
+#define SEQUENCE_HAS_POLARITY                                                                                \
+    (PM_HAS(d_current) || PM_HAS(secondary_current) || PM_HAS(dual_pulses) || PM_HAS(three_phase_hf))
+
+#if SEQUENCE_HAS_POLARITY
+#define SEQUENCE_STEPS 5
+#define SEQUENCE_KINDS SEQUENCE_COUNT
+#else
 #define SEQUENCE_STEPS 4
+#define SEQUENCE_KINDS SEQUENCE_pole /* those before it */
+#endif
 
 /* Where a step leads: the number of another, or one of these. */
 enum {
@@ -40,18 +55,19 @@ enum {
 
 #define SEQUENCE_ANY  PM_PROCEDURE_COUNT
 #define SEQUENCE_FIND 255
+#define SEQUENCE_POLE 254
 
 typedef struct {
-    uint8_t procedure; /* PROCEDURE_... or SEQUENCE_FIND */
+    uint8_t procedure; /* PROCEDURE_..., SEQUENCE_FIND or SEQUENCE_POLE */
     uint8_t done;
     uint8_t refused; /* where it leads when it fails by ... */
     uint8_t reason;  /* ... this, PM_FAILED_... or SEQUENCE_ANY; by another: SEQUENCE_FAULT */
 } sequence_step_t;
 
 const sequence_step_t *sequence_step(sequence_id_t id, uint32_t step);
-uint8_t sequence_procedure(const sequence_step_t *step, uint8_t find); /* PROCEDURE_... */
+uint8_t sequence_procedure(const sequence_step_t *step, uint8_t find, uint8_t pole); /* PROCEDURE_... */
 uint32_t sequence_next(const sequence_step_t *step, pm_procedure_t result);
-uint32_t sequence_needs(sequence_id_t id, uint8_t find); /* NEEDS_...: of all its procedures */
+uint32_t sequence_needs(sequence_id_t id, uint8_t find, uint8_t pole); /* NEEDS_...: of all its procedures */
 
 /* The drive's place in it. */
 typedef struct {

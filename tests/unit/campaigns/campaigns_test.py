@@ -207,8 +207,8 @@ class Files(unittest.TestCase):
         self.assertEqual(more.run(1).machine, forwards[1].machine)
 
     def test_what_no_machine_file_can_be_made_of_is_refused(self):
-        run = self.campaign(CAMPAIGN.replace("L_q0_H: L,", "L_q0_H: L / 2,")).run(0)
-        self.assertIn("L_q is below L_d", run.refusal)
+        run = self.campaign(CAMPAIGN.replace("v_dc_V: 36}", "v_dc_V: 36}\n  sensor: {i_full_scale_A: 5}")).run(0)
+        self.assertIn("cannot measure what the name plate says", run.refusal)
 
     def test_a_campaign_may_be_like_another(self):
         folder = Path(self.folder.name)

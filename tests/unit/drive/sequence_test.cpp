@@ -21,6 +21,12 @@ uint32_t next(sequence_id_t id, uint32_t step, pm_procedure_t result)
     return sequence_next(sequence_step(id, step), result);
 }
 
+// A step of its own for the polarity.
+bool poles(sequence_id_t id)
+{
+    return id == SEQUENCE_pole || id == SEQUENCE_pole_align;
+}
+
 TEST(Sequence, LeadsWhereItSays)
 {
     for (int id = 0; id < SEQUENCE_COUNT; ++id) {
@@ -32,14 +38,23 @@ TEST(Sequence, LeadsWhereItSays)
         for (int reason = PM_DONE + 1; reason < PM_PROCEDURE_COUNT; ++reason) {
             const auto result = static_cast<pm_procedure_t>(reason);
             EXPECT_EQ(next(sequence, 0, result), uint32_t(SEQUENCE_FAULT)) << id << ' ' << reason;
-            const bool replaced = id == SEQUENCE_pulses_align && reason == PM_FAILED_POLARITY;
+            const bool replaced =
+                (id == SEQUENCE_pulses_align || poles(sequence)) && reason == PM_FAILED_POLARITY;
             const uint32_t expected = id == SEQUENCE_identify ? uint32_t(SEQUENCE_WAIT)
                                                               : (replaced ? 3U : uint32_t(SEQUENCE_FAULT));
             EXPECT_EQ(next(sequence, 2, result), expected) << id << ' ' << reason;
         }
-        EXPECT_EQ(next(sequence, 2, PM_DONE),
-                  uint32_t(id == SEQUENCE_identify ? SEQUENCE_WAIT : SEQUENCE_RUN));
+        const uint32_t done = id == SEQUENCE_identify ? uint32_t(SEQUENCE_WAIT) : uint32_t(SEQUENCE_RUN);
+        EXPECT_EQ(next(sequence, 2, PM_DONE), poles(sequence) ? 3U : done);
     }
+    for (const sequence_id_t id : {SEQUENCE_pole, SEQUENCE_pole_align}) {
+        EXPECT_EQ(sequence_step(id, 3)->procedure, SEQUENCE_POLE);
+        EXPECT_EQ(next(id, 3, PM_DONE), uint32_t(SEQUENCE_RUN));
+        EXPECT_EQ(next(id, 3, PM_FAILED_POLARITY), id == SEQUENCE_pole ? uint32_t(SEQUENCE_FAULT) : 4U);
+        EXPECT_EQ(next(id, 3, PM_FAILED_TIMEOUT), uint32_t(SEQUENCE_FAULT));
+    }
+    EXPECT_EQ(sequence_step(SEQUENCE_pole_align, 4)->procedure, PROCEDURE_align);
+    EXPECT_EQ(next(SEQUENCE_pole_align, 4, PM_DONE), uint32_t(SEQUENCE_RUN));
     EXPECT_EQ(sequence_step(SEQUENCE_pulses_align, 3)->procedure, PROCEDURE_align);
     EXPECT_EQ(next(SEQUENCE_pulses_align, 3, PM_DONE), uint32_t(SEQUENCE_RUN));
     EXPECT_EQ(next(SEQUENCE_pulses_align, 3, PM_FAILED_POLARITY), uint32_t(SEQUENCE_FAULT));
@@ -108,9 +123,33 @@ struct Start {
     drive_mode_t mode;
 };
 
+drive_params_t lock_and(int32_t polarity)
+{
+    drive_params_t p = direct::params(1);
+    p.position_find = 1;
+    p.polarity = polarity;
+    return p;
+}
+
+drive_params_t three_phase_and_sine()
+{
+    drive_params_t p = direct::params(1);
+    p.position_find = 2;
+    p.polarity = 3;
+    p.injection = INJECTION_pulsating_sine;
+    p.injection_bandwidth = 7000;
+    p.speed_bandwidth = 2000;
+    return p;
+}
+
 const Start kStarts[] = {
-    {"pulses", direct::params(1), DRIVE_MODE_SPEED},      {"align", direct::params(3), DRIVE_MODE_SPEED},
-    {"open loop", direct::params(2), DRIVE_MODE_SPEED},   {"current", direct::params(1), DRIVE_MODE_CURRENT},
+    {"lock, pulses", lock_and(1), DRIVE_MODE_SPEED},
+    {"lock, current", lock_and(2), DRIVE_MODE_SPEED},
+    {"three phases", three_phase_and_sine(), DRIVE_MODE_SPEED},
+    {"pulses", direct::params(1), DRIVE_MODE_SPEED},
+    {"align", direct::params(3), DRIVE_MODE_SPEED},
+    {"open loop", direct::params(2), DRIVE_MODE_SPEED},
+    {"current", direct::params(1), DRIVE_MODE_CURRENT},
     {"identify", direct::params(1), DRIVE_MODE_IDENTIFY},
 };
 

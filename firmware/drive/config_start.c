@@ -1,0 +1,122 @@
+/* Configuration of the start: how position and pole are found. */
+#include "firmware/drive/config.h"
+#include "firmware/drive/procedures/procedure.h"
+#include "firmware/params/maker.h"
+
+/* The procedure that position_pulses names. */
+static procedure_id_t pulses_of(const drive_params_t *params)
+{
+    static const uint8_t procedures[] = {PROCEDURE_initial_pulses, PROCEDURE_four_pulses,
+                                         PROCEDURE_basic_pulses, PROCEDURE_boundary_detection,
+                                         PROCEDURE_dc_link_pulses};
+    return (procedure_id_t)procedures[params->position_pulses];
+}
+
+static void make_find(maker_t *m, drive_config_t *config)
+{
+    make_pulses(m, &config->pulses);
+    PM_IN_IMAGE(
+        boundary_detection, if (config->find == (uint8_t)PROCEDURE_boundary_detection) {
+            make_boundary_detection(m, &config->boundary_detection);
+        })
+    PM_IN_IMAGE(
+        dc_link_pulses, if (config->find == (uint8_t)PROCEDURE_dc_link_pulses) {
+            make_dc_link_pulses(m, &config->pulses, &config->dc_link_pulses);
+        })
+}
+
+static sequence_id_t start_of(const drive_params_t *params, bool injection)
+{
+    if (!injection || params->start_method == 3) {
+        return SEQUENCE_align;
+    }
+#if SEQUENCE_HAS_POLARITY
+    if (params->polarity != 0) {
+        return params->start_fallback == 0 ? SEQUENCE_pole : SEQUENCE_pole_align;
+    }
+#endif
+    return params->start_fallback == 0 ? SEQUENCE_pulses : SEQUENCE_pulses_align;
+}
+
+static uint8_t find_of(const drive_params_t *params)
+{
+#if SEQUENCE_HAS_POLARITY
+    if (params->position_find != 0) {
+        return params->position_find == 1 ? (uint8_t)PROCEDURE_lock : (uint8_t)PROCEDURE_three_phase_hf;
+    }
+#endif
+    return (uint8_t)pulses_of(params);
+}
+
+#if SEQUENCE_HAS_POLARITY
+static uint8_t pole_of(const drive_params_t *params)
+{
+    static const uint8_t poles[] = {PROCEDURE_NONE, PROCEDURE_dual_pulses, PROCEDURE_d_current,
+                                    PROCEDURE_secondary_current};
+    return poles[params->polarity];
+}
+
+/* What of the carrier the steps of polarity look at, and whether there is one that they can look at. */
+static void make_carrier(maker_t *m, drive_config_t *config)
+{
+    const injection_config_t *c = &config->position.injection;
+    const drive_params_t *p = m->params;
+    const sine_config_t *sine = NULL;
+    pm_q_t h_d = c->pulsating_square.h_d;
+    if (c->id == INJECTION_pulsating_sine) {
+        sine = &c->pulsating_sine.sine;
+        h_d = c->pulsating_sine.h_d;
+    } else if (p->polarity == 3 || (p->polarity == 2 && c->id != INJECTION_pulsating_square)) {
+        refuse(m, DRIVE_PARAM_polarity,
+               p->polarity == 3 ? "needs injection 4, a sine along d"
+                                : "needs injection 0 or 4, a carrier along d");
+    } else {
+        /* no step looks at the carrier, or one at the square wave */
+    }
+    make_polarity(m, sine, h_d, &config->polarity);
+}
+
+/* How the start finds angle and pole. */
+static void make_pole(maker_t *m, drive_config_t *config)
+{
+    const drive_params_t *p = m->params;
+    if (p->position_find == 1 && (config->position.traits & SOURCE_STATOR) != 0U) {
+        refuse(m, DRIVE_PARAM_position_find, "needs a carrier in the estimated frame: injection 0, 1 or 4");
+    } else if (p->position_find == 1 && p->polarity == 0) {
+        refuse(m, DRIVE_PARAM_polarity, "injection alone does not know the pole: 1, 2 or 3");
+    } else {
+        /* both are found */
+    }
+    if (p->position_find == 2) {
+        make_three_phase_hf(m, &config->three_phase_hf);
+    }
+    if (p->polarity == 1) {
+        make_dual_pulses(m, &config->dual_pulses);
+    } else if (p->polarity != 0) {
+        make_carrier(m, config);
+    } else {
+        /* what finds the angle finds the pole */
+    }
+}
+#endif
+
+void choose_start(maker_t *m, drive_config_t *config, uint32_t channels)
+{
+    config->start = (uint8_t)start_of(m->params, config->injection);
+    config->find = find_of(m->params);
+#if SEQUENCE_HAS_POLARITY
+    config->pole = pole_of(m->params);
+#endif
+    config->charge_periods =
+        (channels & PM_BOOTSTRAP) != 0U ? (uint16_t)(m->slow_divider * (uint32_t)CHARGE_MS) : 0U;
+    require(m, sequence_needs((sequence_id_t)config->start, config->find, config_pole(config)),
+            DRIVE_PARAM_start_method);
+}
+
+void make_start(maker_t *m, drive_config_t *config)
+{
+    make_find(m, config);
+#if SEQUENCE_HAS_POLARITY
+    make_pole(m, config);
+#endif
+}
