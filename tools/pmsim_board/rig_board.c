@@ -74,7 +74,8 @@ static uint32_t make_page(const drive_params_t *params, uint32_t words[STORE_WOR
 /* Wound again with the machine: then its preset is another. */
 static bool is_wound(drive_param_id_t id)
 {
-    return similar && strcmp(drive_param_text[id].unit, "A") == 0;
+    const char *unit = drive_param_text[id].unit;
+    return similar && (strcmp(unit, "A") == 0 || strcmp(unit, "ohm") == 0 || strcmp(unit, "F") == 0);
 }
 
 /* A parameter that the image has not, and that is not as it would be without it */
