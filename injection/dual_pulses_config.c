@@ -8,11 +8,11 @@ static pm_num_t on_most(const maker_t *m)
     return least(pm_num_ratio(seen_on_time(m), PM_SHARE_ONE), pm_num_ratio(95, 100));
 }
 
-/* e^-x by its inverse's series, 0 <= x <= 3 */
+/* e^-x by its inverse's series within 2 %, 0 <= x <= 1 */
 static pm_q_t falls_to(pm_q_t x)
 {
-    const pm_q_t square = pm_mul(x, x) / 2;
-    return pm_div(PM_ONE / 4, (PM_ONE + x + square + pm_mul(square, x / 3)) / 4);
+    const pm_q_t half_square = pm_mul(x, x) / 2;
+    return pm_div(PM_ONE / 4, (PM_ONE + x + half_square + pm_mul(half_square, x / 3)) / 4);
 }
 
 /* Beyond a time constant nothing is left after the pause, whatever this says. */
@@ -20,8 +20,9 @@ PM_APART static void make_decay(maker_t *m, dual_pulses_config_t *c)
 {
     const pm_num_t L_per_R = pm_num_div(si(m, DRIVE_PARAM_L_d), si(m, DRIVE_PARAM_R_s));
     const pm_num_t exact = pm_num_div(pm_num_mul(pm_num(c->periods), m->base.t_s), L_per_R);
-    const pm_q_t x = fixed(m, least(exact, pm_num(1)), Q_BITS, DRIVE_PARAM_R_s);
-    c->decay = pm_shl((falls_to(x) + falls_to(3 * x)) / 2 - 1, UNIT_BITS - Q_BITS);
+    const pm_q_t once = falls_to(fixed(m, least(exact, pm_num(1)), Q_BITS, DRIVE_PARAM_R_s));
+    const pm_q_t thrice = pm_mul(once, pm_mul(once, once));
+    c->decay = pm_shl((once + thrice) / 2 - 1, UNIT_BITS - Q_BITS);
 }
 
 PM_APART static void make_limits(maker_t *m, dual_pulses_config_t *c)

@@ -288,6 +288,27 @@ TEST(Polarity, HandOverKeepsTheCurrent)
     }
 }
 
+// What is left of a pulse's current, of any winding; of a pulse beyond the time constant, what a time constant leaves.
+TEST(Polarity, DecayOfDualPulsesIsThatOfTheWinding)
+{
+    double shortest = 1, longest = 0;
+    for (const int32_t R_ohm : {1, 6, 15, 24, 30, 36, 50}) {
+        drive_params_t p = direct::params(1);
+        p.polarity = 1;
+        p.R_s = R_ohm * 1000000;
+        drive_config_t c = {};
+        const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
+        ASSERT_TRUE(r.ok) << drive_param_table[r.param].name << ' ' << r.reason;
+        const double T_s = double(c.dual_pulses.periods) / p.f_pwm;
+        const double x = std::min(1.0, T_s * R_ohm / (1e-9 * p.L_d));
+        EXPECT_NEAR(std::ldexp(c.dual_pulses.decay, -31), (std::exp(-x) + std::exp(-3 * x)) / 2, 0.02) << x;
+        shortest = std::min(shortest, x);
+        longest = std::max(longest, x);
+    }
+    EXPECT_LT(shortest, 0.1);
+    EXPECT_EQ(longest, 1);
+}
+
 TEST(Polarity, AParameterThatCannotBeIsRefusedByName)
 {
     const auto refused = [](void (*change)(drive_params_t &)) {
