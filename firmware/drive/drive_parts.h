@@ -38,6 +38,12 @@ static inline bool protection_passed(const drive_t *drive, int32_t top)
     return above <= (uint32_t)v_dc.second && protection_currents_passed(drive, top);
 }
 
+/* Injection leads at low speed: as configured, unless the start has found the machine round. */
+static inline bool drive_injects(const drive_t *drive)
+{
+    return drive->config.injection && !drive->round;
+}
+
 /* drive.c: at 1 kHz, what the step needs of the present operating point and stage. */
 void drive_prepare(drive_t *drive);
 

@@ -51,6 +51,7 @@ static void begin_sequence(drive_t *drive)
     }
     drive->sequence = (sequence_t){.id = id, .begins = true};
     drive->status.refusal = (drive_refusal_t){0};
+    drive->round = false;
 }
 
 /* The rotor stands at theta: injection takes over. */
@@ -102,7 +103,7 @@ static void begin_running(drive_t *drive)
         return;
     }
 #endif
-    if (drive->config.injection && drive->command.mode != DRIVE_MODE_CURRENT) {
+    if (drive_injects(drive) && drive->command.mode != DRIVE_MODE_CURRENT) {
         begin_injection(drive, drive->sequence.theta);
     } else {
         drive->state = DRIVE_RUNNING;
@@ -120,6 +121,7 @@ static void advance(drive_t *drive, pm_procedure_t result)
         next = sequence_step(id, next)->done;
     }
     if (result != PM_DONE) {
+        drive->round = drive->round || result == PM_FAILED_SALIENCY;
         drive->status.refusal = (drive_refusal_t){.procedure = self->procedure, .reason = (uint8_t)result};
     }
     self->procedure = (uint8_t)PROCEDURE_NONE;
@@ -198,7 +200,7 @@ static void run(drive_t *drive)
     }
     reference_vector(drive);
     /* without injection nothing shows the position at low speed */
-    if (!c->injects && pm_abs(drive->speed.reference) < c->omega_low &&
+    if (!drive_injects(drive) && pm_abs(drive->speed.reference) < c->omega_low &&
         pm_abs(drive->position.pll.omega) < c->omega_low) {
         open_loop_resume(drive);
     }

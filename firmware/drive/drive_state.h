@@ -32,6 +32,7 @@ struct drive {
     bool carrier; /* injection is on */
     bool forced;  /* open loop: the observer is forced to the ramp angle */
     bool usual;   /* estimated angle and REGULATOR_INLINE: one branch per period for all that is not */
+    bool round;   /* the start has found no saliency: without injection until the next one */
     bool references_ready; /* the command's references are in per-unit */
     pm_dir_t ahead;        /* one and a half periods of rotation: from the sample to where the voltage acts */
     pm_unit_t v_share;     /* share of v_dc for current control */

@@ -53,7 +53,7 @@ static void hand_over(drive_t *drive)
     reference_reset(drive, i.beta);
     drive->i_ref.d = i.alpha;
     drive->i_open = i.alpha;
-    drive->position.carrier = drive->config.injection; /* at lower speeds */
+    drive->position.carrier = drive_injects(drive); /* at lower speeds */
     drive->stage = STAGE_VECTOR;
 }
 

@@ -3,7 +3,7 @@
 #include "firmware/drive/procedures/procedure.h"
 #include "firmware/math/measure.h"
 
-#define FAULT_ALWAYS SEQUENCE_FAULT, PM_RUNNING
+#define FAULT_ALWAYS SEQUENCE_FAULT, SEQUENCE_FAULT, SEQUENCE_FAULT
 #define CALIBRATE                                                                                            \
     {                                                                                                        \
         PROCEDURE_calibrate, 1, FAULT_ALWAYS                                                                 \
@@ -12,9 +12,9 @@
     {                                                                                                        \
         PROCEDURE_charge, 2, FAULT_ALWAYS                                                                    \
     }
-#define FIND_AXIS                                                                                            \
+#define FIND_AXIS(round)                                                                                     \
     {                                                                                                        \
-        SEQUENCE_FIND, 3, 3, PM_FAILED_POLARITY                                                              \
+        SEQUENCE_FIND, 3, 3, round, SEQUENCE_FAULT                                                           \
     }
 
 static const sequence_step_t steps[SEQUENCE_KINDS][SEQUENCE_STEPS] = {
@@ -22,17 +22,20 @@ static const sequence_step_t steps[SEQUENCE_KINDS][SEQUENCE_STEPS] = {
     [SEQUENCE_pulses] = {CALIBRATE, CHARGE, {SEQUENCE_FIND, SEQUENCE_RUN, FAULT_ALWAYS}},
     [SEQUENCE_pulses_align] = {CALIBRATE,
                                CHARGE,
-                               {SEQUENCE_FIND, SEQUENCE_RUN, 3, PM_FAILED_POLARITY},
+                               {SEQUENCE_FIND, SEQUENCE_RUN, 3, 3, SEQUENCE_FAULT},
                                {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
     [SEQUENCE_identify] = {CALIBRATE,
                            CHARGE,
-                           {PROCEDURE_identify, SEQUENCE_WAIT, SEQUENCE_WAIT, SEQUENCE_ANY}},
+                           {PROCEDURE_identify, SEQUENCE_WAIT, SEQUENCE_WAIT, SEQUENCE_WAIT, SEQUENCE_WAIT}},
 #if SEQUENCE_HAS_POLARITY
-    [SEQUENCE_pole] = {CALIBRATE, CHARGE, FIND_AXIS, {SEQUENCE_POLE, SEQUENCE_RUN, FAULT_ALWAYS}},
+    [SEQUENCE_pole] = {CALIBRATE,
+                       CHARGE,
+                       FIND_AXIS(SEQUENCE_FAULT),
+                       {SEQUENCE_POLE, SEQUENCE_RUN, FAULT_ALWAYS}},
     [SEQUENCE_pole_align] = {CALIBRATE,
                              CHARGE,
-                             FIND_AXIS,
-                             {SEQUENCE_POLE, SEQUENCE_RUN, 4, PM_FAILED_POLARITY},
+                             FIND_AXIS(4),
+                             {SEQUENCE_POLE, SEQUENCE_RUN, 4, SEQUENCE_FAULT, SEQUENCE_FAULT},
                              {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
 #endif
 };
@@ -76,9 +79,14 @@ uint32_t sequence_needs(sequence_id_t id, uint8_t find, uint8_t pole)
 
 uint32_t sequence_next(const sequence_step_t *step, pm_procedure_t result)
 {
-    if (result == PM_DONE) {
+    switch (result) {
+    case PM_DONE:
         return step->done;
+    case PM_FAILED_POLARITY:
+        return step->no_pole;
+    case PM_FAILED_SALIENCY:
+        return step->no_axis;
+    default:
+        return step->other;
     }
-    const bool covered = step->reason == (uint8_t)SEQUENCE_ANY || step->reason == (uint8_t)result;
-    return covered ? step->refused : (uint32_t)SEQUENCE_FAULT;
 }

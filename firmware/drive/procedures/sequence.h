@@ -2,15 +2,16 @@
  *
  *   align          calibrate, charge, align
  *   pulses         calibrate, charge, find
- *   pulses_align   calibrate, charge, find; align, if that found no polarity
+ *   pulses_align   calibrate, charge, find; align, if that found no polarity or no saliency
  *   identify       calibrate, charge, identify
  *   pole           calibrate, charge, find; then, whether that found a polarity or not, pole
- *   pole_align     the same; align, if pole found none
+ *   pole_align     the same; align, if pole found none or find no saliency
  * find and pole are the procedures of drive_config_t. On boards without PM_BOOTSTRAP charge is passed over, without a
  * period of its own.
- * The fall-back is for what alignment can replace: without saliency injection has nothing to go by, and
- * without a current nothing is connected; those are faults in all of them.
- * Tests: tests/unit/drive/sequence_test.cpp. */
+ * The fall-back is for what alignment can replace. A machine that shows no saliency is round, whatever it was told: it runs
+ * as one without injection does, by open loop and hand-over, until the next start. Without a current nothing is connected:
+ * a fault in all of them.
+ * Tests: tests/unit/drive/sequence_test.cpp, tests/scenario/start_fallback.yaml, start_round.yaml. */
 #ifndef DRIVE_PROCEDURES_SEQUENCE_H
 #define DRIVE_PROCEDURES_SEQUENCE_H
 
@@ -53,15 +54,15 @@ enum {
     SEQUENCE_WAIT, /* bridge off, until enable is taken back */
 };
 
-#define SEQUENCE_ANY  PM_PROCEDURE_COUNT
 #define SEQUENCE_FIND 255
 #define SEQUENCE_POLE 254
 
 typedef struct {
     uint8_t procedure; /* PROCEDURE_..., SEQUENCE_FIND or SEQUENCE_POLE */
     uint8_t done;
-    uint8_t refused; /* where it leads when it fails by ... */
-    uint8_t reason;  /* ... this, PM_FAILED_... or SEQUENCE_ANY; by another: SEQUENCE_FAULT */
+    uint8_t no_pole; /* where PM_FAILED_POLARITY leads, */
+    uint8_t no_axis; /* PM_FAILED_SALIENCY, */
+    uint8_t other;   /* and every other failure */
 } sequence_step_t;
 
 const sequence_step_t *sequence_step(sequence_id_t id, uint32_t step);

@@ -38,10 +38,16 @@ TEST(Sequence, LeadsWhereItSays)
         for (int reason = PM_DONE + 1; reason < PM_PROCEDURE_COUNT; ++reason) {
             const auto result = static_cast<pm_procedure_t>(reason);
             EXPECT_EQ(next(sequence, 0, result), uint32_t(SEQUENCE_FAULT)) << id << ' ' << reason;
-            const bool replaced =
-                (id == SEQUENCE_pulses_align || poles(sequence)) && reason == PM_FAILED_POLARITY;
-            const uint32_t expected = id == SEQUENCE_identify ? uint32_t(SEQUENCE_WAIT)
-                                                              : (replaced ? 3U : uint32_t(SEQUENCE_FAULT));
+            uint32_t expected = SEQUENCE_FAULT;
+            if (id == SEQUENCE_identify) {
+                expected = SEQUENCE_WAIT;
+            } else if (reason == PM_FAILED_POLARITY && (id == SEQUENCE_pulses_align || poles(sequence))) {
+                expected = 3;
+            } else if (reason == PM_FAILED_SALIENCY && id == SEQUENCE_pulses_align) {
+                expected = 3;
+            } else if (reason == PM_FAILED_SALIENCY && id == SEQUENCE_pole_align) {
+                expected = 4;
+            }
             EXPECT_EQ(next(sequence, 2, result), expected) << id << ' ' << reason;
         }
         const uint32_t done = id == SEQUENCE_identify ? uint32_t(SEQUENCE_WAIT) : uint32_t(SEQUENCE_RUN);
@@ -82,12 +88,15 @@ TEST(Sequence, ARefusalIsAFaultOrLeadsToTheFallBack)
             x.run_ms(1);
             EXPECT_EQ(drive_status(&x.d)->refusal.procedure, PROCEDURE_initial_pulses);
             EXPECT_EQ(drive_status(&x.d)->refusal.reason, reason);
-            if (fall_back && reason == PM_FAILED_POLARITY) {
+            const bool round = reason == PM_FAILED_SALIENCY;
+            if (fall_back && (reason == PM_FAILED_POLARITY || round)) {
                 EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
                 EXPECT_EQ(x.d.sequence.procedure, PROCEDURE_align);
                 EXPECT_EQ(x.d.stage, STAGE_OPEN_LOOP);
                 x.run_ms(301);
-                EXPECT_EQ(x.d.stage, STAGE_VECTOR); // injection goes on from there
+                // injection goes on from there, or the vector turns a machine that has no saliency
+                EXPECT_EQ(x.d.stage, round ? STAGE_OPEN_LOOP : STAGE_VECTOR);
+                EXPECT_EQ(x.d.position.carrier, !round);
                 EXPECT_EQ(x.d.sequence.procedure, PROCEDURE_NONE);
                 continue;
             }
@@ -115,6 +124,33 @@ TEST(Sequence, AnotherStartForgetsTheRefusal)
     x.run_ms(1);
     EXPECT_EQ(drive_status(&x.d)->refusal.reason, 0);
     EXPECT_EQ(drive_status(&x.d)->refusal.procedure, PROCEDURE_NONE);
+}
+
+// What the start has found of the saliency holds for its run: the observer's hand-over brings no carrier, and low speed
+// leads back to the open loop. The next start looks again.
+TEST(Sequence, ARoundMachineRunsWithoutInjectionUntilTheNextStart)
+{
+    Drive x = in_pulses(direct::params(1));
+    x.d.procedure.result = PM_FAILED_SALIENCY;
+    x.run_ms(302);
+    ASSERT_EQ(x.d.stage, STAGE_OPEN_LOOP);
+    x.d.stage = STAGE_VECTOR;
+    x.d.position.pll.omega = 0;
+    x.d.speed.reference = 0;
+    x.run_ms(1);
+    EXPECT_EQ(x.d.stage, STAGE_OPEN_LOOP);
+    x.command.coast = true;
+    x.enable(false);
+    x.run_ms(1);
+    ASSERT_EQ(x.state(), DRIVE_OFF);
+    x.enable(true);
+    for (int ms = 0; ms < 120 && x.d.sequence.procedure != PROCEDURE_initial_pulses; ++ms) {
+        x.run_ms(1);
+    }
+    EXPECT_EQ(x.d.sequence.procedure, PROCEDURE_initial_pulses);
+    x.d.procedure.result = PM_FAILED_POLARITY;
+    x.run_ms(302);
+    EXPECT_TRUE(x.d.position.carrier);
 }
 
 struct Start {

@@ -256,7 +256,7 @@ ENTRIES = (
     Entry(0x2300, 18, "mismatch_current", "position", "i32", "live", "A", -3, 0, 10, 1000000, 400, False, True, "application", "none", {}, 'its amplitude, a tenth of the rated current; J must be right for the q-axis', "3.5.2.2 #30"),
     Entry(0x2300, 19, "open_loop_damping", "position", "i32", "live", "1", -3, 0, 0, 3000, 700, False, True, "application", "none", {}, ('damping ratio of the rotor on the vector of align and open-loop start, for '
  'the inertia J; 0: it swings'), ""),
-    Entry(0x2300, 20, "start_fallback", "position", "i32", "off", "1", 0, 0, 0, 1, 1, False, True, "application", "none", {0: 'fault', 1: 'align'}, 'where a start leads whose pulses found no polarity', "9.4.2 #101"),
+    Entry(0x2300, 20, "start_fallback", "position", "i32", "off", "1", 0, 0, 0, 1, 1, False, True, "application", "none", {0: 'fault', 1: 'align'}, 'where a start leads whose pulses found no polarity or no saliency', "9.4.2 #101"),
     Entry(0x2310, 0, "sliding_mode.count", "sliding_mode", "u8", "const", "", 0, 0, None, None, 4, False, False, "none", "none", {}, 'highest sub-index', ""),
     Entry(0x2310, 1, "sliding_function", "sliding_mode", "i32", "live", "1", 0, 0, 0, 3, 1, False, True, "application", "none", {0: 'sign', 1: 'saturation', 2: 'super-twisting', 3: 'sigmoid'}, 'switching function; 0: the conventional one', "12.3.3 #141"),
     Entry(0x2310, 2, "sliding_bandwidth", "sliding_mode", "i32", "live", "Hz", -3, 0, 5000, 1000000, 100000, False, True, "application", "none", {}, 'low-pass of the switched voltage', "12.3.2 #140"),
