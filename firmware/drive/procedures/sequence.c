@@ -8,31 +8,38 @@
     {                                                                                                        \
         PROCEDURE_calibrate, 1, FAULT_ALWAYS                                                                 \
     }
+#define LOOK                                                                                                 \
+    {                                                                                                        \
+        PROCEDURE_flying_start, SEQUENCE_CAUGHT, 2, PM_FAILED_NOT_TURNING                                    \
+    }
 #define CHARGE                                                                                               \
     {                                                                                                        \
-        PROCEDURE_charge, 2, FAULT_ALWAYS                                                                    \
+        PROCEDURE_charge, 3, FAULT_ALWAYS                                                                    \
     }
 #define FIND_AXIS                                                                                            \
     {                                                                                                        \
-        SEQUENCE_FIND, 3, 3, PM_FAILED_POLARITY                                                              \
+        SEQUENCE_FIND, 4, 4, PM_FAILED_POLARITY                                                              \
     }
 
 static const sequence_step_t steps[SEQUENCE_KINDS][SEQUENCE_STEPS] = {
-    [SEQUENCE_align] = {CALIBRATE, CHARGE, {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
-    [SEQUENCE_pulses] = {CALIBRATE, CHARGE, {SEQUENCE_FIND, SEQUENCE_RUN, FAULT_ALWAYS}},
+    [SEQUENCE_align] = {CALIBRATE, LOOK, CHARGE, {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
+    [SEQUENCE_pulses] = {CALIBRATE, LOOK, CHARGE, {SEQUENCE_FIND, SEQUENCE_RUN, FAULT_ALWAYS}},
     [SEQUENCE_pulses_align] = {CALIBRATE,
+                               LOOK,
                                CHARGE,
-                               {SEQUENCE_FIND, SEQUENCE_RUN, 3, PM_FAILED_POLARITY},
+                               {SEQUENCE_FIND, SEQUENCE_RUN, 4, PM_FAILED_POLARITY},
                                {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
-    [SEQUENCE_identify] = {CALIBRATE,
+    [SEQUENCE_identify] = {{PROCEDURE_calibrate, 2, FAULT_ALWAYS},
+                           {PROCEDURE_NONE, 2, FAULT_ALWAYS},
                            CHARGE,
                            {PROCEDURE_identify, SEQUENCE_WAIT, SEQUENCE_WAIT, SEQUENCE_ANY}},
 #if SEQUENCE_HAS_POLARITY
-    [SEQUENCE_pole] = {CALIBRATE, CHARGE, FIND_AXIS, {SEQUENCE_POLE, SEQUENCE_RUN, FAULT_ALWAYS}},
+    [SEQUENCE_pole] = {CALIBRATE, LOOK, CHARGE, FIND_AXIS, {SEQUENCE_POLE, SEQUENCE_RUN, FAULT_ALWAYS}},
     [SEQUENCE_pole_align] = {CALIBRATE,
+                             LOOK,
                              CHARGE,
                              FIND_AXIS,
-                             {SEQUENCE_POLE, SEQUENCE_RUN, 4, PM_FAILED_POLARITY},
+                             {SEQUENCE_POLE, SEQUENCE_RUN, 5, PM_FAILED_POLARITY},
                              {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
 #endif
 };

@@ -1,13 +1,14 @@
 /* What a start consists of: procedures one after the other, and where a refusal leads.
  *
- *   align          calibrate, charge, align
- *   pulses         calibrate, charge, find
- *   pulses_align   calibrate, charge, find; align, if that found no polarity
+ *   align          calibrate, look, charge, align
+ *   pulses         calibrate, look, charge, find
+ *   pulses_align   calibrate, look, charge, find; align, if that found no polarity
  *   identify       calibrate, charge, identify
- *   pole           calibrate, charge, find; then, whether that found a polarity or not, pole
+ *   pole           calibrate, look, charge, find; then, whether that found a polarity or not, pole
  *   pole_align     the same; align, if pole found none
- * find and pole are the procedures of drive_config_t. On boards without PM_BOOTSTRAP charge is passed over, without a
- * period of its own.
+ * find and pole are the procedures of drive_config_t. look, flying_start.h, catches a rotor that turns, and the drive runs from
+ * there; it is passed over, without a period of its own, unless the parameter flying_start is set, and in current mode.
+ * So is charge on boards without PM_BOOTSTRAP.
  * The fall-back is for what alignment can replace: without saliency injection has nothing to go by, and
  * without a current nothing is connected; those are faults in all of them.
  * Tests: tests/unit/drive/sequence_test.cpp. */
@@ -39,18 +40,19 @@ typedef enum {
     (PM_HAS(d_current) || PM_HAS(secondary_current) || PM_HAS(dual_pulses) || PM_HAS(three_phase_hf))
 
 #if SEQUENCE_HAS_POLARITY
-#define SEQUENCE_STEPS 5
+#define SEQUENCE_STEPS 6
 #define SEQUENCE_KINDS SEQUENCE_COUNT
 #else
-#define SEQUENCE_STEPS 4
+#define SEQUENCE_STEPS 5
 #define SEQUENCE_KINDS SEQUENCE_pole /* those before it */
 #endif
 
 /* Where a step leads: the number of another, or one of these. */
 enum {
     SEQUENCE_FAULT = SEQUENCE_STEPS,
-    SEQUENCE_RUN,  /* the drive runs, from the angle that was found */
-    SEQUENCE_WAIT, /* bridge off, until enable is taken back */
+    SEQUENCE_RUN,    /* the drive runs, from the angle that was found */
+    SEQUENCE_WAIT,   /* bridge off, until enable is taken back */
+    SEQUENCE_CAUGHT, /* the drive runs, from the angle and the speed that were found */
 };
 
 #define SEQUENCE_ANY  PM_PROCEDURE_COUNT
@@ -75,6 +77,7 @@ typedef struct {
     uint8_t procedure; /* at work, or PROCEDURE_NONE */
     bool begins;       /* the step does, in this millisecond */
     pm_angle_t theta;  /* of the rotor, where the last position finding left it */
+    pm_q_t omega;      /* its speed, if it was caught */
     pm_sigma_t margin; /* of that, the smallest */
 } sequence_t;
 
