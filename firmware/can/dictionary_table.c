@@ -4,7 +4,7 @@
 
 /* clang-format off */
 
-const uint32_t od_schema = 0xC59CC1F3U;
+const uint32_t od_schema = 0xF3E9EF5DU;
 
 /* least, preset, most; those of parameters are in firmware/params/parameters.def */
 const od_values_t od_values[] = {
@@ -64,7 +64,7 @@ const int32_t od_presets[] = {
     18,
     196620,
     2,
-    20,
+    21,
     255,
     3,
     35,
@@ -327,6 +327,9 @@ const od_entry_t od_table[] = {
 #endif
     {0x2300U, 19U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_OPEN_LOOP_DAMPING, 0U, 0U},
     {0x2300U, 20U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_START_FALLBACK, 0U, 0U},
+#if PM_HAS(flying_start)
+    {0x2300U, 21U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_FLYING_START, 0U, 0U},
+#endif
 #if PM_HAS(sliding_mode)
     {0x2310U, 0U, OD_READ, OD_U8, OD_CONSTANT, OD_GROUP_NONE, 0U, 37U, 0U},
     {0x2310U, 1U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_SLIDING_FUNCTION, 0U, 0U},

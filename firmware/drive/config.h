@@ -12,6 +12,7 @@
 #include "firmware/control/speed_control.h"
 #include "firmware/drive/fault_short.h"
 #include "firmware/drive/position.h"
+#include "firmware/drive/procedures/flying_start.h"
 #include "firmware/drive/procedures/sequence.h"
 #include "firmware/math/image.h"
 #include "firmware/math/num.h"
@@ -68,6 +69,7 @@ typedef struct {
     pulses_config_t pulses;
     PM_IN_IMAGE(boundary_detection, boundary_detection_config_t boundary_detection;)
     PM_IN_IMAGE(dc_link_pulses, dc_link_pulses_config_t dc_link_pulses;)
+    PM_IN_IMAGE(flying_start, flying_start_config_t flying_start;)
 #if SEQUENCE_HAS_POLARITY
     polarity_config_t polarity;
     dual_pulses_config_t dual_pulses;

@@ -109,6 +109,9 @@ void choose_start(maker_t *m, drive_config_t *config, uint32_t channels)
 #endif
     config->charge_periods =
         (channels & PM_BOOTSTRAP) != 0U ? (uint16_t)(m->slow_divider * (uint32_t)CHARGE_MS) : 0U;
+    PM_IN_IMAGE(flying_start, make_flying_start(m, &config->flying_start);
+                config->flying_start.charge =
+                    (uint32_t)config->charge_periods * (uint32_t)FLYING_START_PARTS;)
     require(m, sequence_needs((sequence_id_t)config->start, config->find, config_pole(config)),
             DRIVE_PARAM_start_method);
 }

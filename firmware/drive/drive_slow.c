@@ -94,6 +94,37 @@ PM_RARE static void go_on(drive_t *drive)
 }
 #endif
 
+#if PM_HAS(flying_start)
+/* The EMF is the voltage that keeps the current at zero, from the period that has begun on; where the link has less, the
+ * current that weakens the field is wanted at once. */
+PM_RARE static void begin_caught(drive_t *drive)
+{
+    const drive_config_t *c = &drive->config;
+    const pm_pll_t caught = {.theta = drive->sequence.theta, .omega = drive->sequence.omega};
+    position_take(&drive->position, &c->position, &caught);
+    const pm_q_t v_top = pm_unit(drive->status.v_dc, c->v_share);
+    const pm_q_t emf = pm_mul(caught.omega, c->machine.psi_m);
+    const pm_dq_t v = {.d = 0, .q = pm_clamp(emf, -v_top, v_top)};
+    regulator_reset(&drive->regulator, &c->regulator, v, (pm_dq_t){0, 0}, caught.omega);
+    reference_reset(drive, 0);
+    const pm_q_t over = pm_abs(emf) - (v_top - v_top / 20);
+    if (over > 0) {
+        const pm_q_t x = pm_mul(pm_abs(caught.omega), c->machine.L_d);
+        drive->field_weakening.i_d = -pm_min(pm_div(over, x), c->field_weakening.i_max);
+        drive->i_ref.d = drive->field_weakening.i_d;
+    }
+    const int32_t turn = pm_omega_to_angle(caught.omega, c->k_theta);
+    const pm_angle_t middle = caught.theta + (pm_angle_t)pm_half(turn);
+    const pm_dq_t e = {.d = 0, .q = emf};
+    drive->v_acting = pm_park_inverse(e, pm_dir(middle));
+    drive->v_next = pm_park_inverse(e, pm_dir(middle + (pm_angle_t)turn));
+    drive->status.theta = caught.theta;
+    drive->stage = STAGE_VECTOR;
+    drive->state = DRIVE_RUNNING;
+    drive->state_ms = 0;
+}
+#endif
+
 /* The sequence has come to its end: injection from there on, or the open loop that aligned the rotor. */
 static void begin_running(drive_t *drive)
 {
@@ -110,17 +141,31 @@ static void begin_running(drive_t *drive)
     }
 }
 
+/* A step that this start or this board does without. */
+static bool is_passed_over(const drive_t *drive, uint8_t procedure)
+{
+    if (procedure == (uint8_t)PROCEDURE_charge) {
+        return drive->config.charge_periods == 0U;
+    }
+#if PM_HAS(flying_start)
+    return procedure == (uint8_t)PROCEDURE_flying_start &&
+           (!drive->config.flying_start.on || drive->command.mode == DRIVE_MODE_CURRENT);
+#else
+    return procedure == (uint8_t)PROCEDURE_flying_start;
+#endif
+}
+
 /* A procedure has come to its end, this way or that. */
 static void advance(drive_t *drive, pm_procedure_t result)
 {
     sequence_t *self = &drive->sequence;
     const sequence_id_t id = (sequence_id_t)self->id;
     uint32_t next = sequence_next(sequence_step(id, self->step), result);
-    if (next < SEQUENCE_STEPS && drive->config.charge_periods == 0U &&
-        sequence_step(id, next)->procedure == (uint8_t)PROCEDURE_charge) {
-        next = sequence_step(id, next)->done;
+    while (next < SEQUENCE_STEPS && is_passed_over(drive, sequence_step(id, next)->procedure)) {
+        next++;
     }
-    if (result != PM_DONE) {
+    const bool rests = self->procedure == (uint8_t)PROCEDURE_flying_start && result == PM_FAILED_NOT_TURNING;
+    if (result != PM_DONE && !rests) {
         drive->round = drive->round || result == PM_FAILED_SALIENCY;
         drive->status.refusal = (drive_refusal_t){.procedure = self->procedure, .reason = (uint8_t)result};
     }
@@ -136,6 +181,7 @@ static void advance(drive_t *drive, pm_procedure_t result)
     case SEQUENCE_WAIT:
         drive->stage = STAGE_OFF;
         break;
+        PM_IN_IMAGE(flying_start, case SEQUENCE_CAUGHT : begin_caught(drive); break;)
     default:
         self->step = (uint8_t)next;
         self->begins = true;

@@ -71,6 +71,9 @@ typedef struct {
 void position_reset(position_t *self, const position_config_t *config, pm_angle_t theta, pm_ab_t i,
                     bool carrier);
 
+/* Takes over a rotor that was caught: at theta and omega, per-unit, without current. */
+void position_take(position_t *self, const position_config_t *config, const pm_pll_t *caught);
+
 typedef struct {
     pm_half_dir_t ahead; /* half of the direction of the estimated frame where the next voltage acts */
     pm_dq_t i;           /* fundamental current in the frame at k */

@@ -32,6 +32,23 @@ void position_reset(position_t *self, const position_config_t *config, pm_angle_
     }
 }
 
+PM_RARE void position_take(position_t *self, const position_config_t *config, const pm_pll_t *caught)
+{
+    position_reset(self, config, caught->theta, (pm_ab_t){0, 0}, true);
+    self->pll.omega = caught->omega;
+    self->omega_mean = caught->omega;
+    if (pm_abs(caught->omega) > config->omega_high) {
+        self->inject = false;
+        self->weight = PM_ONE;
+        self->gains = config->pll_high;
+    }
+    const obs_in_t in = {.dir = pm_dir(caught->theta), .omega = caught->omega};
+    observer_reset(&self->observer, &config->observer, &in);
+    if (self->inject) {
+        injection_reset(&self->injection, &config->injection, &in);
+    }
+}
+
 void position_change_observer(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq)
 {
     const obs_in_t in = {.i = i, .dir = pm_dir(self->pll.theta), .omega = self->pll.omega, .i_dq = i_dq};

@@ -30,6 +30,7 @@
 #include "firmware/drive/procedures/calibrate.h"
 #include "firmware/drive/procedures/charge.h"
 #include "firmware/drive/procedures/d_current.h"
+#include "firmware/drive/procedures/flying_start.h"
 #include "firmware/drive/procedures/lock.h"
 #include "firmware/drive/procedures/secondary_current.h"
 #include "firmware/math/pll.h"

@@ -8,34 +8,39 @@
     {                                                                                                        \
         PROCEDURE_calibrate, 1, FAULT_ALWAYS                                                                 \
     }
+#define LOOK                                                                                                 \
+    {                                                                                                        \
+        PROCEDURE_flying_start, SEQUENCE_CAUGHT, 2, SEQUENCE_FAULT, SEQUENCE_FAULT                           \
+    }
 #define CHARGE                                                                                               \
     {                                                                                                        \
-        PROCEDURE_charge, 2, FAULT_ALWAYS                                                                    \
+        PROCEDURE_charge, 3, FAULT_ALWAYS                                                                    \
     }
 #define FIND_AXIS(round)                                                                                     \
     {                                                                                                        \
-        SEQUENCE_FIND, 3, 3, round, SEQUENCE_FAULT                                                           \
+        SEQUENCE_FIND, 4, 4, round, SEQUENCE_FAULT                                                           \
     }
 
 static const sequence_step_t steps[SEQUENCE_KINDS][SEQUENCE_STEPS] = {
-    [SEQUENCE_align] = {CALIBRATE, CHARGE, {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
-    [SEQUENCE_pulses] = {CALIBRATE, CHARGE, {SEQUENCE_FIND, SEQUENCE_RUN, FAULT_ALWAYS}},
+    [SEQUENCE_align] = {CALIBRATE, LOOK, CHARGE, {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
+    [SEQUENCE_pulses] = {CALIBRATE, LOOK, CHARGE, {SEQUENCE_FIND, SEQUENCE_RUN, FAULT_ALWAYS}},
     [SEQUENCE_pulses_align] = {CALIBRATE,
+                               LOOK,
                                CHARGE,
-                               {SEQUENCE_FIND, SEQUENCE_RUN, 3, 3, SEQUENCE_FAULT},
+                               {SEQUENCE_FIND, SEQUENCE_RUN, 4, 4, SEQUENCE_FAULT},
                                {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
-    [SEQUENCE_identify] = {CALIBRATE,
+    [SEQUENCE_identify] = {{PROCEDURE_calibrate, 2, FAULT_ALWAYS},
+                           {PROCEDURE_NONE, 2, FAULT_ALWAYS},
                            CHARGE,
                            {PROCEDURE_identify, SEQUENCE_WAIT, SEQUENCE_WAIT, SEQUENCE_WAIT, SEQUENCE_WAIT}},
 #if SEQUENCE_HAS_POLARITY
-    [SEQUENCE_pole] = {CALIBRATE,
-                       CHARGE,
-                       FIND_AXIS(SEQUENCE_FAULT),
-                       {SEQUENCE_POLE, SEQUENCE_RUN, FAULT_ALWAYS}},
+    [SEQUENCE_pole] =
+        {CALIBRATE, LOOK, CHARGE, FIND_AXIS(SEQUENCE_FAULT), {SEQUENCE_POLE, SEQUENCE_RUN, FAULT_ALWAYS}},
     [SEQUENCE_pole_align] = {CALIBRATE,
+                             LOOK,
                              CHARGE,
-                             FIND_AXIS(4),
-                             {SEQUENCE_POLE, SEQUENCE_RUN, 4, SEQUENCE_FAULT, SEQUENCE_FAULT},
+                             FIND_AXIS(5),
+                             {SEQUENCE_POLE, SEQUENCE_RUN, 5, SEQUENCE_FAULT, SEQUENCE_FAULT},
                              {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
 #endif
 };
@@ -83,7 +88,8 @@ uint32_t sequence_next(const sequence_step_t *step, pm_procedure_t result)
     case PM_DONE:
         return step->done;
     case PM_FAILED_POLARITY:
-        return step->no_pole;
+    case PM_FAILED_NOT_TURNING:
+        return step->not_there;
     case PM_FAILED_SALIENCY:
         return step->no_axis;
     default:

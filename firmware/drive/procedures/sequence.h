@@ -1,13 +1,14 @@
 /* What a start consists of: procedures one after the other, and where a refusal leads.
  *
- *   align          calibrate, charge, align
- *   pulses         calibrate, charge, find
- *   pulses_align   calibrate, charge, find; align, if that found no polarity or no saliency
+ *   align          calibrate, look, charge, align
+ *   pulses         calibrate, look, charge, find
+ *   pulses_align   calibrate, look, charge, find; align, if that found no polarity or no saliency
  *   identify       calibrate, charge, identify
- *   pole           calibrate, charge, find; then, whether that found a polarity or not, pole
+ *   pole           calibrate, look, charge, find; then, whether that found a polarity or not, pole
  *   pole_align     the same; align, if pole found none or find no saliency
- * find and pole are the procedures of drive_config_t. On boards without PM_BOOTSTRAP charge is passed over, without a
- * period of its own.
+ * find and pole are the procedures of drive_config_t. look, flying_start.h, catches a rotor that turns, and the drive runs
+ * from there; it is passed over, without a period of its own, unless the parameter flying_start is set, and in current
+ * mode. So is charge on boards without PM_BOOTSTRAP.
  * The fall-back is for what alignment can replace. A machine that shows no saliency is round, whatever it was told: it runs
  * as one without injection does, by open loop and hand-over, until the next start. Without a current nothing is connected:
  * a fault in all of them.
@@ -40,18 +41,19 @@ typedef enum {
     (PM_HAS(d_current) || PM_HAS(secondary_current) || PM_HAS(dual_pulses) || PM_HAS(three_phase_hf))
 
 #if SEQUENCE_HAS_POLARITY
-#define SEQUENCE_STEPS 5
+#define SEQUENCE_STEPS 6
 #define SEQUENCE_KINDS SEQUENCE_COUNT
 #else
-#define SEQUENCE_STEPS 4
+#define SEQUENCE_STEPS 5
 #define SEQUENCE_KINDS SEQUENCE_pole /* those before it */
 #endif
 
 /* Where a step leads: the number of another, or one of these. */
 enum {
     SEQUENCE_FAULT = SEQUENCE_STEPS,
-    SEQUENCE_RUN,  /* the drive runs, from the angle that was found */
-    SEQUENCE_WAIT, /* bridge off, until enable is taken back */
+    SEQUENCE_RUN,    /* the drive runs, from the angle that was found */
+    SEQUENCE_WAIT,   /* bridge off, until enable is taken back */
+    SEQUENCE_CAUGHT, /* the drive runs, from the angle and the speed that were found */
 };
 
 #define SEQUENCE_FIND 255
@@ -60,9 +62,9 @@ enum {
 typedef struct {
     uint8_t procedure; /* PROCEDURE_..., SEQUENCE_FIND or SEQUENCE_POLE */
     uint8_t done;
-    uint8_t no_pole; /* where PM_FAILED_POLARITY leads, */
-    uint8_t no_axis; /* PM_FAILED_SALIENCY, */
-    uint8_t other;   /* and every other failure */
+    uint8_t not_there; /* where PM_FAILED_POLARITY or PM_FAILED_NOT_TURNING leads, */
+    uint8_t no_axis;   /* PM_FAILED_SALIENCY, */
+    uint8_t other;     /* and every other failure */
 } sequence_step_t;
 
 const sequence_step_t *sequence_step(sequence_id_t id, uint32_t step);
@@ -76,6 +78,7 @@ typedef struct {
     uint8_t procedure; /* at work, or PROCEDURE_NONE */
     bool begins;       /* the step does, in this millisecond */
     pm_angle_t theta;  /* of the rotor, where the last position finding left it */
+    pm_q_t omega;      /* its speed, if it was caught */
     pm_sigma_t margin; /* of that, the smallest */
 } sequence_t;
 

@@ -31,39 +31,47 @@ TEST(Sequence, LeadsWhereItSays)
 {
     for (int id = 0; id < SEQUENCE_COUNT; ++id) {
         const auto sequence = static_cast<sequence_id_t>(id);
+        const bool looks = id != SEQUENCE_identify;
         EXPECT_EQ(sequence_step(sequence, 0)->procedure, PROCEDURE_calibrate);
-        EXPECT_EQ(next(sequence, 0, PM_DONE), 1U);
-        EXPECT_EQ(sequence_step(sequence, 1)->procedure, PROCEDURE_charge);
-        EXPECT_EQ(next(sequence, 1, PM_DONE), 2U);
+        EXPECT_EQ(next(sequence, 0, PM_DONE), looks ? 1U : 2U);
+        if (looks) {
+            EXPECT_EQ(sequence_step(sequence, 1)->procedure, PROCEDURE_flying_start);
+            EXPECT_EQ(next(sequence, 1, PM_DONE), uint32_t(SEQUENCE_CAUGHT));
+            EXPECT_EQ(next(sequence, 1, PM_FAILED_NOT_TURNING), 2U);
+            EXPECT_EQ(next(sequence, 1, PM_FAILED_TIMEOUT), uint32_t(SEQUENCE_FAULT));
+        }
+        EXPECT_EQ(sequence_step(sequence, 2)->procedure, PROCEDURE_charge);
+        EXPECT_EQ(next(sequence, 2, PM_DONE), 3U);
         for (int reason = PM_DONE + 1; reason < PM_PROCEDURE_COUNT; ++reason) {
             const auto result = static_cast<pm_procedure_t>(reason);
             EXPECT_EQ(next(sequence, 0, result), uint32_t(SEQUENCE_FAULT)) << id << ' ' << reason;
             uint32_t expected = SEQUENCE_FAULT;
             if (id == SEQUENCE_identify) {
                 expected = SEQUENCE_WAIT;
-            } else if (reason == PM_FAILED_POLARITY && (id == SEQUENCE_pulses_align || poles(sequence))) {
-                expected = 3;
-            } else if (reason == PM_FAILED_SALIENCY && id == SEQUENCE_pulses_align) {
-                expected = 3;
-            } else if (reason == PM_FAILED_SALIENCY && id == SEQUENCE_pole_align) {
+            } else if ((reason == PM_FAILED_POLARITY || reason == PM_FAILED_NOT_TURNING) &&
+                       (id == SEQUENCE_pulses_align || poles(sequence))) {
                 expected = 4;
+            } else if (reason == PM_FAILED_SALIENCY && id == SEQUENCE_pulses_align) {
+                expected = 4;
+            } else if (reason == PM_FAILED_SALIENCY && id == SEQUENCE_pole_align) {
+                expected = 5;
             }
-            EXPECT_EQ(next(sequence, 2, result), expected) << id << ' ' << reason;
+            EXPECT_EQ(next(sequence, 3, result), expected) << id << ' ' << reason;
         }
         const uint32_t done = id == SEQUENCE_identify ? uint32_t(SEQUENCE_WAIT) : uint32_t(SEQUENCE_RUN);
-        EXPECT_EQ(next(sequence, 2, PM_DONE), poles(sequence) ? 3U : done);
+        EXPECT_EQ(next(sequence, 3, PM_DONE), poles(sequence) ? 4U : done);
     }
     for (const sequence_id_t id : {SEQUENCE_pole, SEQUENCE_pole_align}) {
-        EXPECT_EQ(sequence_step(id, 3)->procedure, SEQUENCE_POLE);
-        EXPECT_EQ(next(id, 3, PM_DONE), uint32_t(SEQUENCE_RUN));
-        EXPECT_EQ(next(id, 3, PM_FAILED_POLARITY), id == SEQUENCE_pole ? uint32_t(SEQUENCE_FAULT) : 4U);
-        EXPECT_EQ(next(id, 3, PM_FAILED_TIMEOUT), uint32_t(SEQUENCE_FAULT));
+        EXPECT_EQ(sequence_step(id, 4)->procedure, SEQUENCE_POLE);
+        EXPECT_EQ(next(id, 4, PM_DONE), uint32_t(SEQUENCE_RUN));
+        EXPECT_EQ(next(id, 4, PM_FAILED_POLARITY), id == SEQUENCE_pole ? uint32_t(SEQUENCE_FAULT) : 5U);
+        EXPECT_EQ(next(id, 4, PM_FAILED_TIMEOUT), uint32_t(SEQUENCE_FAULT));
     }
-    EXPECT_EQ(sequence_step(SEQUENCE_pole_align, 4)->procedure, PROCEDURE_align);
-    EXPECT_EQ(next(SEQUENCE_pole_align, 4, PM_DONE), uint32_t(SEQUENCE_RUN));
-    EXPECT_EQ(sequence_step(SEQUENCE_pulses_align, 3)->procedure, PROCEDURE_align);
-    EXPECT_EQ(next(SEQUENCE_pulses_align, 3, PM_DONE), uint32_t(SEQUENCE_RUN));
-    EXPECT_EQ(next(SEQUENCE_pulses_align, 3, PM_FAILED_POLARITY), uint32_t(SEQUENCE_FAULT));
+    EXPECT_EQ(sequence_step(SEQUENCE_pole_align, 5)->procedure, PROCEDURE_align);
+    EXPECT_EQ(next(SEQUENCE_pole_align, 5, PM_DONE), uint32_t(SEQUENCE_RUN));
+    EXPECT_EQ(sequence_step(SEQUENCE_pulses_align, 4)->procedure, PROCEDURE_align);
+    EXPECT_EQ(next(SEQUENCE_pulses_align, 4, PM_DONE), uint32_t(SEQUENCE_RUN));
+    EXPECT_EQ(next(SEQUENCE_pulses_align, 4, PM_FAILED_POLARITY), uint32_t(SEQUENCE_FAULT));
 }
 
 // Calibrated, with the pulses at work.
@@ -178,7 +186,15 @@ drive_params_t three_phase_and_sine()
     return p;
 }
 
+drive_params_t looking()
+{
+    drive_params_t p = direct::params(1);
+    p.flying_start = 1;
+    return p;
+}
+
 const Start kStarts[] = {
+    {"look", looking(), DRIVE_MODE_SPEED},
     {"lock, pulses", lock_and(1), DRIVE_MODE_SPEED},
     {"lock, current", lock_and(2), DRIVE_MODE_SPEED},
     {"three phases", three_phase_and_sine(), DRIVE_MODE_SPEED},

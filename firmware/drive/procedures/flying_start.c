@@ -1,0 +1,256 @@
+#include "firmware/drive/procedures/flying_start.h"
+
+#include "firmware/drive/drive_parts.h"
+#include "firmware/math/compiler.h"
+#include "firmware/math/root.h"
+#include "firmware/math/trig.h"
+
+#if PM_HAS(flying_start)
+
+#define PARTS FLYING_START_PARTS
+/* What is commanded in a period acts in the next, whose end the one after sees. */
+#define SEEN 2U
+/* Samples of zero current before a pulse: what one takes for zero may be the end of a slow decay. */
+#define QUIET 2U
+/* Times its noise: a current of a leg that is there, and one that has an angle, of 3 degrees rms. */
+#define THERE 6
+#define LEAST 20
+
+/* Periods of a pulse. */
+static uint32_t periods_of(uint32_t length)
+{
+    return length < (uint32_t)PARTS ? 1U : length / (uint32_t)PARTS;
+}
+
+/* Length of a pulse in 64ths of a period: one that is shorter has the second half alone. */
+static uint32_t seen_of(uint32_t length)
+{
+    return length < (uint32_t)PARTS ? length : 2U * length;
+}
+
+static int32_t times(pm_q_t x, uint32_t n) /* at most 4 */
+{
+    return n >= (uint32_t)PM_Q(4.0) / (uint32_t)pm_max(x, 1) ? PM_Q(4.0) : x * (int32_t)n;
+}
+
+/* The longest of the next pulses that cannot carry twice i_enough: four times as long, twice, or none. */
+static uint32_t longer(const flying_start_t *self, const flying_start_config_t *c, pm_q_t i)
+{
+    const uint32_t now = seen_of(self->length);
+    for (uint32_t times = 4; times >= 2U; times /= 2U) {
+        const uint32_t next = times * self->length;
+        if (next <= c->longest && i < 2 * c->i_enough / (int32_t)(seen_of(next) / now)) {
+            return next;
+        }
+    }
+    return 0;
+}
+
+/* Until the next pulse; all of the time that is left, if no other fits behind it. */
+static pm_procedure_t after_pulse(flying_start_t *self, const flying_start_config_t *c)
+{
+    static const uint8_t more[FLYING_START_PULSES + 1] = {0, 0, 1, 3, 7, 0}; /* pitches, of so many pulses */
+    const uint32_t pitch = periods_of(self->length) + SEEN + QUIET - 1U;
+    const uint32_t behind = self->timer + pitch;
+    if (self->charged >= c->charge && (self->count >= FLYING_START_PULSES || behind > c->span)) {
+        return PM_DONE;
+    }
+    const uint32_t pause = pitch * more[self->count];
+    const uint32_t rest = behind < c->span ? c->span - behind : 0U;
+    const bool last = rest < pause + pitch && self->count < FLYING_START_PULSES;
+    self->wait = (uint16_t)(SEEN + QUIET - 1U + (last ? rest : pause));
+    return PM_RUNNING;
+}
+
+/* What devices and noise leave of it has no angle. */
+static bool is_large(const flying_start_t *self, const flying_start_config_t *c, pm_q_t i)
+{
+    return i >= LEAST * c->noise && i / 3 >= times(c->drop, seen_of(self->length));
+}
+
+static pm_procedure_t keep(flying_start_t *self, const flying_start_config_t *c, pm_abc_t i, uint16_t period)
+{
+    const pm_ab_t i_ab = pm_clarke(i);
+    if (self->count == 0U) {
+        const pm_q_t size = pm_hypot(i_ab.alpha, i_ab.beta);
+        const uint32_t next = longer(self, c, size);
+        if (next != 0U) {
+            self->length = (uint16_t)next;
+            return PM_RUNNING;
+        }
+        if (!is_large(self, c, size)) {
+            return PM_FAILED_NOT_TURNING;
+        }
+    }
+    const uint32_t last = (uint32_t)FLYING_START_PULSES - 1U;
+    const uint32_t n = self->count < last ? self->count : last;
+    self->pulse[n] = (flying_start_pulse_t){.i = i_ab, .at = period};
+    self->count = (uint8_t)(n + 1U);
+    return after_pulse(self, c);
+}
+
+static bool is_zero(const flying_start_config_t *c, pm_abc_t i)
+{
+    return pm_abs(i.a) < c->i_zero && pm_abs(i.b) < c->i_zero && pm_abs(i.c) < c->i_zero;
+}
+
+pm_procedure_t flying_start_step(flying_start_t *self, const flying_start_config_t *c, pm_abc_t i,
+                                 uint16_t period, uint32_t *low)
+{
+    *low = 0;
+    self->timer++;
+    self->since++;
+    if (self->left == 0U) {
+        if (self->begun && self->since == SEEN) {
+            return keep(self, c, i, period);
+        }
+        if (self->timer == UINT16_MAX) {
+            return PM_FAILED_TIMEOUT;
+        }
+        self->quiet = is_zero(c, i) ? (uint8_t)(self->quiet + (self->quiet < QUIET ? 1U : 0U)) : 0U;
+        if (self->since <= self->wait || self->quiet < QUIET) {
+            return PM_RUNNING;
+        }
+        self->timer = self->begun ? self->timer : 0U;
+        self->length = self->begun ? self->length : c->shortest;
+        self->begun = true;
+        self->left = (uint16_t)periods_of(self->length);
+        self->wait = SEEN;
+        self->quiet = 0;
+    }
+    self->left--;
+    self->since = 0;
+    *low = self->length < (uint16_t)PARTS ? self->length : (uint32_t)PARTS;
+    self->charged += *low;
+    return PM_RUNNING;
+}
+
+/* A leg's current with what the devices took from it; within the noise they conduct nothing. */
+static pm_q_t restored(const flying_start_config_t *c, pm_q_t i, pm_q_t drop)
+{
+    const pm_q_t size = pm_abs(i);
+    const pm_q_t more = size < THERE * c->noise ? 0 : drop;
+    return i < 0 ? i - more : i + more;
+}
+
+static pm_angle_t angle_of(const flying_start_config_t *c, pm_ab_t i, uint32_t seen)
+{
+    const pm_abc_t legs = pm_clarke_inverse(i);
+    const pm_q_t drop = times(c->drop, seen);
+    const pm_ab_t whole = pm_clarke((pm_abc_t){
+        .a = restored(c, legs.a, drop), .b = restored(c, legs.b, drop), .c = restored(c, legs.c, drop)});
+    return pm_atan2(whole.beta, whole.alpha);
+}
+
+/* By which the current lags behind the EMF at the end of the pulse. */
+static pm_angle_t delta_of(const flying_start_config_t *c, const pm_machine_t *machine, int32_t turn,
+                           uint32_t seen)
+{
+    const pm_q_t x = times(c->decay, seen) / 8;
+    const pm_q_t y = pm_mul_sat(x, pm_div(machine->L_q, machine->L_d));
+    const pm_q_t later = PM_ONE / 8 + pm_frac(y, PM_FRAC(0.333333333)) - pm_frac(x, PM_FRAC(0.166666667)) +
+                         pm_frac(pm_mul(x, y), PM_FRAC(0.32));
+    const pm_q_t centre = pm_div(PM_ONE / 16, later);
+    const int32_t part = pm_abs(turn) / (int32_t)(2U * PARTS);
+    const int32_t most = (int32_t)PM_TURN(0.45);
+    const int32_t whole = part < most / (int32_t)seen ? part * (int32_t)seen : most;
+    const pm_dir_t dir = pm_dir((pm_angle_t)pm_mul(whole, centre));
+    return pm_atan2(pm_unit(machine->L_q, dir.sin), pm_unit(machine->L_d, dir.cos));
+}
+
+/* A turn that the noise of the currents could make. */
+static bool is_still(const flying_start_config_t *c, pm_q_t i, int32_t turn, uint32_t periods)
+{
+    const int32_t most = (int32_t)PM_TURN(0.16);
+    const int32_t size = pm_abs(turn);
+    const int32_t whole = size < most / (int32_t)periods ? size * (int32_t)periods : most;
+    return pm_mulh(i, whole) < c->noise + c->noise / 2;
+}
+
+pm_procedure_t flying_start_find(flying_start_t *self, const flying_start_config_t *c,
+                                 const pm_machine_t *machine, int32_t k_theta)
+{
+    if (self->count < 2U) {
+        return PM_FAILED_NOT_TURNING;
+    }
+    const uint32_t seen = seen_of(self->length);
+    const pm_angle_t first = angle_of(c, self->pulse[0].i, seen);
+    pm_angle_t angle = first;
+    uint32_t periods = 1;
+    int32_t turn = 0;
+    for (uint32_t n = 1; n < self->count; n++) {
+        periods = (uint16_t)(self->pulse[n].at - self->pulse[0].at);
+        angle = angle_of(c, self->pulse[n].i, seen);
+        turn += pm_angle_diff(angle - first, (uint32_t)turn * periods) / (int32_t)periods;
+    }
+    const pm_ab_t i = self->pulse[self->count - 1U].i;
+    if (is_still(c, pm_hypot(i.alpha, i.beta), turn, periods)) {
+        return PM_FAILED_NOT_TURNING;
+    }
+    const pm_angle_t behind = PM_TURN(0.25) + delta_of(c, machine, turn, seen);
+    self->theta = turn > 0 ? angle + behind : angle - behind;
+    self->omega = pm_div(turn, pm_omega_to_angle(PM_ONE, k_theta));
+    return PM_DONE;
+}
+
+void procedure_flying_start_begin(drive_t *drive)
+{
+    (void)drive;
+}
+
+/* Less than a period: in its second half alone, at whose end the currents are sampled. Else the diodes would conduct between
+ * the two, and what they leave lies along an axis of theirs. */
+static void write_low(drive_t *drive, uint32_t low, drive_out_t *out)
+{
+    const uint32_t counts = (uint32_t)drive->config.modulator.counts;
+    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
+        drive_write_leg(out->compare[x], (int32_t)(counts - counts * low / (uint32_t)PARTS));
+    }
+    out->legs = PM_LEGS_PWM;
+#if PM_CARRIES(NEEDS_ONE_SWITCH) && PM_CARRIES(NEEDS_HALVES)
+    if (low < (uint32_t)PARTS) {
+        out->legs = PM_LEGS_ALL(PM_LEG_LOWER);
+        for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
+            out->compare[x][0] = (uint16_t)counts;
+        }
+    }
+#endif
+}
+
+PM_RARE pm_procedure_t procedure_flying_start_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
+{
+    (void)in;
+    uint32_t low;
+    const pm_procedure_t result =
+        flying_start_step(&drive->procedure.flying_start, &drive->config.flying_start, drive->i_abc,
+                          (uint16_t)drive->period, &low);
+    if (low != 0U) {
+        write_low(drive, low, out);
+    } else {
+        out->legs = PM_LEGS_OFF;
+        drive->completed = drive->period + 1U; /* low-side shunts do not see the upper diodes */
+    }
+    return result;
+}
+
+pm_procedure_t procedure_flying_start_slow(drive_t *drive)
+{
+    if (drive->procedure.result != PM_DONE) {
+        return drive->procedure.result;
+    }
+    flying_start_t *self = &drive->procedure.flying_start;
+    const drive_config_t *c = &drive->config;
+    const pm_procedure_t result = flying_start_find(self, &c->flying_start, &c->machine, c->k_theta);
+    const uint32_t since = (uint16_t)((uint16_t)drive->period - self->pulse[self->count - 1U].at);
+    const int32_t turn = pm_omega_to_angle(self->omega, c->k_theta);
+    drive->sequence.theta = self->theta + (uint32_t)turn * since;
+    drive->sequence.omega = self->omega;
+    return result;
+}
+
+void procedure_flying_start_abort(drive_t *drive)
+{
+    (void)drive;
+}
+
+#endif

@@ -1,0 +1,87 @@
+/* A rotor that turns already is caught: its angle and speed from the currents that its EMF drives through windings which
+ * are shorted for moments, all low switches on and then all switches off. First in every sequence (sequence.h), before
+ * anything else is driven; a rotor at rest is left to what comes then.
+ *
+ * From zero current, with s = L_q / L_d and tau the length of the pulse:
+ *   |i| = |w| psi_m tau / L_q                                   while tau is small against L / R and a turn
+ *   angle of i = theta -+ (90 degrees + delta),  tan delta = s tan(|w| c),   - forwards, + backwards
+ *   c = tau / 2 / (1 + y/3 - x/6 + 0.04 x y),  x = R tau / L_q,  y = R tau / L_d
+ * theta belongs to the end of the pulse. What devices drop along the current is added as i_drop = V_drop tau / L_q in each leg.
+ *
+ * The first pulse is a period long, on boards that have PWM on one switch (NEEDS_ONE_SWITCH) a 32nd of one. A pulse twice or four times as
+ * long follows while it cannot carry more than about 24 % of rated current, up to 3.2 ms. Five of the length that is left, at distances that
+ * double, give the speed: each tells how many turns lie between the next.
+ *   w = (angle of i_n - angle of i_0) / (t_n - t_0)
+ * At rest (PM_FAILED_NOT_TURNING): currents below six times their noise, or too little of a turn between the first and
+ * the last, 0.16 |i| |turn in rad| below the noise of a current.
+ *
+ * Largest current: that of a period, |w| psi_m T_s / L_q, or 24 % of rated. All takes at most 16 ms, without the wait
+ * for zero current: before the first pulse a rotor whose EMF exceeds the link lets the diodes conduct, and no switch closes
+ * until that ends; PM_FAILED_TIMEOUT after 65,535 periods. Between pulses the diodes take the current back to zero,
+ * and the link takes its energy, 3/4 L i^2.
+ * On boards with PM_BOOTSTRAP the pulses go on until the low switches have been on for what charge.h takes, since the
+ * caught rotor must not be shorted for as long.
+ * The step costs at most 110 instructions. Tests: tests/unit/drive/flying_start_test.cpp,
+ * tests/scenario/flying_start.yaml, tests/contract/procedure_contract_test.cpp. */
+#ifndef DRIVE_PROCEDURES_FLYING_START_H
+#define DRIVE_PROCEDURES_FLYING_START_H
+
+#include "firmware/drive/slip.h"
+#include "firmware/math/frames.h"
+#include "firmware/math/procedure.h"
+#include "firmware/params/types.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define FLYING_START_PULSES 5
+#define FLYING_START_PARTS  32 /* of a period */
+
+typedef struct {
+    bool on;
+    uint16_t shortest, longest; /* pulse, in parts; those shorter than a period need PWM on one switch */
+    uint16_t span;              /* periods in which the pulses begin and end */
+    uint32_t charge;            /* parts for which the low switches must have been on at the end */
+    pm_q_t i_zero;              /* currents below count as zero */
+    pm_q_t i_enough;            /* a pulse that reaches it is not made twice as long */
+    pm_q_t noise;               /* of one current */
+    pm_q_t decay;               /* R T_s / (64 L_q) */
+    pm_q_t drop;                /* V_drop T_s / (64 L_q), a current */
+} flying_start_config_t;
+
+typedef struct {
+    pm_ab_t i;   /* at its end ... */
+    uint16_t at; /* ... in that period */
+} flying_start_pulse_t;
+
+typedef struct {
+    flying_start_pulse_t pulse[FLYING_START_PULSES];
+    uint32_t charged; /* parts for which the low switches were on */
+    uint16_t length;  /* parts */
+    uint16_t timer;   /* periods since the first pulse began; before, since the procedure did */
+    uint16_t since;   /* periods since the last one with the low switches on */
+    uint16_t wait;    /* of those, until the next pulse */
+    uint16_t left;    /* periods of the present pulse */
+    uint8_t quiet;    /* samples of zero current */
+    uint8_t count;
+    bool begun;
+    pm_angle_t theta; /* found, at the end of the last pulse */
+    pm_q_t omega;
+} flying_start_t;
+
+/* One period; *low: parts of the coming one for which all low switches are on. */
+pm_procedure_t flying_start_step(flying_start_t *self, const flying_start_config_t *config, pm_abc_t i,
+                                 uint16_t period, uint32_t *low);
+
+/* After PM_DONE: theta and omega; k_theta is that of pm_omega_to_angle(). Not for the control interrupt. */
+pm_procedure_t flying_start_find(flying_start_t *self, const flying_start_config_t *config,
+                                 const pm_machine_t *machine, int32_t k_theta);
+
+void make_flying_start(maker_t *m, flying_start_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

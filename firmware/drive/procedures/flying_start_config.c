@@ -1,0 +1,31 @@
+#include "firmware/drive/procedures/flying_start.h"
+#include "firmware/params/maker.h"
+
+#define LONGEST_US 3200U  /* a pulse */
+#define SPAN_US    16000U /* all of them */
+
+static pm_q_t per_part(maker_t *m, pm_num_t v, drive_param_id_t blame)
+{
+    const pm_num_t per =
+        pm_num_div(m->base.t_s, pm_num_mul(pm_num(2 * FLYING_START_PARTS), si(m, DRIVE_PARAM_L_q)));
+    return fixed(m, least(pm_num_mul(v, per), pm_num(4)), Q_BITS, blame);
+}
+
+void make_flying_start(maker_t *m, flying_start_config_t *c)
+{
+    const uint32_t f = (uint32_t)m->params->f_pwm;
+    c->on = m->params->flying_start != 0;
+    const uint32_t fine = NEEDS_ONE_SWITCH | NEEDS_HALVES;
+    c->shortest = (m->channels & fine) == fine ? 1U : FLYING_START_PARTS;
+    c->span = (uint16_t)(f / 1000U * SPAN_US / 1000U);
+    c->longest = FLYING_START_PARTS;
+    while (2UL * c->longest / FLYING_START_PARTS <= f / 1000U * LONGEST_US / 1000U) {
+        c->longest = (uint16_t)(2U * c->longest);
+    }
+    c->i_enough = fixed(m, pm_num_mul(pm_num_ratio(3, 25), pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i)),
+                        Q_BITS, DRIVE_PARAM_i_rated);
+    c->noise = pm_max(per_unit(m, DRIVE_PARAM_i_noise, m->base.i), PM_Q(0.5 / 4096.0));
+    c->i_zero = pm_max(5 * c->noise, PM_Q(8.0 / 4096.0));
+    c->decay = per_part(m, si(m, DRIVE_PARAM_R_s), DRIVE_PARAM_R_s);
+    c->drop = per_part(m, pm_num_div(si(m, DRIVE_PARAM_device_drop), m->base.i), DRIVE_PARAM_device_drop);
+}
