@@ -9,8 +9,8 @@
  * theta belongs to the end of the pulse. What devices drop along the current is added as i_drop = V_drop tau / L_q in each leg.
  *
  * The first pulse is a period long; on boards that have PWM on one switch and different halves of a period, a 64th of one,
- * at its end. A pulse twice or four times as long follows while it cannot carry more than about 40 % of rated current, up to
- * 3.2 ms. Five of the length that is left, at distances that double, give the speed: each tells how many turns lie before
+ * at its end. A pulse twice or four times as long follows while it cannot carry more than about 40 % of rated current, nor of
+ * psi_m / L_q, where the rotor has turned by 0.4 rad and saturation would count, and is not longer than 3.2 ms. Five of the length that is left, at distances that double, give the speed: each tells how many turns lie before
  * the next.
  *   w = (angle of i_n - angle of i_0) / (t_n - t_0)
  * At rest (PM_FAILED_NOT_TURNING): currents below twenty times their noise or three times i_drop, or a turn that noise could
