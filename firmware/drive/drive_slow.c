@@ -94,12 +94,13 @@ PM_RARE static void go_on(drive_t *drive)
 #endif
 
 #if PM_HAS(flying_start)
-/* The EMF is the voltage that keeps the current at zero, from the period that has begun on; where the link has less, the
+/* Called from drive_slow() itself, as begin_step(). The EMF is the voltage that keeps the current at zero, from the period that has begun on; where the link has less, the
  * current that weakens the field is wanted at once. Any other comes little by little. At a speed where neither source sees
  * the rotor it is held by a vector along its d-axis. */
 PM_RARE static void begin_caught(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
+    drive->sequence.begins = false;
     const pm_pll_t caught = {.theta = drive->sequence.theta, .omega = drive->sequence.omega};
     const bool imposed = !c->position.injects && pm_abs(caught.omega) < c->position.omega_low;
     if (imposed) {
@@ -188,7 +189,6 @@ static void advance(drive_t *drive, pm_procedure_t result)
     case SEQUENCE_WAIT:
         drive->stage = STAGE_OFF;
         break;
-        PM_IN_IMAGE(flying_start, case SEQUENCE_CAUGHT : begin_caught(drive); break;)
     default:
         self->step = (uint8_t)next;
         self->begins = true;
@@ -368,6 +368,11 @@ void drive_slow(drive_t *drive, const drive_slow_in_t *in)
         if (drive->stage == STAGE_VECTOR) {
             resolve_slip(drive);
         }
+#if PM_HAS(flying_start)
+        if (drive->sequence.begins && drive->sequence.step == (uint8_t)SEQUENCE_CAUGHT) {
+            begin_caught(drive);
+        }
+#endif
         if (drive->sequence.begins) {
             begin_step(drive);
         }
