@@ -95,12 +95,18 @@ PM_RARE static void go_on(drive_t *drive)
 #endif
 
 #if PM_HAS(flying_start)
-/* The EMF is the voltage that keeps the current at zero, from the period that has begun on; where the link has less, the
- * current that weakens the field is wanted at once. */
+/* Called from drive_slow() itself, as begin_step(). The EMF is the voltage that keeps the current at zero, from the period that has begun on; where the link has less, the
+ * current that weakens the field is wanted at once. Any other comes little by little. At a speed where neither source sees
+ * the rotor it is held by a vector along its d-axis. */
 PM_RARE static void begin_caught(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
+    drive->sequence.begins = false;
     const pm_pll_t caught = {.theta = drive->sequence.theta, .omega = drive->sequence.omega};
+    const bool imposed = !c->position.injects && pm_abs(caught.omega) < c->position.omega_low;
+    if (imposed) {
+        open_loop_start(drive);
+    }
     position_take(&drive->position, &c->position, &caught);
     const pm_q_t v_top = pm_unit(drive->status.v_dc, c->v_share);
     const pm_q_t emf = pm_mul(caught.omega, c->machine.psi_m);
@@ -119,7 +125,11 @@ PM_RARE static void begin_caught(drive_t *drive)
     drive->v_acting = pm_park_inverse(e, pm_dir(middle));
     drive->v_next = pm_park_inverse(e, pm_dir(middle + (pm_angle_t)turn));
     drive->status.theta = caught.theta;
-    drive->stage = STAGE_VECTOR;
+    drive->theta_open = caught.theta;
+    drive->omega_ramp = caught.omega;
+    drive->omega_open = caught.omega;
+    drive->i_open = imposed ? 0 : pm_mul(c->i_d_light, drive->position.weight);
+    drive->stage = imposed ? STAGE_OPEN_LOOP : STAGE_VECTOR;
     drive->state = DRIVE_RUNNING;
     drive->state_ms = 0;
 }
@@ -181,7 +191,6 @@ static void advance(drive_t *drive, pm_procedure_t result)
     case SEQUENCE_WAIT:
         drive->stage = STAGE_OFF;
         break;
-        PM_IN_IMAGE(flying_start, case SEQUENCE_CAUGHT : begin_caught(drive); break;)
     default:
         self->step = (uint8_t)next;
         self->begins = true;
@@ -361,6 +370,11 @@ void drive_slow(drive_t *drive, const drive_slow_in_t *in)
         if (drive->stage == STAGE_VECTOR) {
             resolve_slip(drive);
         }
+#if PM_HAS(flying_start)
+        if (drive->sequence.begins && drive->sequence.step == (uint8_t)SEQUENCE_CAUGHT) {
+            begin_caught(drive);
+        }
+#endif
         if (drive->sequence.begins) {
             begin_step(drive);
         }

@@ -142,7 +142,9 @@ void protection_current_limits(drive_t *drive, pm_q_t *i_min, pm_q_t *i_max)
 {
     const protection_config_t *c = &drive->config.protection;
     const pm_unit_t by_temperature = derate(drive->temperature_dC, c->temp_derate_dC, c->temp_trip_dC);
-    const pm_unit_t by_voltage = derate(drive->status.v_dc, c->v_dc_derate, c->v_dc_max);
+    /* nothing is regenerated in the last quarter: noise of the current must not carry the link to v_dc_max */
+    const pm_q_t v_dc_none = c->v_dc_max - (c->v_dc_max - c->v_dc_derate) / 4;
+    const pm_unit_t by_voltage = derate(drive->status.v_dc, c->v_dc_derate, v_dc_none);
     const pm_q_t i = pm_unit(drive->config.i_max, by_temperature);
     if (by_temperature < PM_UNIT_MAX) {
         drive->status.limits |= DRIVE_LIMIT_TEMPERATURE;

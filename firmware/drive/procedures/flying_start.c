@@ -12,6 +12,8 @@
 #define SEEN 2U
 /* Samples of zero current before a pulse: what one takes for zero may be the end of a slow decay. */
 #define QUIET 2U
+/* From then on, after a pulse, what is left may be the ringing of the open legs with the winding, which does not end. */
+#define RINGS (SEEN + 4U)
 /* Times its noise: a current of a leg that is there, and one that has an angle, of 3 degrees rms. */
 #define THERE 6
 #define LEAST 20
@@ -47,19 +49,20 @@ static uint32_t longer(const flying_start_t *self, const flying_start_config_t *
 }
 
 /* Until the next pulse; all of the time that is left, if no other fits behind it. */
-static pm_procedure_t after_pulse(flying_start_t *self, const flying_start_config_t *c)
+static void after_pulse(flying_start_t *self, const flying_start_config_t *c)
 {
     static const uint8_t more[FLYING_START_PULSES + 1] = {0, 0, 1, 3, 7, 0}; /* pitches, of so many pulses */
     const uint32_t pitch = periods_of(self->length) + SEEN + QUIET - 1U;
     const uint32_t behind = self->timer + pitch;
     if (self->charged >= c->charge && (self->count >= FLYING_START_PULSES || behind > c->span)) {
-        return PM_DONE;
+        self->ended = true;
+        self->wait = SEEN;
+        return;
     }
     const uint32_t pause = pitch * more[self->count];
     const uint32_t rest = behind < c->span ? c->span - behind : 0U;
     const bool last = rest < pause + pitch && self->count < FLYING_START_PULSES;
     self->wait = (uint16_t)(SEEN + QUIET - 1U + (last ? rest : pause));
-    return PM_RUNNING;
 }
 
 /* What devices and noise leave of it has no angle. */
@@ -86,12 +89,14 @@ static pm_procedure_t keep(flying_start_t *self, const flying_start_config_t *c,
     const uint32_t n = self->count < last ? self->count : last;
     self->pulse[n] = (flying_start_pulse_t){.i = i_ab, .at = period};
     self->count = (uint8_t)(n + 1U);
-    return after_pulse(self, c);
+    after_pulse(self, c);
+    return PM_RUNNING;
 }
 
-static bool is_zero(const flying_start_config_t *c, pm_abc_t i)
+static bool is_zero(const flying_start_t *self, const flying_start_config_t *c, pm_abc_t i)
 {
-    return pm_abs(i.a) < c->i_zero && pm_abs(i.b) < c->i_zero && pm_abs(i.c) < c->i_zero;
+    const pm_q_t zero = self->begun && self->since >= RINGS ? c->i_rings : c->i_zero;
+    return pm_abs(i.a) < zero && pm_abs(i.b) < zero && pm_abs(i.c) < zero;
 }
 
 pm_procedure_t flying_start_step(flying_start_t *self, const flying_start_config_t *c, pm_abc_t i,
@@ -107,9 +112,12 @@ pm_procedure_t flying_start_step(flying_start_t *self, const flying_start_config
         if (self->timer == UINT16_MAX) {
             return PM_FAILED_TIMEOUT;
         }
-        self->quiet = is_zero(c, i) ? (uint8_t)(self->quiet + (self->quiet < QUIET ? 1U : 0U)) : 0U;
+        self->quiet = is_zero(self, c, i) ? (uint8_t)(self->quiet + (self->quiet < QUIET ? 1U : 0U)) : 0U;
         if (self->since <= self->wait || self->quiet < QUIET) {
             return PM_RUNNING;
+        }
+        if (self->ended) {
+            return PM_DONE;
         }
         self->timer = self->begun ? self->timer : 0U;
         self->length = self->begun ? self->length : c->shortest;

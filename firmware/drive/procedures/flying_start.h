@@ -8,20 +8,23 @@
  *   c = tau / 2 / (1 + y/3 - x/6 + 0.04 x y),  x = R tau / L_q,  y = R tau / L_d
  * theta belongs to the end of the pulse. What devices drop along the current is added as i_drop = V_drop tau / L_q in each leg.
  *
- * The first pulse is a period long, on boards that have PWM on one switch (NEEDS_ONE_SWITCH) a 32nd of one. A pulse twice or four times as
- * long follows while it cannot carry more than about 24 % of rated current, up to 3.2 ms. Five of the length that is left, at distances that
- * double, give the speed: each tells how many turns lie between the next.
+ * The first pulse is a period long; on boards that have PWM on one switch and different halves of a period, a 64th of one,
+ * at its end. A pulse twice or four times as long follows while it cannot carry more than about 40 % of rated current, nor of
+ * psi_m / L_q, where the rotor has turned by 0.4 rad and saturation would count, and is not longer than 3.2 ms. Five of the length that is left, at distances that double, give the speed: each tells how many turns lie before
+ * the next.
  *   w = (angle of i_n - angle of i_0) / (t_n - t_0)
- * At rest (PM_FAILED_NOT_TURNING): currents below six times their noise, or too little of a turn between the first and
- * the last, 0.16 |i| |turn in rad| below the noise of a current.
+ * At rest (PM_FAILED_NOT_TURNING): currents below twenty times their noise or three times i_drop, or a turn that noise could
+ * make, 0.16 |i| |turn in rad| below 1.5 times the noise of a current. A 12-bit converter of 2.5 times rated current sees 5 to
+ * 10 % of rated speed, and less where L is small.
  *
- * Largest current: that of a period, |w| psi_m T_s / L_q, or 24 % of rated. All takes at most 16 ms, without the wait
- * for zero current: before the first pulse a rotor whose EMF exceeds the link lets the diodes conduct, and no switch closes
- * until that ends; PM_FAILED_TIMEOUT after 65,535 periods. Between pulses the diodes take the current back to zero,
- * and the link takes its energy, 3/4 L i^2.
+ * Largest current: that of the first pulse, |w| psi_m tau / L_q, or 40 % of rated. All takes at most 16 ms, without the wait for
+ * zero current: where the EMF exceeds the link the diodes conduct, and no switch closes until that ends;
+ * PM_FAILED_TIMEOUT after 65,535 periods. Between pulses the diodes take the current back to zero, and the link takes its
+ * energy, 3/4 L i^2. What rings on for longer than four periods is that of the legs' capacitance, v_dc root(C / L_d) at
+ * its most, and ends no wait.
  * On boards with PM_BOOTSTRAP the pulses go on until the low switches have been on for what charge.h takes, since the
  * caught rotor must not be shorted for as long.
- * The step costs at most 110 instructions. Tests: tests/unit/drive/flying_start_test.cpp,
+ * The step costs at most 150 instructions. Tests: tests/unit/drive/flying_start_test.cpp,
  * tests/scenario/flying_start.yaml, tests/contract/procedure_contract_test.cpp. */
 #ifndef DRIVE_PROCEDURES_FLYING_START_H
 #define DRIVE_PROCEDURES_FLYING_START_H
@@ -44,6 +47,7 @@ typedef struct {
     uint16_t span;              /* periods in which the pulses begin and end */
     uint32_t charge;            /* parts for which the low switches must have been on at the end */
     pm_q_t i_zero;              /* currents below count as zero */
+    pm_q_t i_rings;             /* the same when the legs have been off for long enough */
     pm_q_t i_enough;            /* a pulse that reaches it is not made twice as long */
     pm_q_t noise;               /* of one current */
     pm_q_t decay;               /* R T_s / (64 L_q) */
@@ -65,8 +69,8 @@ typedef struct {
     uint16_t left;    /* periods of the present pulse */
     uint8_t quiet;    /* samples of zero current */
     uint8_t count;
-    bool begun;
-    pm_angle_t theta; /* found, at the end of the last pulse */
+    bool begun, ended; /* the first pulse, the last */
+    pm_angle_t theta;  /* found, at the end of the last pulse */
     pm_q_t omega;
 } flying_start_t;
 

@@ -11,6 +11,15 @@ static pm_q_t per_part(maker_t *m, pm_num_t v, drive_param_id_t blame)
     return fixed(m, least(pm_num_mul(v, per), pm_num(4)), Q_BITS, blame);
 }
 
+/* Of the open legs with the winding: v_dc root(C / L_d) at its most, and no more than an eighth of rated current. */
+static pm_q_t make_ringing(maker_t *m)
+{
+    const pm_num_t per = pm_num_div(si(m, DRIVE_PARAM_leg_capacitance), si(m, DRIVE_PARAM_L_d));
+    const pm_num_t i = pm_num_mul(si(m, DRIVE_PARAM_v_dc_nominal), pm_num_sqrt(per));
+    const pm_num_t most = pm_num_div(si(m, DRIVE_PARAM_i_rated), pm_num(8));
+    return fixed(m, pm_num_div(least(i, most), m->base.i), Q_BITS, DRIVE_PARAM_leg_capacitance);
+}
+
 void make_flying_start(maker_t *m, flying_start_config_t *c)
 {
     const uint32_t f = (uint32_t)m->params->f_pwm;
@@ -22,10 +31,12 @@ void make_flying_start(maker_t *m, flying_start_config_t *c)
     while (2UL * c->longest / FLYING_START_PARTS <= f / 1000U * LONGEST_US / 1000U) {
         c->longest = (uint16_t)(2U * c->longest);
     }
-    c->i_enough = fixed(m, pm_num_mul(pm_num_ratio(3, 25), pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i)),
-                        Q_BITS, DRIVE_PARAM_i_rated);
+    const pm_num_t turns = pm_num_div(si(m, DRIVE_PARAM_psi_m), si(m, DRIVE_PARAM_L_q)); /* by a radian */
+    const pm_num_t i = pm_num_mul(least(si(m, DRIVE_PARAM_i_rated), turns), pm_num_ratio(1, 5));
+    c->i_enough = fixed(m, pm_num_div(i, m->base.i), Q_BITS, DRIVE_PARAM_i_rated);
     c->noise = pm_max(per_unit(m, DRIVE_PARAM_i_noise, m->base.i), PM_Q(0.5 / 4096.0));
     c->i_zero = pm_max(5 * c->noise, PM_Q(8.0 / 4096.0));
+    c->i_rings = pm_max(make_ringing(m), c->i_zero);
     c->decay = per_part(m, si(m, DRIVE_PARAM_R_s), DRIVE_PARAM_R_s);
     c->drop = per_part(m, pm_num_div(si(m, DRIVE_PARAM_device_drop), m->base.i), DRIVE_PARAM_device_drop);
 }

@@ -98,7 +98,7 @@ Found pulses(Turning x, bool fine, uint64_t seed)
     }
     c.span = static_cast<uint16_t>(16e-3 / x.m.period_s);
     c.noise = q28(0.3e-3);
-    c.i_zero = q28(2e-3);
+    c.i_zero = c.i_rings = q28(2e-3);
     c.i_enough = q28(0.12 * x.m.i_rated_A / x.m.i_full_A);
     c.decay = q28(x.m.R_ohm * x.m.period_s / (64 * x.m.L_q_H));
     pm_machine_t machine = {};
@@ -110,7 +110,8 @@ Found pulses(Turning x, bool fine, uint64_t seed)
     flying_start_t self = {};
     Found f;
     uint32_t acting = 0;
-    for (uint16_t k = 65500; f.result == PM_RUNNING && f.time_s < 0.1; ++k) { // the count of periods wraps
+    uint16_t k = 65500; // the count of periods wraps
+    for (; f.result == PM_RUNNING && f.time_s < 0.1; ++k) {
         uint32_t low = 0;
         f.result = flying_start_step(&self, &c, x.seen(random, 0.3e-3 * x.m.i_full_A), k, &low);
         f.time_s += x.m.period_s;
@@ -122,7 +123,9 @@ Found pulses(Turning x, bool fine, uint64_t seed)
     }
     if (f.result == PM_DONE) {
         f.result = flying_start_find(&self, &c, &machine, k_theta);
-        f.angle_error_rad = wrapped(x.theta_rad - rad(self.theta));
+        const int since = static_cast<uint16_t>(k - 1 - self.pulse[self.count - 1].at);
+        const double turned = self.omega / double(PM_ONE) * omega_base * x.m.period_s * since;
+        f.angle_error_rad = wrapped(x.theta_rad - turned - rad(self.theta));
         f.speed_error = self.omega / double(PM_ONE) * omega_base / x.omega_1_s - 1;
     }
     return f;
@@ -206,6 +209,7 @@ drive_params_t ipm_params()
     drive_params_t p = direct::params(1);
     p.flying_start = 1;
     p.i_noise = 2820;
+    p.leg_capacitance = 500;
     return p;
 }
 
@@ -449,7 +453,7 @@ TEST(FlyingStart, ChargesTheUpperSwitchesInPulses)
     c.span = 160;
     c.charge = 20 * 32;
     c.noise = q28(0.3e-3);
-    c.i_zero = q28(2e-3);
+    c.i_zero = c.i_rings = q28(2e-3);
     c.i_enough = q28(0.05);
     Turning x = draw(random);
     x.omega_1_s = 500;

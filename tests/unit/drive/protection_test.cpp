@@ -276,7 +276,7 @@ TEST(Protection, CurrentIsDeratedByTemperatureAndVoltage)
                 pm_q_t i_min, i_most;
                 protection_current_limits(&x.d, &i_min, &i_most);
                 const double hot = std::clamp((1100.0 - dC) / 200, 0.0, 1.0);
-                const double high = std::clamp((400.0 - v) / 20, 0.0, 1.0);
+                const double high = std::clamp((395.0 - v) / 15, 0.0, 1.0); // a quarter is left
                 const double drives = i_max * hot, brakes = i_max * hot * high;
                 // a turn of the sign brakes
                 EXPECT_NEAR(real(i_most), omega > 0 ? drives : brakes, 1e-4) << dC << ' ' << v;
