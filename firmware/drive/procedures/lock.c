@@ -48,14 +48,14 @@ PM_APART pm_procedure_t procedure_lock_slow(drive_t *drive)
 {
     lock_t *self = &drive->beside.lock;
     self->ms++;
-    if (self->second < 2U) {
-        look(drive, &self->look[self->second], self->ms > READ_MS);
+    if (lock_looks(self)) {
+        look(drive, &self->look[self->looks], self->ms > READ_MS);
         if (self->ms < LOOK_MS) {
             return PM_RUNNING;
         }
         self->ms = 0;
-        self->second++;
-        if (self->second == 2U) {
+        self->looks++;
+        if (!lock_looks(self)) {
             return close_loop(drive);
         }
         drive->position.pll.theta = APART;

@@ -19,7 +19,15 @@
 
 typedef struct {
     polarity_mean_t look[2];
-    uint16_t ms, second; /* of this look, and whether it is the second */
+    uint16_t ms, looks; /* of this look, and how many have been before it */
 } lock_t;
+
+#define LOCK_LOOKS 2U
+
+/* The loop is open: nothing is known of the angle. */
+static inline bool lock_looks(const lock_t *self)
+{
+    return self->looks < LOCK_LOOKS;
+}
 
 #endif
