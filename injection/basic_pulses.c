@@ -26,8 +26,9 @@ pm_procedure_t basic_pulses_step(basic_pulses_t *self, const pulses_config_t *co
 primary_config_t basic_pulses_limits(const pulses_config_t *config)
 {
     return (primary_config_t){.y_min = config->y_min / 3,
-                              .bridge = pm_mul(PM_Q(2.0 / 3), config->i_bridge),
-                              .noise = pm_max(pm_mul(PM_Q(1.155), config->i_noise), 1)};
+                              .pole = {.bridge = pm_mul(PM_Q(2.0 / 3), config->i_bridge),
+                                       .noise = pm_max(pm_mul(PM_Q(1.155), config->i_noise), 1),
+                                       .reversed = config->reversed}};
 }
 
 pm_procedure_t basic_pulses_find(basic_pulses_t *self, const pulses_config_t *config)

@@ -46,7 +46,7 @@ pm_procedure_t dc_link_pulses_step(dc_link_pulses_t *self, const dc_link_pulses_
 pm_procedure_t dc_link_pulses_find(dc_link_pulses_t *self, const dc_link_pulses_config_t *config)
 {
     for (uint32_t x = 0; x < PULSES_AXES; x++) {
-        if (self->response.sum[x] < 5 * config->limits.noise) {
+        if (self->response.sum[x] < 5 * config->limits.pole.noise) {
             return PM_FAILED_TIMEOUT;
         }
     }

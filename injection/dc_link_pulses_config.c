@@ -41,9 +41,11 @@ void make_dc_link_pulses(maker_t *m, const pulses_config_t *pulses, dc_link_puls
              pm_num(repeats), pm_num(1));
     const primary_config_t currents = basic_pulses_limits(pulses);
     c->limits.y_min = fixed(m, pm_num_mul(k, real(currents.y_min)), Q_BITS, DRIVE_PARAM_dc_link_repeats);
-    c->limits.bridge = fixed(m, pm_num_mul(k, real(currents.bridge)), Q_BITS, DRIVE_PARAM_dc_link_repeats);
+    c->limits.pole.bridge =
+        fixed(m, pm_num_mul(k, real(currents.pole.bridge)), Q_BITS, DRIVE_PARAM_dc_link_repeats);
     /* 0.6 of a step of a 12-bit converter; sqrt(1 + 1/4) of it in a drop, 1.155 of that in y */
     const pm_num_t step = pm_num_div(pm_num_div(si(m, DRIVE_PARAM_v_full_scale), m->base.v), pm_num(4096));
     const pm_num_t noise = mul3(pm_num_ratio(775, 1000), step, pm_num_sqrt(pm_num(repeats)));
-    c->limits.noise = pm_max(fixed(m, noise, Q_BITS, DRIVE_PARAM_dc_link_repeats), 1);
+    c->limits.pole.reversed = currents.pole.reversed;
+    c->limits.pole.noise = pm_max(fixed(m, noise, Q_BITS, DRIVE_PARAM_dc_link_repeats), 1);
 }

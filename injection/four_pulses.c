@@ -64,6 +64,19 @@ static void correct(four_pulses_t *self)
                         *theta);
 }
 
+/* Of the vectors of the first three. */
+static pm_ab_t sum(const pulses_t *train)
+{
+    pm_ab_t w = {0, 0};
+    for (uint32_t x = 0; x < PULSES_AXES; x++) {
+        const pm_ab_t i =
+            pm_clarke((pm_abc_t){.a = train->e[x][0], .b = train->e[x][1], .c = train->e[x][2]});
+        w.alpha += i.alpha;
+        w.beta += i.beta;
+    }
+    return w;
+}
+
 static pm_procedure_t locate(four_pulses_t *self, const pulses_config_t *config)
 {
     pulses_found_t *found = &self->train.found;
@@ -79,9 +92,13 @@ static pm_procedure_t locate(four_pulses_t *self, const pulses_config_t *config)
     if (polarity < PULSES_SURE) {
         return PM_FAILED_POLARITY;
     }
-    const pm_angle_t theta = pm_atan2(self->y.beta, self->y.alpha) / 2U;
-    const bool opposite = (self->D < 0) != (pm_dir(theta - pulses_axis[self->axis]).cos < 0);
-    found->theta = theta + (opposite ? PM_TURN(0.5) : 0U);
+    found->theta = pm_atan2(self->y.beta, self->y.alpha) / 2U;
+    const bool opposite = (self->D < 0) != (pm_dir(found->theta - pulses_axis[self->axis]).cos < 0);
+    found->theta += opposite ? PM_TURN(0.5) : 0U;
+    const pm_dq_t seen = pm_park(sum(&self->train), pm_dir(found->theta));
+    if (seen.d < pm_abs(seen.q)) {
+        return PM_FAILED_POLARITY;
+    }
     found->margin = pm_min(polarity, pulses_margin(length, pm_mul(PM_Q(2.12), config->i_noise)));
     return PM_RUNNING;
 }
@@ -96,6 +113,8 @@ pm_procedure_t four_pulses_find(four_pulses_t *self, const pulses_config_t *conf
         return locate(self, config);
     }
     if (self->train.steps > PULSES_BALANCING + 1U + CORRECTIONS) {
+        /* theta is of the end of the axis with B > 0 */
+        self->train.found.theta += config->reversed ? PM_TURN(0.5) : 0U;
         return PM_DONE;
     }
     correct(self);

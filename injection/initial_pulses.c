@@ -35,14 +35,10 @@ static pm_procedure_t locate(initial_pulses_t *self, const pulses_config_t *conf
         return PM_FAILED_SALIENCY;
     }
     found->theta = pm_atan2(y.beta, y.alpha) / 2U;
-    const pm_q_t along = pm_park(self->w, pm_dir(found->theta)).d;
-    found->theta += along < 0 ? PM_TURN(0.5) : 0U;
-    const pm_sigma_t polarity = pulses_polarity(along, config->i_bridge, 2 * config->i_noise);
-    if (polarity < PULSES_SURE) {
-        return PM_FAILED_POLARITY;
-    }
-    found->margin = pm_min(polarity, pulses_margin(length, 3 * config->i_noise));
-    return PM_RUNNING;
+    found->margin = pulses_margin(length, 3 * config->i_noise);
+    const pulses_pole_t limits = {
+        .bridge = config->i_bridge, .noise = 2 * config->i_noise, .reversed = config->reversed};
+    return pulses_pole(self->w, &limits, found);
 }
 
 pm_procedure_t initial_pulses_find(initial_pulses_t *self, const pulses_config_t *config)
@@ -51,5 +47,5 @@ pm_procedure_t initial_pulses_find(initial_pulses_t *self, const pulses_config_t
     if (balanced != PM_DONE) {
         return balanced;
     }
-    return self->train.steps == PULSES_BALANCING + 1U ? locate(self, config) : PM_DONE;
+    return locate(self, config);
 }

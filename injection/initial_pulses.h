@@ -6,13 +6,14 @@
  *   w = sum i         ~ e^{j theta}             first-order saturation: the polarity
  * Both sums cancel offsets. The torque of a pair of pulses averages to zero.
  *   margin of saliency = |y| / (3 i_noise)
- *   margin of polarity = (|w . e^{j theta}| - i_bridge) / (2 i_noise)
+ *   margin of polarity: pulses_pole() of w, with i_bridge and 2 i_noise
  * as a component of w has the noise of six currents of 2/3 i_noise^2 each, that of y 1.5 times as much.
  *
  * Call initial_pulses_step() each period until it is not PM_RUNNING; after PM_DONE initial_pulses_find() each
  * millisecond, outside the control interrupt, which gives the position or the reason why there is none: y too
  * small for this machine, w below five times its noise, or gains that no sensors have. Duration: about
- * 6 (2 n + 5) periods and 6 ms.
+ * 6 (2 n + 5) periods and 5 ms: 15 ms on IPM-1000. Peak of the current: i_pulse and up to half of it by saturation. Movement: 0.05
+ * degrees mechanical with IPM-1000, 0.02 with SPM-400, as each pulse is followed by its opposite.
  * Tests: tests/unit/injection/initial_pulses_test.cpp, tests/scenario/ipm_start_grid.yaml. */
 #ifndef INJECTION_INITIAL_PULSES_H
 #define INJECTION_INITIAL_PULSES_H

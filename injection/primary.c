@@ -7,14 +7,7 @@ pm_procedure_t primary_polarity(const pm_q_t difference[PULSES_AXES], const prim
                                 pulses_found_t *found)
 {
     const pm_ab_t w = pm_clarke((pm_abc_t){.a = difference[0], .b = difference[1], .c = difference[2]});
-    const pm_q_t along = pm_park(w, pm_dir(found->theta)).d;
-    const pm_sigma_t polarity = pulses_polarity(along, config->bridge, config->noise);
-    if (polarity < PULSES_SURE) {
-        return PM_FAILED_POLARITY;
-    }
-    found->theta += along < 0 ? PM_TURN(0.5) : 0U;
-    found->margin = pm_min(polarity, found->margin);
-    return PM_DONE;
+    return pulses_pole(w, &config->pole, found);
 }
 
 pm_procedure_t primary_locate(const primary_t *self, const primary_config_t *config, pulses_found_t *found)
@@ -26,6 +19,6 @@ pm_procedure_t primary_locate(const primary_t *self, const primary_config_t *con
         return PM_FAILED_SALIENCY;
     }
     found->theta = pm_atan2(y.beta, y.alpha) / 2U;
-    found->margin = pulses_margin(length, config->noise);
+    found->margin = pulses_margin(length, config->pole.noise);
     return primary_polarity(self->difference, config, found);
 }

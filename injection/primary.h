@@ -7,7 +7,7 @@
  *   w = 2/3 sum D_x e^{j g_x}             = I_1 e^{j theta}         first-order saturation: the polarity
  * The third harmonic I_3 is alike in all three axes and leaves w, not so the largest D_x alone.
  *   margin of saliency = |y| / noise
- *   margin of polarity = (|w . e^{j theta}| - bridge) / noise
+ *   margin of polarity: pulses_pole() of w
  * noise: 1.155 times that of one value, of both. A gain of one of three sensors is no noise: 1 % of one against the
  * others errs by 0.17 I_0 / I_2 degrees.
  * For the slow part, at most 400 instructions. Tests: tests/unit/injection/basic_pulses_test.cpp, dc_link_pulses_test.cpp. */
@@ -26,9 +26,8 @@ typedef struct {
 } primary_t;
 
 typedef struct {
-    pm_q_t y_min;  /* least |y| that counts as a saliency */
-    pm_q_t bridge; /* what the bridge may add to w */
-    pm_q_t noise;  /* of a component of y or w */
+    pm_q_t y_min;       /* least |y| that counts as a saliency */
+    pulses_pole_t pole; /* its noise is that of y, too */
 } primary_config_t;
 
 /* PM_DONE, PM_FAILED_SALIENCY or PM_FAILED_POLARITY */

@@ -130,6 +130,18 @@ pm_sigma_t pulses_margin(pm_q_t length, pm_q_t noise)
     return pm_div(length / 64, noise) / PER_SIGMA;
 }
 
+pm_procedure_t pulses_pole(pm_ab_t w, const pulses_pole_t *limits, pulses_found_t *found)
+{
+    const pm_dq_t seen = pm_park(w, pm_dir(found->theta));
+    const pm_sigma_t margin = pulses_polarity(seen.d, pm_abs(seen.q) + limits->bridge, limits->noise);
+    if (margin < PULSES_SURE) {
+        return PM_FAILED_POLARITY;
+    }
+    found->theta += (seen.d < 0) != limits->reversed ? PM_TURN(0.5) : 0U;
+    found->margin = pm_min(margin, found->margin);
+    return PM_DONE;
+}
+
 pm_sigma_t pulses_polarity(pm_q_t along, pm_q_t bridge, pm_q_t noise)
 {
     return pulses_margin(pm_max(pm_abs(along) - bridge, 0), noise);

@@ -20,7 +20,8 @@
  * capacitance rings with the winding until the next pulse:
  *   i_bridge = 4/3 n T_dt v_dc / L_d + 2 v_dc sqrt(C_leg / L_d)
  * Of 360 starts of machines that do not saturate, saliency 1.1 to 4, up to 1.1 n T_dt v_dc / L_d was seen. A polarity that
- * is not sure beyond it is not found; of a machine whose L_d falls with demagnetising current it is the wrong one.
+ * is not sure beyond it is not found. It is that of a magnet which saturates the core; where bridges that it holds
+ * saturated make L_d fall with demagnetising current, it is the other one (polarity.h: L_d_falls).
  *
  * A one-shot procedure that owns the bridge; the step costs at most 130 instructions. What follows from the
  * train is found outside the control interrupt.
@@ -47,6 +48,7 @@ typedef struct {
     pm_q_t y_min;     /* least |y| of six pulses that counts as a saliency: a fourth of the machine's */
     pm_q_t i_noise;   /* of one current */
     pm_q_t i_bridge;  /* what the bridge may add to the currents that show the polarity */
+    bool reversed;    /* polarity.h: L_d_falls */
 } pulses_config_t;
 
 typedef struct {
@@ -107,6 +109,17 @@ pm_sigma_t pulses_margin(pm_q_t length, pm_q_t noise);
 /* The same of what shows the polarity, beyond what the bridge may add to it. It is sure from PULSES_SURE on. */
 #define PULSES_SURE (5 * PM_SIGMA_ONE)
 pm_sigma_t pulses_polarity(pm_q_t along, pm_q_t bridge, pm_q_t noise);
+
+typedef struct {
+    pm_q_t bridge; /* what the bridge may add to w */
+    pm_q_t noise;  /* of a component of w */
+    bool reversed; /* polarity.h: L_d_falls */
+} pulses_pole_t;
+
+/* w points to the end of the axis found->theta that saturates: PM_DONE, theta is that of the magnet and the margin the
+ * smaller of both; or PM_FAILED_POLARITY. What lies across the axis is none of its poles', and counts against them:
+ *   margin = (|w . e^{j theta}| - |w x e^{j theta}| - bridge) / noise */
+pm_procedure_t pulses_pole(pm_ab_t w, const pulses_pole_t *limits, pulses_found_t *found);
 
 void make_pulses(maker_t *m, pulses_config_t *c);
 

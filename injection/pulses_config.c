@@ -55,5 +55,6 @@ void make_pulses(maker_t *m, pulses_config_t *c)
     if (make_duration(m, i_peak, c)) {
         make_y_min(m, i_peak, c);
         make_errors(m, c);
+        c->reversed = m->params->L_d_falls != 0;
     }
 }

@@ -292,6 +292,8 @@ enum {
     OD_PARAMETER_POSITION_FIND,
     OD_PARAMETER_POLARITY,
     OD_PARAMETER_I_POLARITY,
+#endif
+#if PM_HAS(initial_pulses) || PM_HAS(dual_pulses) || PM_HAS(three_phase_hf)
     OD_PARAMETER_L_D_FALLS,
 #endif
     OD_PARAMETER_I_TRIP,

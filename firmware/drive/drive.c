@@ -370,6 +370,12 @@ static void prepare_current_control(drive_t *drive)
         if (share < PM_UNIT_MAX) {
             regulator_slow_down(&drive->regulator_config, share);
         }
+#if PM_HAS(lock)
+        if (procedure_without_angle(drive)) {
+            const pm_machine_t *machine = &drive->config.machine;
+            regulator_slow_down(&drive->regulator_config, pm_ratio(machine->L_d, machine->L_q));
+        }
+#endif
     }
 }
 

@@ -14,7 +14,7 @@
 
 void procedure_lock_begin(drive_t *drive)
 {
-    drive->beside.lock = (lock_t){.ms = 0};
+    drive->beside.lock = (lock_t){.misfit = -PM_ONE};
     inject_at(drive, 0);
 }
 
@@ -36,6 +36,9 @@ static pm_procedure_t close_loop(drive_t *drive)
     const pm_q_t noise = pm_hypot(polarity_noise(&self->look[0]), polarity_noise(&self->look[1]));
     const pm_q_t answer = pm_hypot(eps_0, eps_1);
     const pm_sigma_t margin = pulses_margin(answer, pm_max(noise, 1));
+    if (self->misfit < -PM_Q(0.75)) {
+        return PM_FAILED_NO_CURRENT;
+    }
     if (answer < LEAST / 16 || margin < PULSES_SURE) {
         return PM_FAILED_SALIENCY;
     }
@@ -48,14 +51,16 @@ PM_APART pm_procedure_t procedure_lock_slow(drive_t *drive)
 {
     lock_t *self = &drive->beside.lock;
     self->ms++;
-    if (self->second < 2U) {
-        look(drive, &self->look[self->second], self->ms > READ_MS);
+    if (lock_looks(self)) {
+        look(drive, &self->look[self->looks], self->ms > READ_MS);
         if (self->ms < LOOK_MS) {
             return PM_RUNNING;
         }
+        const obs_out_t last = injection_last(&drive->position.injection, &drive->config.position.injection);
+        self->misfit = pm_max(self->misfit, last.misfit);
         self->ms = 0;
-        self->second++;
-        if (self->second == 2U) {
+        self->looks++;
+        if (!lock_looks(self)) {
             return close_loop(drive);
         }
         drive->position.pll.theta = APART;

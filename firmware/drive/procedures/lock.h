@@ -9,9 +9,11 @@
  * Then the loop is closed there, and position control of the drive goes on from it.
  *
  * Each look 24 ms, of which the first 16 for transients; closed loop 40 ms: 90 ms. No current but the carrier's; no
- * movement. PM_FAILED_SALIENCY: the answer is below five sigma or a quarter of what the machine's data promise.
+ * movement. PM_FAILED_SALIENCY: the answer is below five sigma or a quarter of what the machine's data promise;
+ * PM_FAILED_NO_CURRENT: the carrier's own current is, at both angles. 45 degrees apart, one of them shows more than a
+ * quarter up to L_q = 7 L_d.
  * Sources whose carrier stands in the stator are refused: these detect I_p first, at a known angle.
- * Tests: tests/unit/drive/lock_test.cpp, tests/scenario/polarity_d_current.yaml. */
+ * Tests: tests/unit/drive/polarity_test.cpp, tests/scenario/polarity_d_current.yaml. */
 #ifndef DRIVE_PROCEDURES_LOCK_H
 #define DRIVE_PROCEDURES_LOCK_H
 
@@ -19,7 +21,16 @@
 
 typedef struct {
     polarity_mean_t look[2];
-    uint16_t ms, second; /* of this look, and whether it is the second */
+    uint16_t ms, looks; /* of this look, and how many have been before it */
+    pm_q_t misfit;      /* of the source, the greater of the looks' */
 } lock_t;
+
+#define LOCK_LOOKS 2U
+
+/* The loop is open: nothing is known of the angle. */
+static inline bool lock_looks(const lock_t *self)
+{
+    return self->looks < LOCK_LOOKS;
+}
 
 #endif

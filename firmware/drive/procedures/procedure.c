@@ -84,6 +84,16 @@ bool procedure_without_current(const drive_t *drive)
     return id == (uint8_t)PROCEDURE_lock || id == (uint8_t)PROCEDURE_secondary_current;
 }
 
+bool procedure_without_angle(const drive_t *drive)
+{
+#if PM_HAS(lock)
+    return drive->sequence.procedure == (uint8_t)PROCEDURE_lock && lock_looks(&drive->beside.lock);
+#else
+    (void)drive;
+    return false;
+#endif
+}
+
 static void report_identification(drive_t *drive, commissioning_state_t state, commissioning_reason_t reason)
 {
     commissioning_report_t *report = &drive->commissioning_report;

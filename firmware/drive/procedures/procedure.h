@@ -95,6 +95,10 @@ typedef union {
  * mean current would make that swing: it takes more than the dead time then does. */
 bool procedure_without_current(const drive_t *drive);
 
+/* The angle is not known yet: what current control does by L_q may meet L_d, and with gains for L_q would swing from a ratio
+ * of three on. Slower by L_d / L_q it does not. */
+bool procedure_without_angle(const drive_t *drive);
+
 /* The one of drive->sequence.procedure; nothing with PROCEDURE_NONE. */
 void procedure_begin(drive_t *drive, procedure_id_t id); /* the drive's state and stage, too */
 void procedure_expect(

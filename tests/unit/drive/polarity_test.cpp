@@ -362,6 +362,7 @@ TEST(Polarity, AnOpenMotorIsRefusedByEach)
         x.run_ms(400);
         EXPECT_EQ(x.fault(), DRIVE_FAULT_POSITION_NOT_FOUND);
         EXPECT_EQ(drive_status(&x.d)->refusal.procedure, PROCEDURE_lock);
+        EXPECT_EQ(drive_status(&x.d)->refusal.reason, PM_FAILED_NO_CURRENT);
     }
 }
 

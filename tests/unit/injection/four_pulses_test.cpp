@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "injection/basic_pulses.h"
 #include "injection/initial_pulses.h"
 #include "tests/unit/injection/pulse_rig.h"
 
@@ -14,6 +15,7 @@ using namespace pulse_rig;
 
 const Method<four_pulses_t> kFour = {&four_pulses_step, &four_pulses_find};
 const Method<initial_pulses_t> kSix = {&initial_pulses_step, &initial_pulses_find};
+const Method<basic_pulses_t> kBasic = {&basic_pulses_step, &basic_pulses_find};
 
 // METHODS-ADDENDUM.md B (b), row 101, with a 12-bit converter, noise, and gains of 1.01, 1 and 0.99.
 constexpr double kGain = 0.01;
@@ -114,6 +116,41 @@ TEST(FourPulses, FailsWithoutPolarity)
     for (const double theta : {0.0, 0.8, 2.0}) {
         EXPECT_EQ(find(kFour, r, config(r), theta).state, PM_FAILED_POLARITY) << theta;
     }
+}
+
+// The q-axis of a machine with L_q below L_d, told the other way round, is found: D of the nearest leg is not zero, and would be
+// a pole 90 degrees off.
+TEST(Pulses, TheOtherAxisHasNoPole)
+{
+    Rig r = ipm(0.01);
+    std::swap(r.plant.machine.L_d0_H, r.plant.machine.L_q0_H);
+    for (int k = 0; k < 24; ++k) {
+        const double theta = (k + 0.3) * bench::kPi / 12;
+        EXPECT_EQ(find(kFour, r, config(r), theta).state, PM_FAILED_POLARITY) << k;
+        EXPECT_EQ(find(kSix, r, config(r), theta).state, PM_FAILED_POLARITY) << k;
+        EXPECT_EQ(find(kBasic, r, config(r), theta).state, PM_FAILED_POLARITY) << k;
+    }
+}
+
+// polarity.h: L_d_falls. The same angle but for half a turn, with the same margin.
+TEST(Pulses, TheOppositeSignOfSaturationIsTheOtherPole)
+{
+    const auto check = [](const auto &method) {
+        const Rig r = ipm(0.01);
+        pulses_config_t c = config(r);
+        for (const double theta : {0.3, 2.2, 4.0}) {
+            const Result x = find(method, r, c, theta);
+            pulses_config_t opposite = c;
+            opposite.reversed = true;
+            const Result y = find(method, r, opposite, theta);
+            ASSERT_EQ(y.state, PM_DONE);
+            EXPECT_NEAR(std::abs(bench::wrapped(x.theta_rad - y.theta_rad)), bench::kPi, 1e-6) << theta;
+            EXPECT_EQ(x.margin, y.margin);
+        }
+    };
+    check(kSix);
+    check(kFour);
+    check(kBasic);
 }
 
 TEST(FourPulses, RefusesExchangedSensors)

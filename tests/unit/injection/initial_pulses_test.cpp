@@ -49,7 +49,7 @@ TEST(InitialPulses, TakesTwentyMilliseconds)
     for (const Rig &r : {ipm(0), spm(0)}) {
         const Result x = find(kSix, r, config(r), 0.7);
         EXPECT_LE((x.periods + x.computing) * r.base.period_s, kLongest_s);
-        EXPECT_NEAR(x.computing * r.base.period_s, 6e-3, 1e-9);
+        EXPECT_NEAR(x.computing * r.base.period_s, 5e-3, 1e-9);
         EXPECT_LE(x.periods, 6 * (2 * config(r).periods + 5)); // as the header says
     }
 }
