@@ -482,6 +482,22 @@ TEST(Config, PulsesAreAsLongAsTheirFluxAsks)
 }
 
 // Without dead time there is nothing that the capacitance of a leg could give back.
+TEST(Config, DcLinkPulsesNeedALinkThatShowsThem)
+{
+    const auto refused = [](int32_t R_mohm, int32_t C_nF) {
+        drive_params_t p;
+        drive_params_default(&p);
+        p.position_pulses = 4;
+        p.dc_resistance = R_mohm;
+        p.dc_capacitance = C_nF;
+        drive_config_t c = {};
+        return drive_configure(&c, &p, PM_CHANNELS);
+    };
+    EXPECT_TRUE(refused(10000, 100000).ok);
+    EXPECT_EQ(refused(1, 100000).param, DRIVE_PARAM_dc_resistance);
+    EXPECT_EQ(refused(10000, 1000000000).param, DRIVE_PARAM_dc_capacitance);
+}
+
 TEST(Config, CapacitanceOfALegNeedsADeadTime)
 {
     const auto far = [](double dead_time_s) {

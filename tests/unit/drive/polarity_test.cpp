@@ -288,6 +288,58 @@ TEST(Polarity, HandOverKeepsTheCurrent)
     }
 }
 
+TEST(Polarity, DualPulsesTellThePole)
+{
+    int turned = 0;
+    for (const double theta : {0.4, 0.4 + kPi}) {
+        Start x(ipm(), sine(1, 70000, 250000), theta);
+        x.run_past(PROCEDURE_lock);
+        const double axis = rad(x.drive().sequence.theta);
+        x.run([](const drive_t &d) { return d.state == DRIVE_RUNNING; });
+        ASSERT_EQ(x.drive().state, DRIVE_RUNNING);
+        EXPECT_LE(std::abs(x.error_rad()), 5 * kDegree);
+        turned += std::abs(wrapped(rad(x.drive().sequence.theta) - axis)) > kPi / 2 ? 1 : 0;
+    }
+    EXPECT_EQ(turned, 1);
+}
+
+TEST(Polarity, ALinearMachineIsRefusedByEach)
+{
+    const procedure_id_t steps[] = {PROCEDURE_dual_pulses, PROCEDURE_d_current, PROCEDURE_secondary_current};
+    plant_config_t linear = ipm();
+    linear.machine.c_A_Wb5 = 0;
+    for (const int32_t polarity : {1, 2, 3}) {
+        Start x(linear, sine(polarity, 70000, 250000), 0.4);
+        x.run([](const drive_t &d) { return d.state == DRIVE_FAULT; });
+        EXPECT_EQ(drive_status(&x.drive())->fault, DRIVE_FAULT_POSITION_NOT_FOUND) << polarity;
+        EXPECT_EQ(drive_status(&x.drive())->refusal.procedure, steps[polarity - 1]);
+        EXPECT_EQ(drive_status(&x.drive())->refusal.reason, PM_FAILED_POLARITY) << polarity;
+    }
+}
+
+// A carrier that makes no current, and a frame that has turned away from its axis.
+TEST(Polarity, AStepNeedsItsCarrierAndItsAxis)
+{
+    for (const int32_t polarity : {2, 3}) {
+        const procedure_id_t step = polarity == 2 ? PROCEDURE_d_current : PROCEDURE_secondary_current;
+        for (const pm_procedure_t reason : {PM_FAILED_NO_CURRENT, PM_FAILED_SALIENCY}) {
+            Start x(ipm(), sine(polarity, 70000, 250000), 0.4);
+            x.run_to(step);
+            if (reason == PM_FAILED_NO_CURRENT) {
+                x.drive().config.polarity.h_d *= 5;
+            } else if (polarity == 2) {
+                x.drive().beside.d_current.theta += PM_TURN(0.25);
+            } else {
+                x.run([](const drive_t &d) { return d.beside.secondary_current.x.count > 0; });
+                x.drive().beside.secondary_current.theta += PM_TURN(0.25);
+            }
+            x.run([](const drive_t &d) { return d.state == DRIVE_FAULT; });
+            EXPECT_EQ(drive_status(&x.drive())->refusal.procedure, step);
+            EXPECT_EQ(drive_status(&x.drive())->refusal.reason, reason) << polarity;
+        }
+    }
+}
+
 // What is left of a pulse's current, of any winding; of a pulse beyond the time constant, what a time constant leaves.
 TEST(Polarity, DecayOfDualPulsesIsThatOfTheWinding)
 {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <complex>
+
 #include "firmware/math/trig.h"
 #include "tests/unit/injection/leg_rig.h"
 
@@ -182,6 +184,35 @@ TEST(ThreePhaseHf, FailsWithoutSaliencyWithoutACurrentAndWithUnevenPhases)
     Rig uneven = r;
     uneven.plant.sensor.gain_error[1] = 0.4;
     EXPECT_EQ(look(uneven, c, 1).result, PM_FAILED_UNEVEN);
+}
+
+// Currents by formula, for what no machine does: a negative sequence as large as the positive one, which leaves no two
+// equations for the gains, or larger, which turns their sign; and none.
+TEST(ThreePhaseHf, TakesAnySequencesOfItsCurrents)
+{
+    const three_phase_hf_config_t c = make(ipm(0), 35);
+    const auto find = [&c](double I_p, double I_n, double theta, double *error_rad) {
+        three_phase_hf_t self = {};
+        for (int x = 0; x < 3; ++x) {
+            const double g = 2 * bench::kPi / 3 * x;
+            const std::complex<double> I =
+                std::polar(I_p, -g) +
+                std::polar(I_n, -(2 * theta - bench::rad(pm_rad_to_angle(c.rho_R)) - g));
+            const double scale = std::ldexp(c.block * c.wanted / 2.0, 27);
+            self.cosine[x] = static_cast<int64_t>(I.real() * scale);
+            self.sine[x] = static_cast<int64_t>(-I.imag() * scale);
+        }
+        const pm_procedure_t result = three_phase_hf_find(&self, &c);
+        *error_rad = bench::wrapped(2 * (bench::rad(self.found.theta) - theta)) / 2;
+        return result;
+    };
+    double error;
+    EXPECT_EQ(find(0, 0, 1, &error), PM_FAILED_NO_CURRENT);
+    EXPECT_EQ(find(0.4, 0.4, 1, &error), PM_FAILED_UNEVEN);
+    for (const double I_n : {0.3, 0.5}) {
+        EXPECT_EQ(find(0.4, I_n, 1, &error), PM_FAILED_POLARITY); /* of a linear machine */
+        EXPECT_LE(std::abs(error), 0.02) << I_n;
+    }
 }
 
 } // namespace
