@@ -206,6 +206,7 @@ def drive(x, board, tolerance):
         known[name] = told.get(name, value)
     out["offset_max"] = 0.03 * known["i_full_scale"], "3 % of the converter's range"
     out.update((name, (value, tune.WHY[name])) for name, value in tune.values(known, tolerance=tolerance).items())
+    out["flying_start"] = 1.0, "a rotor that wind or its load turns is caught"
     out.update((name, (value, "told")) for name, value in told.items())
     return {name: stored(name, *reason) for name, reason in out.items()}
 

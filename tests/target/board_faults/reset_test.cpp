@@ -147,7 +147,7 @@ TEST(BoardReset, AnErrorOfTheMemorysParityOpensTheBridgeAtOnce)
         b.running();
         board_flip_ram(b.board);
         EXPECT_EQ(b.bridge_on(), !checked);
-        b.run_ms(50);
+        b.run_ms(100); // the new start checks the whole image first
         EXPECT_EQ(board_resets(b.board), checked ? 1u : 0u);
         if (checked) {
             EXPECT_THAT(b.console(), HasSubstr("last run ended by exception 0x00000002"));
