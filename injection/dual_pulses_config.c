@@ -40,6 +40,7 @@ PM_APART static void make_ringing(maker_t *m, dual_pulses_config_t *c)
     const pm_num_t per = pm_num_div(si(m, DRIVE_PARAM_leg_capacitance), si(m, DRIVE_PARAM_L_d));
     const pm_num_t i = mul3(pm_num(2), si(m, DRIVE_PARAM_v_dc_nominal), pm_num_sqrt(per));
     c->ringing = fixed(m, pm_num_div(i, m->base.i), Q_BITS, DRIVE_PARAM_leg_capacitance);
+    c->i_zero = pm_max(c->i_zero, c->ringing); /* a current that rings has ended */
 }
 
 /* False: there is no such pulse. */

@@ -31,22 +31,23 @@ PM_APART static void make_y_min(maker_t *m, pm_num_t i_peak, pulses_config_t *c)
     c->y_min = fixed(m, mul3(share, i_pulse, pm_num_ratio(3, 4)), Q_BITS, DRIVE_PARAM_i_pulse);
 }
 
-/* Currents that noise and bridge make by themselves. */
+/* Currents that noise and bridge make by themselves. What rings with the legs' capacitance between two pulses is no current
+ * that has not ended. */
 PM_APART static void make_errors(maker_t *m, pulses_config_t *c)
 {
     const pm_num_t noise = pm_num_div(si(m, DRIVE_PARAM_i_noise), m->base.i);
-    /* five times the noise, and no less than four steps of a 12-bit converter */
-    c->i_zero = fixed(m, pm_num_mul(pm_num(5), noise), Q_BITS, DRIVE_PARAM_i_noise);
-    c->i_zero = pm_max(c->i_zero, PM_Q(8.0 / 4096.0));
-    c->i_noise = pm_max(fixed(m, noise, Q_BITS, DRIVE_PARAM_i_noise), 1);
     const pm_num_t L_d = si(m, DRIVE_PARAM_L_d);
     const pm_num_t edges =
         pm_num_mul(pm_num_ratio(4 * c->periods, 3), pm_num_div(si(m, DRIVE_PARAM_dead_time), L_d));
     const pm_num_t ringing =
         pm_num_sqrt(pm_num_div(pm_num_mul(pm_num(4), si(m, DRIVE_PARAM_leg_capacitance)), L_d));
-    const pm_num_t v_dc = si(m, DRIVE_PARAM_v_dc_nominal);
-    c->i_bridge = fixed(m, pm_num_div(pm_num_mul(v_dc, pm_num_add(edges, ringing)), m->base.i), Q_BITS,
-                        DRIVE_PARAM_i_pulse);
+    const pm_num_t v_dc = pm_num_div(si(m, DRIVE_PARAM_v_dc_nominal), m->base.i);
+    c->i_bridge = fixed(m, pm_num_mul(v_dc, pm_num_add(edges, ringing)), Q_BITS, DRIVE_PARAM_i_pulse);
+    /* five times the noise, and no less than four steps of a 12-bit converter */
+    c->i_zero = fixed(m, pm_num_mul(pm_num(5), noise), Q_BITS, DRIVE_PARAM_i_noise);
+    c->i_zero = pm_max(c->i_zero, PM_Q(8.0 / 4096.0));
+    c->i_zero = pm_max(c->i_zero, fixed(m, pm_num_mul(v_dc, ringing), Q_BITS, DRIVE_PARAM_leg_capacitance));
+    c->i_noise = pm_max(fixed(m, noise, Q_BITS, DRIVE_PARAM_i_noise), 1);
 }
 
 void make_pulses(maker_t *m, pulses_config_t *c)

@@ -211,6 +211,12 @@ static bool record_value(const app_t *app, uint16_t slot, int32_t *value)
     case OD_LIVE_FAULT_RECORD_PERIOD:
         *value = (int32_t)record->period;
         return true;
+    case OD_LIVE_FAULT_RECORD_REFUSED_BY:
+        *value = (int32_t)record->refusal.procedure;
+        return true;
+    case OD_LIVE_FAULT_RECORD_REFUSED_BECAUSE:
+        *value = (int32_t)record->refusal.reason;
+        return true;
     default:
         return false;
     }

@@ -56,6 +56,16 @@ static uint8_t pole_of(const drive_params_t *params)
     return poles[params->polarity];
 }
 
+/* Dead time bends a carrier that it takes more of than a quarter into a second harmonic as large as that of the poles. */
+PM_APART static void check_second_harmonic(maker_t *m)
+{
+    const pm_num_t lost =
+        mul3(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm), si(m, DRIVE_PARAM_v_dc_nominal));
+    if (pm_num_cmp(pm_num_mul(lost, pm_num(4)), si(m, DRIVE_PARAM_v_injection)) > 0) {
+        refuse(m, DRIVE_PARAM_v_injection, "polarity 3 needs four times what dead time takes");
+    }
+}
+
 /* What of the carrier the steps of polarity look at, and whether there is one that they can look at. */
 static void make_carrier(maker_t *m, drive_config_t *config)
 {
@@ -72,6 +82,9 @@ static void make_carrier(maker_t *m, drive_config_t *config)
                                 : "needs injection 0 or 4, a carrier along d");
     } else {
         /* no step looks at the carrier, or one at the square wave */
+    }
+    if (p->polarity == 3) {
+        check_second_harmonic(m);
     }
     make_polarity(m, sine, h_d, &config->polarity);
 }

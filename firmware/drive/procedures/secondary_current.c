@@ -42,7 +42,13 @@ static pm_q_t alike(pm_q_t y, pm_q_t x)
     return pm_max(x > 0 ? y : -y, 0);
 }
 
-/* What the inverter may have made of it: that has its sign in all three. */
+/* Of what is beside, that which saturation does not make: all with the sign of x, else beyond a quarter of x. */
+static pm_q_t strange(pm_q_t y, pm_q_t x)
+{
+    return pm_max(alike(y, x), pm_abs(y) - pm_abs(x) / 4);
+}
+
+/* What the inverter may have made of it. */
 static pm_q_t allowance(const drive_t *drive)
 {
     const secondary_current_t *self = &drive->beside.secondary_current;
@@ -50,7 +56,7 @@ static pm_q_t allowance(const drive_t *drive)
     const pm_q_t h_d = drive->config.polarity.h_d;
     const pm_q_t v_h = drive->config.position.injection.pulsating_sine.sine.v_h;
     const pm_q_t v = alike(polarity_mean(&self->v), x);
-    return alike(polarity_mean(&self->beside), x) + pm_mul(pm_div(v + v / 2, v_h), h_d) + h_d / SHARE;
+    return strange(polarity_mean(&self->beside), x) + pm_mul(pm_div(v + v / 2, v_h), h_d) + h_d / SHARE;
 }
 
 static pm_procedure_t judge(drive_t *drive)

@@ -10,15 +10,16 @@
  * Whole periods of the carrier, so that its answer and i_f are nulled. With a fixed delta = 0 the value is taken
  * 34 degrees beside its phase at 35 V and 500 Hz on IPM-1000.
  *   margin = (|mean x| - y' - 3/2 v_d' / V_h h_d - 1/2048 h_d) / sigma      polarity.h
- * y is the mean with the sine, v_d the mean voltage of current control; both count (') where their sign is that of x.
+ * y is the mean with the sine, v_d the mean voltage of current control, which counts (') where its sign is that of x.
  * Dead time may settle into an answer without symmetry: then, also without saturation, both half waves differ, current
- * control needs a voltage to keep the mean at zero, and there is a second harmonic of any phase. Of 80 starts of linear
- * machines, dead-time voltage 1 to 35 % of V_h, up to 0.0013 h_d was seen, always with the signs alike. What saturation
- * makes has them opposite: of that nothing is taken off.
+ * control needs a voltage to keep the mean at zero, and there is a second harmonic of any phase: up to 0.0013 h_d with the
+ * signs alike, 0.001 with opposite ones. What saturation makes has y opposite to x, and small: half of what resistance makes of
+ * delta, 0.1 x. So y counts where it has the sign of x, else by what is beyond a quarter of x.
  * b F^2 / 4 is small: 0.6 mA at 35 V and 500 Hz, 11 mA at 70 V and 250 Hz, with sigma = 0.15 mA after 50 ms. While
  * the margin is below five sigma the number of values is doubled, twice at most.
  *
  * 16 or 32 values, 64 ms; with too little margin up to 256 ms. Peak current: the carrier's, no other; no movement.
+ * A v_injection below four times the dead-time voltage, T_dt f_pwm v_dc, is refused by name.
  * PM_FAILED_POLARITY: below five sigma, as with a linear machine; raise v_injection or lower f_injection:
  * F >= root(20 sigma / b). Nothing is done in the control period. Each value 700 instructions at 1 kHz.
  * Tests: tests/unit/drive/polarity_test.cpp, tests/scenario/polarity_secondary.yaml. */

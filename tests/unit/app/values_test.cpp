@@ -101,6 +101,9 @@ TEST_F(Values, FaultRecordIsInItsUnits)
     r.theta = 0x12345678U;
     r.temperature_dC = 777;
     r.period = 123456789U;
+    r.refusal = {PROCEDURE_initial_pulses, PM_FAILED_POLARITY};
+    EXPECT_EQ(value(OD_LIVE_FAULT_RECORD_REFUSED_BY), PROCEDURE_initial_pulses);
+    EXPECT_EQ(value(OD_LIVE_FAULT_RECORD_REFUSED_BECAUSE), PM_FAILED_POLARITY);
     EXPECT_EQ(value(OD_LIVE_FAULT_RECORD_CODE), DRIVE_FAULT_STALL);
     expect(OD_LIVE_FAULT_RECORD_I_A, 0.25 * kI_A * 1e3, "i_a");
     expect(OD_LIVE_FAULT_RECORD_I_B, -0.35 * kI_A * 1e3, "i_b");

@@ -395,6 +395,13 @@ TEST(Polarity, AParameterThatCannotBeIsRefusedByName)
                   p.J /= 100;
               }),
               DRIVE_PARAM_i_polarity);
+    EXPECT_EQ(refused([](drive_params_t &p) { // 2 us at 10 kHz of 300 V are 6 V
+                  p.polarity = 3;
+                  p.injection = INJECTION_pulsating_sine;
+                  p.injection_bandwidth = 7000;
+                  p.v_injection = 23000;
+              }),
+              DRIVE_PARAM_v_injection);
     EXPECT_EQ(refused([](drive_params_t &p) {
                   p.position_find = 2;
                   p.v_injection = 200000;

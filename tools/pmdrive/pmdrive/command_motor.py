@@ -149,6 +149,6 @@ def faults(arguments, drive, out):
     if found["record"][names.find("fault_record.code")]:
         out.line("when the first fault came:")
         for entry, raw in found["record"].items():
-            out.line(f"  {entry.name.split('.')[-1]:12s} {shown(entry, raw)}")
+            out.line(f"  {entry.name.split('.')[-1]:15s} {shown(entry, raw)}")
     for word in found["history"]:
         out.line(f"error {word & 0xFFFF:04X}h  {error_text(word)}")
