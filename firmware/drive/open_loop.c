@@ -118,6 +118,12 @@ static bool is_mean(const drive_t *drive)
 #endif
 }
 
+/* Too fast for a rotor that swings to stand. */
+static bool is_fast(const drive_t *drive)
+{
+    return drive->follow.emf >= drive->config.open_loop.v_swing / 2;
+}
+
 /* The EMF of the rotor's speed, along where it is: across the vector alone a lag delta shows as speed, omega sin(delta), which
  * from 0.7 of the swing's frequency on turns damping into its opposite. Below half of that frequency, where the rotor may swing
  * through zero, and until it has been seen to follow, across the vector alone. */
@@ -128,7 +134,7 @@ static pm_q_t emf_of_speed(const drive_t *drive)
     const pm_q_t i = drive->status.i.d;
     const pm_ab_t e = {.alpha = pm_narrow(drive->voltage.v.q) - pm_mul(drive->omega_open, pm_mul(m->L_d, i)),
                        .beta = pm_narrow(drive->voltage.v.d) - pm_mul(f->R, i)};
-    if (!PM_HAS(load_current) || f->emf < drive->config.open_loop.v_swing / 2 || !f->follows) {
+    if (!PM_HAS(load_current) || !is_fast(drive) || !f->follows) {
         return e.alpha;
     }
     const bool back = drive->omega_ramp < 0;
@@ -145,11 +151,11 @@ static void damp(drive_t *drive)
         drive->omega_open = drive->omega_ramp;
         return;
     }
-    const pm_q_t emf = emf_of_speed(drive) - pm_mul(drive->omega_ramp, c->machine.psi_m) - drive->emf_open;
-    const pm_q_t beyond = pm_clamp(emf, -c->open_loop.v_swing, c->open_loop.v_swing);
-    const pm_q_t steady = pm_frac(beyond, c->open_loop.k_swing);
-    const pm_q_t swing = beyond - steady;
-    drive->emf_open += steady;
+    const pm_q_t v = c->open_loop.v_swing;
+    const pm_q_t steady = is_fast(drive) ? drive->emf_open : 0; /* what R, L and psi_m are not known to */
+    const pm_q_t emf = emf_of_speed(drive) - pm_mul(drive->omega_ramp, c->machine.psi_m);
+    const pm_q_t seen = steady + pm_clamp(emf - steady, -v, v);
+    const pm_q_t swing = seen - pm_lp1(&drive->emf_open, seen, c->open_loop.k_swing);
     drive->omega_open = drive->omega_ramp - pm_small_gain(pm_small(swing), c->open_loop.per_swing);
 }
 
@@ -190,7 +196,7 @@ static void watch(drive_t *drive)
     }
     const follow_in_t in = {.omega = drive->omega_ramp,
                             .v = {.d = pm_narrow(drive->voltage.v.d), .q = pm_narrow(drive->voltage.v.q)},
-                            .i = drive->status.i.d,
+                            .i = drive->i_open,
                             .v_dc = drive->status.v_dc,
                             .turn = pm_abs(drive->turn_open) / PER_TURN * (int32_t)c->slow_divider};
     if (follow_slow(&drive->follow, &c->machine, &in)) {
@@ -230,7 +236,7 @@ void open_loop_rested(drive_t *drive)
     if (!PM_HAS(load_current) || !is_mean(drive)) {
         return;
     }
-    follow_rested(&drive->follow, &c->machine, drive->status.i.d, drive->status.v_dc);
+    follow_rested(&drive->follow, &c->machine, drive->i_open, drive->status.v_dc);
     position_set_resistance(&drive->position, &c->position, drive->follow.R);
 }
 

@@ -48,7 +48,8 @@ void slow_with(Drive &x, int ms, double lag_deg = 0, double share = 1)
 {
     for (int k = 0; k < ms; ++k) {
         const double emf = real(x.d.omega_ramp) * real(x.d.config.machine.psi_m) * share;
-        x.d.voltage.v = {bench::fixed(emf * std::sin(lag_deg * kDegree), PM_WIDE_BITS),
+        const double drop = real(x.d.i_open) * real(x.d.follow.R);
+        x.d.voltage.v = {bench::fixed(drop + emf * std::sin(lag_deg * kDegree), PM_WIDE_BITS),
                          bench::fixed(emf * std::cos(lag_deg * kDegree), PM_WIDE_BITS)};
         slow(x, 1);
     }
@@ -271,18 +272,18 @@ TEST(OpenLoop, ARotorThatStandsIsTriedOnceMoreWithTheLargestCurrent)
         x.d.torque_target = PM_Q(0.1);
         x.d.i_target = PM_Q(0.2);
         x.d.status.v_dc = PM_Q(0.5);
-        slow(x, kAlign_ms - 1);
+        slow_with(x, kAlign_ms - 1, 0, 0);
         int ms = 0;
         int tries = 1;
         for (pm_q_t before = 0; x.d.fault == DRIVE_FAULT_NONE && ms < 2000; ++ms) {
             drive_prepare(&x.d); // the turn of a period
-            slow(x, 1);
+            slow_with(x, 1, 0, 0);
             if (x.d.omega_ramp < before) {
                 tries++;
                 EXPECT_EQ(x.d.omega_ramp, 0);
                 EXPECT_LT(ms, 300);
                 EXPECT_EQ(x.d.i_vector, x.d.config.i_max);
-                slow(x, 100);
+                slow_with(x, 100, 0, 0);
                 ms += 100;
                 EXPECT_EQ(x.d.omega_ramp, 0);
                 EXPECT_EQ(x.d.i_open, x.d.config.i_max);
@@ -300,7 +301,7 @@ TEST(OpenLoop, ARotorThatFallsOutIsNotTriedAgain)
 {
     Drive x = started();
     x.d.omega_target = PM_Q(0.2);
-    slow(x, kAlign_ms);
+    slow_with(x, kAlign_ms);
     slow_with(x, 1000);
     ASSERT_TRUE(x.d.follow.follows);
     ASSERT_EQ(x.d.fault, DRIVE_FAULT_NONE);
