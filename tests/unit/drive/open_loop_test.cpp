@@ -48,9 +48,11 @@ void slow_with(Drive &x, int ms, double lag_deg = 0, double share = 1)
 {
     for (int k = 0; k < ms; ++k) {
         const double emf = real(x.d.omega_ramp) * real(x.d.config.machine.psi_m) * share;
-        const double drop = real(x.d.i_open) * real(x.d.follow.R);
+        const pm_machine_t &m = x.d.config.machine;
+        const double i = real(x.d.i_open), drop = i * real(x.d.follow.R);
+        const double reactive = real(x.d.omega_ramp) * i * (real(m.L_d) + real(m.L_q)) / 2;
         x.d.voltage.v = {bench::fixed(drop + emf * std::sin(lag_deg * kDegree), PM_WIDE_BITS),
-                         bench::fixed(emf * std::cos(lag_deg * kDegree), PM_WIDE_BITS)};
+                         bench::fixed(reactive + emf * std::cos(lag_deg * kDegree), PM_WIDE_BITS)};
         slow(x, 1);
     }
 }
