@@ -89,6 +89,7 @@ static void make_protection(maker_t *m, protection_config_t *c)
 {
     const drive_params_t *p = m->params;
     const pm_q_t i_trip = per_unit(m, DRIVE_PARAM_i_trip, m->base.i);
+    const pm_q_t i_rated = per_unit(m, DRIVE_PARAM_i_rated, m->base.i);
     c->v_dc_max = per_unit(m, DRIVE_PARAM_v_dc_max, m->base.v);
     c->v_dc_min = per_unit(m, DRIVE_PARAM_v_dc_min, m->base.v);
     c->i_trip_squared = pm_mulh(i_trip, i_trip);
@@ -111,12 +112,13 @@ static void make_protection(maker_t *m, protection_config_t *c)
     /* a current that dead time holds at zero is not one that does not conduct */
     const pm_q_t zone = 2 * fixed(m, pm_num_div(m->comp_zone, m->base.i), Q_BITS, DRIVE_PARAM_comp_zone);
     const pm_q_t noise = 8 * per_unit(m, DRIVE_PARAM_i_noise, m->base.i);
-    const pm_q_t judged = pm_max(pm_max(zone, noise), per_unit(m, DRIVE_PARAM_i_rated, m->base.i) / 64);
+    const pm_q_t judged = pm_max(pm_max(zone, noise), i_rated / 64);
     c->judged = pm_mul(judged, judged);
     c->temp_derate_dC = (int16_t)p->temp_derate;
     c->temp_trip_dC = (int16_t)p->temp_trip;
     c->omega_stall = speed(m, DRIVE_PARAM_speed_max) / 50;
     c->stall_ms = (uint16_t)p->t_stall;
+    c->i_stall = pm_min(i_rated / 4 * 3, per_unit(m, DRIVE_PARAM_i_max, m->base.i) / 16 * 15);
     c->lost_ms = (uint16_t)p->t_lost;
     if (p->i_trip > p->i_full_scale) {
         refuse(m, DRIVE_PARAM_i_trip, "above the full scale of the current channels");

@@ -3,6 +3,7 @@
 #define DRIVE_DRIVE_STATE_H
 
 #include "firmware/drive/drive.h"
+#include "firmware/drive/follow.h"
 #include "firmware/drive/open_phase.h"
 #include "firmware/drive/procedures/procedure.h"
 #include "firmware/drive/procedures/sequence.h"
@@ -33,6 +34,7 @@ struct drive {
     bool forced;  /* open loop: the observer is forced to the ramp angle */
     bool usual;   /* estimated angle and REGULATOR_INLINE: one branch per period for all that is not */
     bool round;   /* the start has found no saliency: without injection until the next one */
+    bool tried;   /* open loop: once more, with i_max */
     bool references_ready; /* the command's references are in per-unit */
     pm_dir_t ahead;        /* one and a half periods of rotation: from the sample to where the voltage acts */
     pm_unit_t v_share;     /* share of v_dc for current control */
@@ -63,6 +65,7 @@ struct drive {
     field_weakening_t field_weakening;
     pm_q_t omega_ramp; /* open loop: speed that is wanted */
     pm_q_t emf_open;   /* mean EMF beside that of the ramp */
+    pm_q_t i_vector;   /* open loop: current that is wanted */
     pm_q_t i_open;     /* open loop: its current; after the hand-over: what is left of it on the d-axis */
 
     /* references in per-unit, made from the command when it is another */
@@ -74,6 +77,9 @@ struct drive {
     uint16_t stall_ms, lost_ms, sum_ms;
     uint16_t still_ms; /* standstill while stopping */
     uint16_t agree_ms; /* observer and imposed angle turn alike */
+    uint16_t wait_ms;  /* for that, where the observer should */
+    uint16_t rest_ms;  /* until the vector turns once more */
+    follow_t follow;
     int32_t temperature_dC;
     pm_q_t heat;        /* of the windings: the current's square, through the low-pass of t_winding */
     pm_q_t bridge_heat; /* the same of the bridge, t_bridge */

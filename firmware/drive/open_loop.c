@@ -8,37 +8,65 @@
 #define SWEEP_FROM PM_TURN(0.75)
 
 /* Agreement of observer and imposed speed before the hand-over, and for how long. */
-#define AGREE_MS 20
+#define AGREE_MS 20U
+#define WAIT_MS  500U /* for it, from speed_high on */
+/* Of an angle, to FOLLOW_TURN. */
+#define PER_TURN (INT32_MAX / (FOLLOW_TURN / 2))
+/* With more current, before the vector turns once more. */
+#define REST_MS 100U
+
+static void begin(drive_t *drive)
+{
+    drive->stage = STAGE_OPEN_LOOP;
+    drive->emf_open = 0;
+    drive->agree_ms = 0;
+    drive->wait_ms = 0;
+    if (PM_HAS(load_current)) {
+        drive->rest_ms = 0;
+        drive->tried = false;
+    }
+}
 
 void open_loop_start(drive_t *drive)
 {
-    drive->stage = STAGE_OPEN_LOOP;
-    drive->agree_ms = 0;
+    begin(drive);
     drive->theta_open = SWEEP_FROM;
     drive->omega_ramp = 0;
     drive->omega_open = 0;
-    drive->emf_open = 0;
     drive->i_open = 0;
+    drive->i_vector = drive->config.open_loop.i;
+    follow_reset(&drive->follow, &drive->config.machine);
     position_reset(&drive->position, &drive->config.position, 0, drive->i_ab, false);
     regulator_reset(&drive->regulator, &drive->config.regulator, (pm_dq_t){0, 0}, (pm_dq_t){0, 0}, 0);
 }
 
-/* The vector keeps its place: the imposed angle starts at the angle of the present current. */
+/* More current than the torque takes, as far ahead of the rotor as makes the same of it. */
+static pm_dq_t with_margin(const drive_t *drive, pm_dq_t i)
+{
+    const drive_config_t *c = &drive->config;
+    const pm_q_t wanted = pm_max(c->open_loop.i, pm_abs(i.q) + pm_abs(i.q) / 2);
+    const pm_q_t length = pm_min(wanted, pm_max(c->i_max, pm_abs(i.q)));
+    return (pm_dq_t){.d = pm_sqrt(pm_mul(length, length) - pm_mul(i.q, i.q)), .q = i.q};
+}
+
+/* The torque stays as it is. */
 void open_loop_resume(drive_t *drive)
 {
     const pm_dq_t i = drive->status.i;
-    const pm_angle_t turn = pm_atan2(i.q, i.d);
+    const pm_dq_t vector = PM_HAS(load_current) ? with_margin(drive, i) : i;
+    const pm_angle_t turn = pm_atan2(vector.q, vector.d);
+    const pm_dir_t dir = pm_dir(turn);
     const pm_ab_t v = {.alpha = pm_narrow(drive->voltage.v.d), .beta = pm_narrow(drive->voltage.v.q)};
-    const pm_dq_t u = pm_park(v, pm_dir(turn));
+    const pm_ab_t present = {.alpha = i.d, .beta = i.q};
+    drive->i_open = pm_hypot(vector.d, vector.q);
+    drive->i_vector = PM_HAS(load_current) ? drive->i_open : drive->config.open_loop.i;
     drive->theta_open = drive->position.pll.theta + turn;
     drive->omega_ramp = drive->position.pll.omega;
     drive->omega_open = drive->omega_ramp;
-    drive->emf_open = 0;
-    drive->i_open = pm_hypot(i.d, i.q);
-    regulator_reset(&drive->regulator, &drive->config.regulator, u, (pm_dq_t){.d = drive->i_open, .q = 0},
+    regulator_reset(&drive->regulator, &drive->config.regulator, pm_park(v, dir), pm_park(present, dir),
                     drive->omega_ramp);
-    drive->agree_ms = 0;
-    drive->stage = STAGE_OPEN_LOOP;
+    follow_resume(&drive->follow);
+    begin(drive);
 }
 
 static void hand_over(drive_t *drive)
@@ -79,35 +107,55 @@ bool open_loop_ramps(const drive_t *drive)
     return drive->omega_ramp != wanted_speed(drive);
 }
 
-/* Across the vector, where there is no current: the EMF but for what the rotor lags behind. */
-static pm_q_t emf_across(const drive_t *drive)
+/* The voltage of a period is the one that the current needs, not that of a switch state. */
+static bool is_mean(const drive_t *drive)
 {
-    return pm_narrow_sat(drive->voltage.v.q) -
-           pm_mul(drive->omega_open, pm_mul(drive->config.machine.L_d, drive->status.i.d));
+#if PM_HAS(finite_set)
+    return (regulator_traits(drive->config.regulator.id) & (uint32_t)REGULATOR_SWITCHES) == 0U;
+#else
+    (void)drive;
+    return true;
+#endif
 }
 
-/* A rotor that follows shows w psi_m, and of that at least 0.7 along or across the vector; one that stands shows what R
- * and saliency are not known to. It is judged where half of w psi_m is more than half of R i and 1/64 of v_dc, which is
- * what the compensation of dead time may leave. */
-bool open_loop_stands(const drive_t *drive)
+/* Too fast for a rotor that swings to stand. */
+static bool is_fast(const drive_t *drive)
 {
-    const pm_machine_t *machine = &drive->config.machine;
-    const pm_q_t half = pm_mul(pm_abs(drive->omega_ramp), machine->psi_m) / 2;
-    const pm_q_t drop = pm_mul(machine->R_s, drive->status.i.d);
-    const pm_q_t along = pm_narrow_sat(drive->voltage.v.d) - drop;
-    return half > pm_abs(drop) / 2 + drive->status.v_dc / 64 && pm_abs(along) < half &&
-           pm_abs(emf_across(drive)) < half;
+    return drive->follow.emf >= drive->config.open_loop.v_swing / 2;
 }
 
-/* A rotor on a vector of constant current swings undamped. Across the vector, where there is no current, the
- * voltage is the EMF of the rotor's speed: the vector falls behind a rotor that is too fast and runs ahead of
+/* The EMF of the rotor's speed, along where it is: across the vector alone a lag delta shows as speed, omega sin(delta), which
+ * from 0.7 of the swing's frequency on turns damping into its opposite. Below half of that frequency, where the rotor may swing
+ * through zero, and until it has been seen to follow, across the vector alone. */
+static pm_q_t emf_of_speed(const drive_t *drive)
+{
+    const pm_machine_t *m = &drive->config.machine;
+    const follow_t *f = &drive->follow;
+    const pm_q_t i = drive->status.i.d;
+    const pm_ab_t e = {.alpha = pm_narrow(drive->voltage.v.q) - pm_mul(drive->omega_open, pm_mul(m->L_d, i)),
+                       .beta = pm_narrow(drive->voltage.v.d) - pm_mul(f->R, i)};
+    if (!PM_HAS(load_current) || !is_fast(drive) || !f->follows) {
+        return e.alpha;
+    }
+    const bool back = drive->omega_ramp < 0;
+    const pm_angle_t lag = pm_atan2(back ? -f->along : f->along, back ? -f->across : f->across);
+    return pm_park(e, pm_dir(lag)).d;
+}
+
+/* A rotor on a vector of constant current swings undamped: the vector falls behind one that is too fast and runs ahead of
  * one that is too slow. */
 static void damp(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
-    const pm_q_t emf = pm_clamp(emf_across(drive) - pm_mul(drive->omega_ramp, c->machine.psi_m),
-                                -c->open_loop.v_swing, c->open_loop.v_swing);
-    const pm_q_t swing = emf - pm_lp1(&drive->emf_open, emf, c->open_loop.k_swing);
+    if (!is_mean(drive)) {
+        drive->omega_open = drive->omega_ramp;
+        return;
+    }
+    const pm_q_t v = c->open_loop.v_swing;
+    const pm_q_t steady = is_fast(drive) ? drive->emf_open : 0; /* what R, L and psi_m are not known to */
+    const pm_q_t emf = emf_of_speed(drive) - pm_mul(drive->omega_ramp, c->machine.psi_m);
+    const pm_q_t seen = steady + pm_clamp(emf - steady, -v, v);
+    const pm_q_t swing = seen - pm_lp1(&drive->emf_open, seen, c->open_loop.k_swing);
     drive->omega_open = drive->omega_ramp - pm_small_gain(pm_small(swing), c->open_loop.per_swing);
 }
 
@@ -115,26 +163,93 @@ void open_loop_hold(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
     const bool current_mode = drive->command.mode == DRIVE_MODE_CURRENT;
-    const pm_q_t i_wanted = current_mode ? pm_min(pm_abs(drive->i_target), c->i_max) : c->open_loop.i;
+    const pm_q_t i_wanted = current_mode ? pm_min(pm_abs(drive->i_target), c->i_max) : drive->i_vector;
     drive->i_open = approach(drive->i_open, i_wanted, c->open_loop.i_slope);
     drive->i_ref = (pm_dq_t){.d = drive->i_open, .q = 0};
     damp(drive);
 }
 
-void open_loop_slow(drive_t *drive)
+/* Once more from standstill, with all the current there is. A vector that the user gave, or that a rotor had followed, is not
+ * tried again. */
+static void try_again(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
-    const bool current_mode = drive->command.mode == DRIVE_MODE_CURRENT;
-    open_loop_hold(drive);
-    const pm_q_t target = wanted_speed(drive);
-    drive->omega_ramp = approach(drive->omega_ramp, target, c->open_loop.slope);
+    const bool may = drive->command.mode != DRIVE_MODE_CURRENT && !drive->follow.follows;
+    if (!PM_HAS(load_current) || !may || drive->tried) {
+        drive_trip(drive, DRIVE_FAULT_STALL);
+        return;
+    }
+    drive->tried = true;
+    drive->i_vector = c->i_max;
+    drive->omega_ramp = 0;
+    drive->rest_ms = REST_MS;
+    drive->wait_ms = 0;
+    follow_again(&drive->follow);
+}
 
+/* The current follows the load, where that shows. */
+static void watch(drive_t *drive)
+{
+    const drive_config_t *c = &drive->config;
+    if (!is_mean(drive)) {
+        return;
+    }
+    const follow_in_t in = {.omega = drive->omega_ramp,
+                            .v = {.d = pm_narrow(drive->voltage.v.d), .q = pm_narrow(drive->voltage.v.q)},
+                            .i = drive->i_open,
+                            .v_dc = drive->status.v_dc,
+                            .turn = pm_abs(drive->turn_open) / PER_TURN * (int32_t)c->slow_divider};
+    if (follow_slow(&drive->follow, &c->machine, &in)) {
+        try_again(drive);
+        return;
+    }
+    const int32_t load = PM_HAS(load_current) ? follow_load(&drive->follow) : 0;
+    if (load > 0) {
+        drive->i_vector = pm_min(drive->i_vector + c->open_loop.i_slope, c->i_max);
+    } else if (load < 0) {
+        drive->i_vector = pm_max(drive->i_vector - c->open_loop.i_slope / 8, c->open_loop.i);
+    } else {
+        /* right, or not known */
+    }
+}
+
+static void hand_over_in_time(drive_t *drive)
+{
     const pm_q_t omega = drive->omega_ramp;
-    const bool agree = pm_abs(omega) >= c->position.omega_high &&
-                       pm_abs(drive->position.pll.omega - omega) < pm_abs(omega) / 4 &&
+    const bool fast = pm_abs(omega) >= drive->config.position.omega_high;
+    const bool agree = fast && pm_abs(drive->position.pll.omega - omega) < pm_abs(omega) / 4 &&
                        drive->position.quality > PM_Q(0.5);
     drive->agree_ms = agree ? (uint16_t)(drive->agree_ms + 1U) : 0U;
-    if (!current_mode && drive->agree_ms > AGREE_MS) {
+    drive->wait_ms = fast ? (uint16_t)(drive->wait_ms + 1U) : 0U;
+    if (drive->agree_ms > AGREE_MS) {
         hand_over(drive);
+    } else if (drive->wait_ms > WAIT_MS) {
+        drive_trip(drive, DRIVE_FAULT_POSITION_LOST);
+    } else {
+        /* not yet */
+    }
+}
+
+void open_loop_rested(drive_t *drive)
+{
+    const drive_config_t *c = &drive->config;
+    if (!PM_HAS(load_current) || !is_mean(drive)) {
+        return;
+    }
+    follow_rested(&drive->follow, &c->machine, drive->i_open, drive->status.v_dc);
+    position_set_resistance(&drive->position, &c->position, drive->follow.R);
+}
+
+void open_loop_slow(drive_t *drive)
+{
+    open_loop_hold(drive);
+    if (PM_HAS(load_current) && drive->rest_ms > 0U) {
+        drive->rest_ms--;
+    } else {
+        drive->omega_ramp = approach(drive->omega_ramp, wanted_speed(drive), drive->config.open_loop.slope);
+    }
+    watch(drive);
+    if (drive->command.mode != DRIVE_MODE_CURRENT && drive->stage == STAGE_OPEN_LOOP) {
+        hand_over_in_time(drive);
     }
 }

@@ -100,6 +100,9 @@ void position_step(position_t *self, const position_config_t *config, const posi
  * amplitude is given up. Between two steps, with the current of the last and the same in its frame. */
 void position_change_observer(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq);
 
+/* R as it was found, from here to the next reset; of active_flux, others keep that of the configuration. */
+void position_set_resistance(position_t *self, const position_config_t *config, pm_q_t R);
+
 /* While the rotor follows a given vector (align, open-loop start): the loop is opened, the position is
  * `imposed` and goes on with its speed, and the observer is tied to it. Up to the next position_slow(). */
 void position_force(position_t *self, const position_config_t *config, const pm_pll_t *imposed);

@@ -55,6 +55,14 @@ void position_change_observer(position_t *self, const position_config_t *config,
     observer_reset(&self->observer, &config->observer, &in);
 }
 
+void position_set_resistance(position_t *self, const position_config_t *config, pm_q_t R)
+{
+    if (config->observer.id == OBSERVER_active_flux) {
+        const pm_q_t told = config->observer.active_flux.model.R;
+        self->observer.active_flux.R = pm_clamp(R, told / 2, told + told / 2);
+    }
+}
+
 void position_force(position_t *self, const position_config_t *config, const pm_pll_t *imposed)
 {
     observer_tie(&self->observer, &config->observer);

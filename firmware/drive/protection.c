@@ -59,8 +59,25 @@ static bool lasts(uint16_t *timer, bool condition, uint16_t limit)
     return *timer > limit;
 }
 
-/* On an imposed vector, by the EMF that is not there. */
-#define STANDS_MS 300U
+/* At standstill where it should turn, with three quarters of rated current or of its torque, or what there is of them. A load
+ * that zero speed holds is not blocked; nor is a rotor that holds less torque. */
+static bool is_blocked(const drive_t *drive)
+{
+    const protection_config_t *c = &drive->config.protection;
+    const pm_dq_t i = drive->i_ref;
+    pm_q_t torque = 0;
+    if (drive->command.mode == DRIVE_MODE_TORQUE) {
+        torque = pm_abs(drive->torque_target);
+    } else if (pm_abs(drive->speed.reference) <= c->omega_stall) {
+        return false;
+    } else {
+        /* its current says */
+    }
+    return drive->stage == STAGE_VECTOR && drive->state == DRIVE_RUNNING &&
+           pm_abs(drive->position.omega_mean) < c->omega_stall &&
+           (torque > pm_mul(c->i_stall, drive->config.machine.psi_m) ||
+            pm_mul(i.d, i.d) + pm_mul(i.q, i.q) > pm_mul(c->i_stall, c->i_stall));
+}
 
 void protection_slow(drive_t *drive)
 {
@@ -88,14 +105,7 @@ void protection_slow(drive_t *drive)
     if (lasts(&drive->lost_ms, judged && drive->position.quality == 0, c->lost_ms)) {
         drive_trip(drive, DRIVE_FAULT_POSITION_LOST);
     }
-    /* In torque control the limit is at work only if more torque is wanted than there is. */
-    const bool wanted =
-        drive->command.mode == DRIVE_MODE_TORQUE || pm_abs(drive->speed.reference) > c->omega_stall;
-    const bool open = drive->stage == STAGE_OPEN_LOOP;
-    const bool blocked = turning && drive->state == DRIVE_RUNNING && wanted &&
-                         (drive->status.limits & DRIVE_LIMIT_CURRENT) != 0U && pm_abs(omega) < c->omega_stall;
-    const bool stalled = open ? open_loop_stands(drive) : blocked;
-    if (lasts(&drive->stall_ms, stalled, open ? STANDS_MS : c->stall_ms)) {
+    if (lasts(&drive->stall_ms, is_blocked(drive), c->stall_ms)) {
         drive_trip(drive, DRIVE_FAULT_STALL);
     }
 }

@@ -13,12 +13,19 @@ pm_procedure_t procedure_align_slow(drive_t *drive)
     const open_loop_config_t *c = &drive->config.open_loop;
     self->ms++;
     if (self->ms >= c->align_ms) {
+        open_loop_rested(drive);
         open_loop_slow(drive);
         drive->sequence.theta = drive->theta_open;
         return PM_DONE;
     }
     open_loop_hold(drive);
-    drive->theta_open += 2U * self->ms <= c->align_ms ? c->sweep : 0U;
+    if (2U * self->ms <= c->align_ms) {
+        drive->theta_open += c->sweep;
+    } else if (PM_HAS(load_current)) {
+        follow_rest(&drive->follow, pm_narrow_sat(drive->voltage.v.d));
+    } else {
+        /* the image keeps R_s */
+    }
     return PM_RUNNING;
 }
 

@@ -43,6 +43,20 @@ void slow(Drive &x, int ms)
     }
 }
 
+// With the EMF of a rotor that lags behind by so much.
+void slow_with(Drive &x, int ms, double lag_deg = 0, double share = 1)
+{
+    for (int k = 0; k < ms; ++k) {
+        const double emf = real(x.d.omega_ramp) * real(x.d.config.machine.psi_m) * share;
+        const pm_machine_t &m = x.d.config.machine;
+        const double i = real(x.d.i_open), drop = i * real(x.d.follow.R);
+        const double reactive = real(x.d.omega_ramp) * i * (real(m.L_d) + real(m.L_q)) / 2;
+        x.d.voltage.v = {bench::fixed(drop + emf * std::sin(lag_deg * kDegree), PM_WIDE_BITS),
+                         bench::fixed(reactive + emf * std::cos(lag_deg * kDegree), PM_WIDE_BITS)};
+        slow(x, 1);
+    }
+}
+
 // What current control gives next while the current is what it should be, in its frame.
 Complex next_voltage(const drive_t &d, pm_dq_t i, pm_q_t omega)
 {
@@ -107,7 +121,7 @@ TEST(OpenLoop, SpeedRampsAfterTheAlign)
         slow(x, kAlign_ms - 1);
         EXPECT_EQ(x.d.omega_ramp, 0);
         for (int ms = 1; ms < 1500; ++ms) {
-            slow(x, 1);
+            slow_with(x, 1);
             ASSERT_NEAR(real(x.d.omega_ramp), std::copysign(std::min(ms * kSlope, 0.3), target), 1e-5) << ms;
         }
     }
@@ -121,7 +135,8 @@ TEST(OpenLoop, TorqueModeGoesBeyondSpeedHigh)
         Drive x = started();
         x.d.command.mode = DRIVE_MODE_TORQUE;
         x.d.torque_target = bench::fixed(torque, 28);
-        slow(x, kAlign_ms + 2000);
+        x.d.config.position.omega_high = PM_Q(40.0 * 3 / 540);
+        slow_with(x, kAlign_ms + 1200);
         EXPECT_NEAR(real(x.d.omega_ramp), std::copysign(1.25 * 40 * 3 / 540, torque), 1e-5);
     }
 }
@@ -133,7 +148,7 @@ TEST(OpenLoop, SpeedIsLimited)
         Drive x = started();
         x.d.config.position.omega_high = PM_Q(2.0); // no hand-over
         x.d.omega_target = bench::fixed(way * 1.5, 28);
-        slow(x, kAlign_ms + 8000);
+        slow_with(x, kAlign_ms + 8000);
         EXPECT_NEAR(real(x.d.omega_ramp), way * 150 * 3 / 540, 1e-5);
     }
 }
@@ -191,7 +206,7 @@ TEST(OpenLoop, HandOverKeepsCurrentAndVoltage)
     for (const double lag_deg : {0.0, 35.0, -60.0}) {
         Drive x = started();
         x.d.omega_target = PM_Q(0.5);
-        slow(x, kAlign_ms + 1500);
+        slow_with(x, kAlign_ms + 1000, lag_deg);
         ASSERT_EQ(x.d.stage, STAGE_OPEN_LOOP); // nothing has agreed so far
         x.d.position.quality = PM_ONE;
         x.d.position.pll.omega = x.d.omega_ramp;
@@ -229,25 +244,101 @@ TEST(OpenLoop, HandOverKeepsCurrentAndVoltage)
     }
 }
 
+// Half a second of waiting for it, from omega_high (0.222) on, is the most.
 TEST(OpenLoop, NoHandOverWithoutAgreement)
 {
     for (const int what : {0, 1, 2}) {
         Drive x = started();
         x.d.omega_target = what == 2 ? PM_Q(0.2) : PM_Q(0.5); // below omega_high
         slow(x, kAlign_ms);
-        for (int ms = 0; ms < 2000; ++ms) {
+        int ms = 0;
+        for (; ms < 2000 && x.d.fault == DRIVE_FAULT_NONE; ++ms) {
+            ASSERT_EQ(x.d.stage, STAGE_OPEN_LOOP) << what;
             x.d.position.quality = what == 0 ? PM_Q(0.4) : PM_ONE;
             x.d.position.pll.omega = what == 1 ? x.d.omega_ramp / 2 : x.d.omega_ramp;
-            slow(x, 1);
-            ASSERT_EQ(x.d.stage, STAGE_OPEN_LOOP) << what;
+            slow_with(x, 1);
         }
+        EXPECT_EQ(x.d.fault, what == 2 ? DRIVE_FAULT_NONE : DRIVE_FAULT_POSITION_LOST);
+        EXPECT_NEAR(ms, what == 2 ? 2000 : 40 * 3 / 540.0 / kSlope + 500, 3);
     }
 }
 
-// Back below omega_low: the imposed angle starts where the current is.
-TEST(OpenLoop, ResumeKeepsCurrentAndVoltage)
+// A rotor that does not answer: once more from standstill, after a rest with all the current there is, then a fault.
+// The vector that the user gave is not tried again.
+TEST(OpenLoop, ARotorThatStandsIsTriedOnceMoreWithTheLargestCurrent)
 {
-    for (const Complex i : {Complex{-0.05, 0.2}, Complex{0.1, -0.15}, Complex{0, 0.01}}) {
+    for (const drive_mode_t mode : {DRIVE_MODE_SPEED, DRIVE_MODE_TORQUE, DRIVE_MODE_CURRENT}) {
+        Drive x = started();
+        x.d.command.mode = mode;
+        x.d.omega_target = PM_Q(0.3);
+        x.d.torque_target = PM_Q(0.1);
+        x.d.i_target = PM_Q(0.2);
+        x.d.status.v_dc = PM_Q(0.5);
+        slow_with(x, kAlign_ms - 1, 0, 0);
+        int ms = 0;
+        int tries = 1;
+        for (pm_q_t before = 0; x.d.fault == DRIVE_FAULT_NONE && ms < 2000; ++ms) {
+            drive_prepare(&x.d); // the turn of a period
+            slow_with(x, 1, 0, 0);
+            if (x.d.omega_ramp < before) {
+                tries++;
+                EXPECT_EQ(x.d.omega_ramp, 0);
+                EXPECT_LT(ms, 300);
+                EXPECT_EQ(x.d.i_vector, x.d.config.i_max);
+                slow_with(x, 100, 0, 0);
+                ms += 100;
+                EXPECT_EQ(x.d.omega_ramp, 0);
+                EXPECT_EQ(x.d.i_open, x.d.config.i_max);
+            }
+            before = x.d.omega_ramp;
+        }
+        EXPECT_EQ(x.d.fault, DRIVE_FAULT_STALL);
+        EXPECT_EQ(tries, mode == DRIVE_MODE_CURRENT ? 1 : 2);
+        EXPECT_LT(ms, 800);
+    }
+}
+
+// One that follows and then stands has a load that no current moves.
+TEST(OpenLoop, ARotorThatFallsOutIsNotTriedAgain)
+{
+    Drive x = started();
+    x.d.omega_target = PM_Q(0.2);
+    slow_with(x, kAlign_ms);
+    slow_with(x, 1000);
+    ASSERT_TRUE(x.d.follow.follows);
+    ASSERT_EQ(x.d.fault, DRIVE_FAULT_NONE);
+    for (int ms = 0; ms < 200; ++ms) {
+        drive_prepare(&x.d);
+        slow_with(x, 1, 0, 0);
+    }
+    EXPECT_EQ(x.d.fault, DRIVE_FAULT_STALL);
+    EXPECT_FALSE(x.d.tried);
+}
+
+// Beyond 40 degrees of lag more current, at most i_max; back to i_open_loop below 24; not in current mode.
+TEST(OpenLoop, CurrentFollowsTheLoad)
+{
+    for (const double way : {1.0, -1.0}) {
+        Drive x = started();
+        x.d.omega_target = bench::fixed(0.2 * way, 28);
+        slow_with(x, kAlign_ms + 900, 30);
+        EXPECT_NEAR(real(x.d.i_ref.d), kCurrent, 1e-6);
+        slow_with(x, 300, 50);
+        EXPECT_NEAR(real(x.d.i_ref.d), 0.5, 1e-6);
+        slow_with(x, 300, -30); // for a moment, on its way, there is no load
+        EXPECT_NEAR(real(x.d.i_ref.d), 0.5, 0.03);
+        slow_with(x, 1000, -10);
+        EXPECT_NEAR(real(x.d.i_ref.d), kCurrent, 1e-6);
+        slow_with(x, 300, -50);
+        EXPECT_NEAR(real(x.d.i_ref.d), 0.5, 1e-6);
+    }
+}
+
+// Back below omega_low: the imposed vector makes the torque that there was, with half as much again of current as it takes, or
+// i_open_loop (0.2) if that is more, at most i_max (0.5).
+TEST(OpenLoop, ResumeKeepsTorqueAndVoltage)
+{
+    for (const Complex i : {Complex{-0.05, 0.2}, Complex{0.1, -0.15}, Complex{0, 0.01}, Complex{0, 0.45}}) {
         Drive x = started();
         x.d.stage = STAGE_VECTOR;
         x.d.position.pll.theta = PM_TURN(0.9);
@@ -258,11 +349,13 @@ TEST(OpenLoop, ResumeKeepsCurrentAndVoltage)
         EXPECT_EQ(x.d.stage, STAGE_OPEN_LOOP);
         EXPECT_EQ(x.d.omega_ramp, PM_Q(0.05));
         const double rotor = 0.9 * 2 * bench::kPi, frame = bench::rad(x.d.theta_open);
-        EXPECT_NEAR(std::abs(real(x.d.i_open) * std::polar(1.0, frame) - i * std::polar(1.0, rotor)), 0,
-                    kVector);
-        const Complex u = Complex{-0.03, 0.08};
-        const Complex next = next_voltage(x.d, {x.d.i_open, 0}, x.d.omega_ramp);
-        EXPECT_NEAR(std::abs(next * std::polar(1.0, frame) - u * std::polar(1.0, rotor)), 0, kVector);
+        const Complex wanted = real(x.d.i_open) * std::polar(1.0, frame - rotor);
+        EXPECT_NEAR(wanted.imag(), i.imag(), kVector);
+        EXPECT_GT(wanted.real(), 0);
+        EXPECT_NEAR(real(x.d.i_open), std::clamp(1.5 * std::abs(i.imag()), 0.2, 0.5), kVector);
+        const Complex u = Complex{-0.03, 0.08} * std::polar(1.0, rotor - frame);
+        const pm_dq_t present = bench::dq(i * std::polar(1.0, rotor - frame));
+        EXPECT_NEAR(std::abs(next_voltage(x.d, present, x.d.omega_ramp) - u), 0, kVector);
     }
 }
 

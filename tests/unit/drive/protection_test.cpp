@@ -333,15 +333,15 @@ TEST(Protection, LimitsThemselvesAreAllowed)
             EXPECT_EQ(calls(x, 100), beyond ? 1 : 100);
             EXPECT_EQ(x.d.fault, beyond ? DRIVE_FAULT_OVER_SPEED : DRIVE_FAULT_NONE);
 
-            // a stall: the current is limited, the rotor below a speed that its reference is above
+            // a stall: current of a stall, the rotor below a speed that its reference is above
             x = turning();
-            x.d.status.limits = DRIVE_LIMIT_CURRENT;
+            x.d.i_ref.q = sign * PM_Q(0.4);
             x.d.speed.reference = sign * 2 * c.omega_stall;
-            x.d.pll.omega = sign * (c.omega_stall - beyond);
+            x.d.position.omega_mean = sign * (c.omega_stall - beyond);
             EXPECT_EQ(calls(x, 10000), beyond ? c.stall_ms + 1 : 10000);
             EXPECT_EQ(x.d.fault, beyond ? DRIVE_FAULT_STALL : DRIVE_FAULT_NONE);
             x = turning();
-            x.d.status.limits = DRIVE_LIMIT_CURRENT;
+            x.d.i_ref.q = sign * PM_Q(0.4);
             x.d.speed.reference = sign * (c.omega_stall + beyond);
             EXPECT_EQ(calls(x, 10000), beyond ? c.stall_ms + 1 : 10000);
         }
@@ -414,7 +414,7 @@ TEST(Protection, StepNamesTheCause)
     }
 }
 
-// A stall is one of a control that wants more than the current's limit gives; each condition by itself.
+// A stall is one of a control that should turn the rotor with that much current; each condition by itself.
 TEST(Protection, WhatIsNoStall)
 {
     for (int missing = 0; missing < 5; ++missing) {
@@ -424,7 +424,8 @@ TEST(Protection, WhatIsNoStall)
         x.d.stage = missing == 2 ? STAGE_OPEN_LOOP : STAGE_VECTOR;
         x.d.command.mode = DRIVE_MODE_SPEED;
         x.d.i_abc = {0, 0, 0};
-        x.d.status.limits = missing == 4 ? uint32_t(DRIVE_LIMIT_VOLTAGE) : uint32_t(DRIVE_LIMIT_CURRENT);
+        x.d.status.limits = DRIVE_LIMIT_VOLTAGE;
+        x.d.i_ref.q = missing == 4 ? PM_Q(0.29) : PM_Q(0.31);
         x.d.position.quality = PM_ONE;
         x.d.speed.reference = missing == 3 ? 0 : PM_Q(0.5);
         for (int ms = 0; ms < 3000; ++ms) {
@@ -494,25 +495,62 @@ TEST(Protection, TheBridgeIsOverloadedAfterItsTime)
     }
 }
 
-// More torque than there is, and no speed: also a stall. Torque within the limit may hold a rotor for good.
+// Three quarters of rated current or of its torque, and no speed: a stall. Less may hold a rotor for good.
 TEST(Protection, AStallInTorqueControl)
 {
-    for (const uint32_t limits : {0U, uint32_t(DRIVE_LIMIT_CURRENT)}) {
-        for (const int beyond : {0, 1}) {
-            Drive x;
-            x.step();
-            x.d.state = DRIVE_RUNNING;
-            x.d.stage = STAGE_VECTOR;
-            x.d.command.mode = DRIVE_MODE_TORQUE;
-            x.d.i_abc = {0, 0, 0};
-            x.d.status.limits = limits;
-            x.d.position.quality = PM_ONE;
-            x.d.pll.omega = x.d.config.protection.omega_stall - beyond;
-            for (int ms = 0; ms < 3000; ++ms) {
-                protection_slow(&x.d);
-            }
-            EXPECT_EQ(x.d.fault, limits != 0U && beyond != 0 ? DRIVE_FAULT_STALL : DRIVE_FAULT_NONE);
+    const struct {
+        double i_q, torque; // of what counts
+        int slow;
+        bool stall;
+    } cases[] = {{0, 0, 1, false},       {1.01, 0, 1, true}, {-1.01, 0, 1, true}, {1.01, 0, 0, false},
+                 {0.99, 0.99, 1, false}, {0, 1.01, 1, true}, {0, -1.01, 1, true}, {0, 1.01, 0, false}};
+    for (const auto &at : cases) {
+        Drive x;
+        x.step();
+        x.d.state = DRIVE_RUNNING;
+        x.d.stage = STAGE_VECTOR;
+        x.d.command.mode = DRIVE_MODE_TORQUE;
+        x.d.i_abc = {0, 0, 0};
+        x.d.position.quality = PM_ONE;
+        const double i_stall = bench::real(x.d.config.protection.i_stall);
+        EXPECT_NEAR(i_stall, 0.75 * 0.4, 1e-6); // of 4 A, 10 A
+        x.d.i_ref.q = bench::fixed(at.i_q * i_stall, 28);
+        x.d.torque_target = bench::fixed(at.torque * i_stall * bench::real(x.d.config.machine.psi_m), 28);
+        x.d.position.omega_mean = x.d.config.protection.omega_stall - at.slow;
+        for (int ms = 0; ms < 3000; ++ms) {
+            protection_slow(&x.d);
         }
+        EXPECT_EQ(x.d.fault, at.stall ? DRIVE_FAULT_STALL : DRIVE_FAULT_NONE)
+            << at.i_q << ' ' << at.torque << ' ' << at.slow;
+    }
+}
+
+// What may flow at all is a stall, too, where it is less.
+TEST(Protection, ASmallCurrentLimitIsAStall)
+{
+    drive_params_t p = direct::params();
+    p.i_max = 2500;
+    p.i_open_loop = 2000;
+    EXPECT_NEAR(bench::real(Drive(p).d.config.protection.i_stall), 0.25 * 15 / 16, 1e-6);
+}
+
+// In speed control the same current is a stall only where the rotor should turn: zero speed holds a load.
+TEST(Protection, RatedCurrentAtZeroSpeedIsAStallOnlyOnTheWayToAnother)
+{
+    for (const bool wanted : {false, true}) {
+        Drive x;
+        x.step();
+        x.d.state = DRIVE_RUNNING;
+        x.d.stage = STAGE_VECTOR;
+        x.d.command.mode = DRIVE_MODE_SPEED;
+        x.d.i_abc = {0, 0, 0};
+        x.d.position.quality = PM_ONE;
+        x.d.i_ref = {-x.d.config.protection.i_stall, x.d.config.protection.i_stall / 8};
+        x.d.speed.reference = x.d.config.protection.omega_stall + (wanted ? 1 : 0);
+        for (int ms = 0; ms < 3000; ++ms) {
+            protection_slow(&x.d);
+        }
+        EXPECT_EQ(x.d.fault, wanted ? DRIVE_FAULT_STALL : DRIVE_FAULT_NONE);
     }
 }
 

@@ -15,6 +15,7 @@ TOLD = 0.15     # what a data sheet is
 STEPS = 4096    # of the converter
 INJECTION_HZ = 25.0  # of the position by injection: slow enough for the noise of the smallest answer that leads
 LAG = 0.12           # rad that the estimate may be behind an acceleration
+STALL_S = 0.6
 SPEED_MOST = 0.4     # of rated speed: hand-over of a machine whose EMF is small at any speed
 
 # Why each value is what it is, in a line.
@@ -46,7 +47,8 @@ WHY = {
     "i_open_loop": "0.8 of rated, bears half the rated torque 39 degrees behind; at most psi_m/(2 (L_q - L_d)), or saliency "
                    "turns the rotor away",
     "t_align": "half a second",
-    "open_loop_acceleration": "a twentieth of rated torque; hands over within 0.6 s where that allows it",
+    "t_stall": "a fault well within a second of a rotor that does not turn",
+    "open_loop_acceleration": "a tenth of rated torque; hands over within 0.6 s where that allows it",
 }
 
 
@@ -173,7 +175,8 @@ def values(x, bandwidth=None, tolerance=MEASURED):
         "start_method": 0 if leads else 2,
         "i_open_loop": i_open,
         "t_align": 0.5,
-        "open_loop_acceleration": min(0.05 * jerk, high / 0.6),
+        "open_loop_acceleration": min(0.1 * jerk, high / 0.6),
+        "t_stall": STALL_S,
     }
 
 
