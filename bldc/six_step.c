@@ -1,0 +1,118 @@
+#include "bldc/six_step.h"
+
+/* What follows from a new interval: what is expected of the next sector. */
+static void follow(six_step_t *self, const six_step_config_t *config)
+{
+    const pm_q_t omega = commutation_speed(&self->commutation, &config->commutation);
+    self->expected.swing = pm_max(pm_mul_sat(omega, config->swing), 1);
+    self->expected.t_60 = commutation_t_60(&self->commutation);
+    self->expected.at = self->commutation.crossing + self->expected.t_60;
+}
+
+static void open(six_step_t *self, uint32_t sector, uint32_t since)
+{
+    zero_crossing_open(&self->crossing, sector, since);
+    self->expected.threshold = thresholds_at(&self->thresholds, sector, self->reverse);
+}
+
+void six_step_reset(six_step_t *self, const six_step_config_t *config, bool reverse, uint32_t sector,
+                    uint32_t crossing, uint32_t t_60, uint32_t now)
+{
+    self->reverse = reverse;
+    self->lost = false;
+    commutation_reset(&self->commutation, sector, crossing, t_60);
+    follow(self, config);
+    open(self, sector, crossing);
+    self->crossing.found = true;
+    self->commutated = now;
+    const uint32_t period = 2U * config->pattern.half_period;
+    const six_step_plan_t none = {.start = now - period, .sector = (uint8_t)sector};
+    self->plan[0] = none;
+    self->plan[1] = none;
+    self->plan[1].start = now;
+}
+
+static void found(six_step_t *self, const six_step_config_t *config)
+{
+    commutation_t *c = &self->commutation;
+    commutation_crossed(c, self->crossing.at);
+    follow(self, config);
+    if (c->crossed == SECTORS - 1U && c->whole == SECTORS) {
+        thresholds_learn(&self->thresholds, &config->thresholds, c->interval, c->sum, self->expected.swing,
+                         self->reverse);
+    }
+}
+
+static void look(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in)
+{
+    const six_step_plan_t *plan = &self->plan[0];
+    const bool commutated = plan->commutate_at != 0U && plan->commutate_at < plan->sample_at;
+    const uint32_t sector = commutated ? sector_next(plan->sector) : plan->sector;
+    if (sector != self->crossing.sector) {
+        if (!self->crossing.found) {
+            commutation_missed(&self->commutation);
+            follow(self, config);
+        }
+        open(self, sector, commutated ? plan->start + plan->commutate_at : self->commutated);
+    }
+    if (self->crossing.found) {
+        return;
+    }
+    const zero_sample_t sample = {.at = plan->start + plan->sample_at,
+                                  .legs = plan->legs,
+                                  .v = {in->v[0], in->v[1], in->v[2]},
+                                  .v_neutral = in->v_neutral,
+                                  .v_dc = in->v_dc};
+    if (zero_crossing_step(&self->crossing, &config->crossing, self->reverse, &sample, &self->expected)) {
+        found(self, config);
+    } else if (self->crossing.ahead) {
+        commutation_ahead(&self->commutation, self->crossing.at);
+    } else {
+        /* nothing is known of it yet */
+    }
+}
+
+/* A commutation ahead of the sample moves it to where the next sector has its own, if that is still to come. */
+static void plan_sample(six_step_plan_t *plan, const pattern_config_t *pattern, pm_q_t u)
+{
+    pattern_sample_t sample = pattern_sample(pattern, plan->sector, u);
+    if (plan->commutate_at != 0U && plan->commutate_at < sample.at) {
+        sample = pattern_sample(pattern, sector_next(plan->sector), u);
+        sample.at = plan->commutate_at < sample.at ? sample.at : 0U;
+    }
+    plan->sample_at = sample.at;
+    plan->legs = sample.legs;
+}
+
+void six_step_step(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in,
+                   six_step_out_t *out)
+{
+    if (in->sampled) {
+        look(self, config, in);
+    }
+    commutation_t *c = &self->commutation;
+    self->lost = self->lost || commutation_state(c, &config->commutation) == COMMUTATION_LOST;
+    const int32_t period = 2 * (int32_t)config->pattern.half_period;
+    if (self->plan[0].commutate_at != 0U) {
+        self->commutated = self->plan[0].start + self->plan[0].commutate_at;
+    }
+    self->plan[0] = self->plan[1];
+    six_step_plan_t *plan = &self->plan[1];
+    plan->start = in->now + (uint32_t)period;
+    plan->sector = c->sector;
+    plan->commutate_at = 0;
+    pattern_legs(&config->pattern, c->sector, self->reverse, in->u, &out->legs);
+    const int32_t due = (int32_t)(commutation_due(c, &config->commutation) - plan->start);
+    if (due < period) {
+        plan->commutate_at = (uint16_t)pm_max(due, 1);
+        c->sector = (uint8_t)sector_next(c->sector);
+        out->then = pattern_states(&config->pattern, c->sector, self->reverse);
+    }
+    plan_sample(plan, &config->pattern, in->u);
+    out->commutate_at = plan->commutate_at;
+    out->sample_at = plan->sample_at;
+    if (self->lost) {
+        out->legs.legs = PM_LEGS_OFF;
+        out->commutate_at = 0;
+    }
+}
