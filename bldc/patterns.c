@@ -35,14 +35,13 @@ static pm_q_t on_share(const pattern_config_t *config, pm_q_t u)
     return config->id == PATTERN_H_PWM_L_PWM ? pm_mean(PM_ONE, u) : u;
 }
 
-void pattern_legs(const pattern_config_t *config, uint32_t sector, bool reverse, pm_q_t u, pm_legs_t *out)
+void pattern_duties(const pattern_config_t *config, uint32_t sector, bool reverse, pm_q_t u, pm_legs_t *out)
 {
     const sector_t at = sector_legs(sector, reverse);
     const pm_q_t D = on_share(config, u);
     out->duty[at.high] = D;
     out->duty[at.low] = PM_ONE - D;
     out->duty[at.open] = sector_rising(sector) ? D : PM_ONE - D;
-    out->legs = pattern_states(config, sector, reverse);
 }
 
 pattern_sample_t pattern_sample(const pattern_config_t *config, uint32_t sector, pm_q_t u)

@@ -20,7 +20,8 @@
  *   late in the off time   both are at one rail, where the on time is shorter than `least`
  *
  * The duties are those that each leg needs in this sector or, open, in the next: to commutate only states change.
- * pattern_legs(): 40 instructions; pattern_sample(): 30.
+ * pattern_duties(): 25 instructions; pattern_states(), at a
+ * commutation: 45; pattern_sample(): 37.
  * Tests: tests/unit/bldc/patterns_test.cpp. */
 #ifndef BLDC_PATTERNS_H
 #define BLDC_PATTERNS_H
@@ -53,8 +54,8 @@ typedef struct {
 /* PM_LEGS_... of a sector. */
 uint16_t pattern_states(const pattern_config_t *config, uint32_t sector, bool reverse);
 
-/* With the duties. */
-void pattern_legs(const pattern_config_t *config, uint32_t sector, bool reverse, pm_q_t u, pm_legs_t *out);
+/* Duties of its legs. */
+void pattern_duties(const pattern_config_t *config, uint32_t sector, bool reverse, pm_q_t u, pm_legs_t *out);
 
 typedef struct {
     uint16_t at; /* counts from the start of the period, 1 ... 2 N - 1 */

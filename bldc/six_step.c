@@ -1,17 +1,15 @@
 #include "bldc/six_step.h"
 
-/* What follows from a new interval: what is expected of the next sector. */
-static void follow(six_step_t *self, const six_step_config_t *config)
+/* What is expected of the next sector. */
+static void follow(six_step_t *self)
 {
-    const pm_q_t omega = commutation_speed(&self->commutation, &config->commutation);
-    self->expected.swing = pm_max(pm_mul_sat(omega, config->swing), 1);
     self->expected.t_60 = commutation_t_60(&self->commutation);
     self->expected.at = self->commutation.crossing + self->expected.t_60;
 }
 
 static void open(six_step_t *self, uint32_t sector, uint32_t since)
 {
-    zero_crossing_open(&self->crossing, sector, since);
+    zero_crossing_open(&self->crossing, sector, self->reverse, since);
     self->expected.threshold = thresholds_at(&self->thresholds, sector, self->reverse);
 }
 
@@ -21,10 +19,11 @@ void six_step_reset(six_step_t *self, const six_step_config_t *config, bool reve
     self->reverse = reverse;
     self->lost = false;
     commutation_reset(&self->commutation, sector, crossing, t_60);
-    follow(self, config);
+    follow(self);
     open(self, sector, crossing);
     self->crossing.found = true;
     self->commutated = now;
+    self->legs = pattern_states(&config->pattern, sector, reverse);
     const uint32_t period = 2U * config->pattern.half_period;
     const six_step_plan_t none = {.start = now - period, .sector = (uint8_t)sector};
     self->plan[0] = none;
@@ -36,10 +35,11 @@ static void found(six_step_t *self, const six_step_config_t *config)
 {
     commutation_t *c = &self->commutation;
     commutation_crossed(c, self->crossing.at);
-    follow(self, config);
-    if (c->crossed == SECTORS - 1U && c->whole == SECTORS) {
-        thresholds_learn(&self->thresholds, &config->thresholds, c->interval, c->sum, self->expected.swing,
-                         self->reverse);
+    follow(self);
+    if (c->whole == SECTORS && sector_rising(c->crossed)) {
+        const pm_q_t swing = zero_crossing_swing(&config->crossing, self->expected.t_60);
+        thresholds_learn(&self->thresholds, &config->thresholds, c->crossed, self->reverse, c->interval,
+                         c->sum, swing);
     }
 }
 
@@ -51,19 +51,15 @@ static void look(six_step_t *self, const six_step_config_t *config, const six_st
     if (sector != self->crossing.sector) {
         if (!self->crossing.found) {
             commutation_missed(&self->commutation);
-            follow(self, config);
+            follow(self);
         }
         open(self, sector, commutated ? plan->start + plan->commutate_at : self->commutated);
     }
     if (self->crossing.found) {
         return;
     }
-    const zero_sample_t sample = {.at = plan->start + plan->sample_at,
-                                  .legs = plan->legs,
-                                  .v = {in->v[0], in->v[1], in->v[2]},
-                                  .v_neutral = in->v_neutral,
-                                  .v_dc = in->v_dc};
-    if (zero_crossing_step(&self->crossing, &config->crossing, self->reverse, &sample, &self->expected)) {
+    const zero_instant_t when = {plan->start + plan->sample_at, plan->legs};
+    if (zero_crossing_step(&self->crossing, &config->crossing, &in->sample, when, &self->expected)) {
         found(self, config);
     } else if (self->crossing.ahead) {
         commutation_ahead(&self->commutation, self->crossing.at);
@@ -101,14 +97,16 @@ void six_step_step(six_step_t *self, const six_step_config_t *config, const six_
     plan->start = in->now + (uint32_t)period;
     plan->sector = c->sector;
     plan->commutate_at = 0;
-    pattern_legs(&config->pattern, c->sector, self->reverse, in->u, &out->legs);
+    pattern_duties(&config->pattern, c->sector, self->reverse, in->u, &out->legs);
+    out->legs.legs = self->legs;
     const int32_t due = (int32_t)(commutation_due(c, &config->commutation) - plan->start);
     if (due < period) {
         plan->commutate_at = (uint16_t)pm_max(due, 1);
         c->sector = (uint8_t)sector_next(c->sector);
-        out->then = pattern_states(&config->pattern, c->sector, self->reverse);
+        self->legs = pattern_states(&config->pattern, c->sector, self->reverse);
     }
     plan_sample(plan, &config->pattern, in->u);
+    out->then = self->legs;
     out->commutate_at = plan->commutate_at;
     out->sample_at = plan->sample_at;
     if (self->lost) {

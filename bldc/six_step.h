@@ -12,7 +12,8 @@
  *   LOCKED     at once; commutation follows crossings
  *   LOST       commutation.h; all legs are off from the next call on, until the next reset
  *
- * six_step_step(), Cortex-M4: see tests/target/bldc. Tests: tests/unit/bldc/six_step_test.cpp. */
+ * six_step_step(), instructions on Cortex-M4 with five periods in a sector: 206 on average without a crossing, at most
+ * 273, where it commutates; 286 with a crossing; 492 with one after which it learns. Tests: tests/target/bldc, tests/unit/bldc/six_step_test.cpp. */
 #ifndef BLDC_SIX_STEP_H
 #define BLDC_SIX_STEP_H
 
@@ -30,15 +31,12 @@ typedef struct {
     zero_crossing_config_t crossing;
     commutation_config_t commutation;
     thresholds_config_t thresholds;
-    pm_q_t swing; /* zero_crossing.h, at base speed */
 } six_step_config_t;
 
 typedef struct {
-    uint32_t now;      /* counts at t_k */
-    bool sampled;      /* the sample asked for two calls ago is here: */
-    pm_q_t v[PM_LEGS]; /* terminals */
-    pm_q_t v_neutral;  /* see zero_crossing.h */
-    pm_q_t v_dc;
+    uint32_t now; /* counts at t_k */
+    bool sampled; /* the sample asked for two calls ago is here: */
+    zero_sample_t sample;
     pm_q_t u; /* patterns.h */
 } six_step_in_t;
 
@@ -64,6 +62,7 @@ typedef struct {
     zero_expected_t expected;
     six_step_plan_t plan[2]; /* [1] of the period that begins now, [0] of the one that has ended */
     uint32_t commutated;     /* instant of the last commutation */
+    uint16_t legs;           /* PM_LEGS_... of commutation.sector */
     bool reverse;
     bool lost;
 } six_step_t;

@@ -22,22 +22,15 @@ static pm_q_t learn(pm_q_t u, pm_frac_t k, pm_q_t volts, pm_q_t most)
     return pm_clamp(pm_frac_add(u, volts, k), -most, most);
 }
 
-void thresholds_learn(thresholds_t *self, const thresholds_config_t *config, const uint32_t interval[],
-                      uint32_t turn, pm_q_t swing, bool reverse)
+void thresholds_learn(thresholds_t *self, const thresholds_config_t *config, uint32_t sector, bool reverse,
+                      const uint32_t interval[], uint32_t turn, pm_q_t swing)
 {
-    /* Sector of the upward crossing of A, C, B of the machine as it turns: 2, 0, 4. */
-    for (uint32_t up = 0; up < SECTORS; up += 2U) {
-        uint32_t s = up;
-        int32_t i[SECTORS]; /* from the upward crossing on */
-        for (uint32_t n = 0; n < SECTORS; n++) {
-            s = sector_next(s);
-            i[n] = (int32_t)interval[s];
-        }
-        const int32_t D_V = i[0] + i[1] + i[2] - i[3] - i[4] - i[5];
-        const int32_t D_H = i[2] - i[0] + i[5] - i[3];
-        const uint8_t leg = sector_legs(up, reverse).open;
-        const pm_q_t v = pm_unit(swing, share(D_V, turn)), h = pm_unit(swing, share(D_H, turn));
-        self->u_V[leg] = learn(self->u_V[leg], config->k_V, v, config->most);
-        self->u_H[leg] = learn(self->u_H[leg], config->k_H, reverse ? -h : h, config->most);
-    }
+    const uint32_t s0 = sector + 1U, s1 = sector_next(s0), s2 = sector_next(s1), s3 = sector_next(s2);
+    const int32_t i_0 = (int32_t)interval[s0], i_2 = (int32_t)interval[s2];
+    const int32_t D_V = 2 * (i_0 + (int32_t)interval[s1] + i_2) - (int32_t)turn;
+    const int32_t D_H = i_2 - i_0 + (int32_t)interval[sector] - (int32_t)interval[s3];
+    const uint8_t leg = sector_legs(sector, reverse).open;
+    const pm_q_t v = pm_unit(swing, share(D_V, turn)), h = pm_unit(swing, share(D_H, turn));
+    self->u_V[leg] = learn(self->u_V[leg], config->k_V, v, config->most);
+    self->u_H[leg] = learn(self->u_H[leg], config->k_H, reverse ? -h : h, config->most);
 }

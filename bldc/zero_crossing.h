@@ -30,8 +30,8 @@
  * comparator delays is taken off by the commutation.
  *
  * Instants are counts of the carrier's timer that go on from period to period and wrap after 2^32. Voltages in Q28
- * per-unit. Error of the instant: (t_2 - t_1) 2^-15 and a count of 2. zero_crossing_step(): at most 60 instructions, with
- * two divisions where it finds a late crossing; 25 where it finds none. Once a sample.
+ * per-unit. Error of the instant: (t_2 - t_1) 2^-15 and a count of 2. zero_crossing_step(): 40 instructions, 70 and a
+ * division where it finds a crossing, 110 and two where it is a late one. Once a sample.
  * Tests: tests/unit/bldc/zero_crossing_test.cpp, six_step_test.cpp. */
 #ifndef BLDC_ZERO_CROSSING_H
 #define BLDC_ZERO_CROSSING_H
@@ -53,25 +53,31 @@ typedef struct {
     zero_reference_t reference;
     pm_q_t rail;    /* nearer than this to a rail a sample tells nothing; METHODS-ADDENDUM.md A2: 0.35 V */
     uint32_t blank; /* counts after a commutation */
+    pm_q_t swing;   /* at base speed, > 0, */
+    uint32_t t_60;  /* where this is the time of 60 degrees, counts */
 } zero_crossing_config_t;
 
 typedef struct {
-    uint32_t at; /* instant */
-    zero_legs_t legs;
     pm_q_t v[PM_LEGS]; /* terminals against the negative rail */
     pm_q_t v_neutral;  /* star point minus mean of the terminals; ZERO_NEUTRAL only */
     pm_q_t v_dc;
 } zero_sample_t;
 
 typedef struct {
+    uint32_t at; /* instant */
+    zero_legs_t legs;
+} zero_instant_t;
+
+typedef struct {
     pm_q_t threshold; /* what y is at the crossing; thresholds.h */
-    pm_q_t swing;     /* > 0 */
     uint32_t t_60;    /* counts */
     uint32_t at;      /* instant of the crossing, from those before */
 } zero_expected_t;
 
 typedef struct {
-    uint32_t sector;
+    uint8_t sector;
+    uint8_t leg; /* the open one */
+    bool rising;
     uint32_t open_since; /* instant of the commutation into it */
     uint32_t at;         /* instant of the crossing, once found; before, of the last sample ahead of it */
     pm_q_t y;            /* of that sample, < 0 */
@@ -81,12 +87,15 @@ typedef struct {
     bool found;
 } zero_crossing_t;
 
+/* What the difference rises by in 60 degrees that take t_60, > 0: one division. */
+pm_q_t zero_crossing_swing(const zero_crossing_config_t *config, uint32_t t_60);
+
 /* Looks at the open leg of another sector. */
-void zero_crossing_open(zero_crossing_t *self, uint32_t sector, uint32_t since);
+void zero_crossing_open(zero_crossing_t *self, uint32_t sector, bool reverse, uint32_t since);
 
 /* One sample of that sector; true when it has found the crossing. Not after that. */
-bool zero_crossing_step(zero_crossing_t *self, const zero_crossing_config_t *config, bool reverse,
-                        const zero_sample_t *in, const zero_expected_t *expected);
+bool zero_crossing_step(zero_crossing_t *self, const zero_crossing_config_t *config, const zero_sample_t *in,
+                        zero_instant_t when, const zero_expected_t *expected);
 
 #ifdef __cplusplus
 }

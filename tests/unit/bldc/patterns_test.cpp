@@ -100,8 +100,10 @@ TEST(Patterns, LineVoltageIsTheCommand)
             for (const double u : {0.0, 0.2, 0.7, 1.0}) {
                 for (uint32_t s = 0; s < SECTORS; ++s) {
                     pm_legs_t out, then;
-                    pattern_legs(&c, s, reverse, fixed(u, 28), &out);
-                    pattern_legs(&c, sector_next(s), reverse, fixed(u, 28), &then);
+                    pattern_duties(&c, s, reverse, fixed(u, 28), &out);
+                    out.legs = pattern_states(&c, s, reverse);
+                    pattern_duties(&c, sector_next(s), reverse, fixed(u, 28), &then);
+                    then.legs = pattern_states(&c, sector_next(s), reverse);
                     const sector_t at = sector_legs(s, reverse), next = sector_legs(sector_next(s), reverse);
                     const auto mean = [&](uint32_t leg) {
                         const pm_leg_t state = pm_leg(out.legs, leg);
@@ -127,7 +129,8 @@ TEST(Patterns, SamplesAreTakenWhereTheLegsAreAsTold)
                 ASSERT_GE(sample.at, 1);
                 ASSERT_LT(sample.at, 2 * kN);
                 pm_legs_t out;
-                pattern_legs(&c, s, false, fixed(u, 28), &out);
+                pattern_duties(&c, s, false, fixed(u, 28), &out);
+                out.legs = pattern_states(&c, s, false);
                 const sector_t at = sector_legs(s, false);
                 const double pulses = id == PATTERN_H_PWM_L_PWM ? 2 : 1;
                 EXPECT_EQ(sample.legs == ZERO_LEGS_APART, 2 * kN * u / pulses >= c.least - 1) << id << u;

@@ -146,7 +146,8 @@ inline six_step_config_t make(const Machine &m, const Options &o)
     c.thresholds.k_V = fixed(1.5 * o.k_V, 32);
     c.thresholds.k_H = fixed(o.k_H, 32);
     c.thresholds.most = fixed(2.0 / kBase_V, PM_Q_BITS);
-    c.swing = fixed(shape * m.slope_Vs() * base_rad_s(m) * kPi / 3 / kBase_V, PM_Q_BITS);
+    c.crossing.t_60 = (c.commutation.turn_base + 3) / 6;
+    c.crossing.swing = fixed(shape * m.slope_Vs() * base_rad_s(m) * kPi / 3 / kBase_V, PM_Q_BITS);
     return c;
 }
 
@@ -231,11 +232,12 @@ class Rig
         in.u = fixed(u, PM_Q_BITS);
         in.sampled = sampled_;
         for (int k = 0; k < 3; ++k) {
-            in.v[k] = fixed(adc_.v_leg[k] / 65536.0 + wrong_reference_V / kBase_V, PM_Q_BITS);
+            in.sample.v[k] = fixed(adc_.v_leg[k] / 65536.0 + wrong_reference_V / kBase_V, PM_Q_BITS);
         }
-        in.v_neutral = fixed(adc_.v_neutral[0] / 65536.0, PM_Q_BITS);
-        in.v_neutral -= (in.v[0] + in.v[1] + in.v[2]) / 3;
-        in.v_dc = fixed(adc_.v_dc / 65536.0 * machine.plant.sensor.v_full_scale_V / kBase_V, PM_Q_BITS);
+        in.sample.v_neutral = fixed(adc_.v_neutral[0] / 65536.0, PM_Q_BITS);
+        in.sample.v_neutral -= (in.sample.v[0] + in.sample.v[1] + in.sample.v[2]) / 3;
+        in.sample.v_dc =
+            fixed(adc_.v_dc / 65536.0 * machine.plant.sensor.v_full_scale_V / kBase_V, PM_Q_BITS);
         six_step_out_t out;
         const bool before = six_step.crossing.found;
         const uint32_t sector = six_step.crossing.sector;

@@ -43,7 +43,9 @@ struct Bench {
             interval[s] = static_cast<uint32_t>(std::lround(kT60 + late(s) - before));
             sum += interval[s];
         }
-        thresholds_learn(&self, &config, interval, sum, fixed(kSwing, 28), reverse);
+        for (uint32_t s = 0; s < SECTORS; s += 2) {
+            thresholds_learn(&self, &config, s, reverse, interval, sum, fixed(kSwing, 28));
+        }
     }
     double most_late() const
     {

@@ -24,14 +24,21 @@ double degrees(double counts)
     return 60.0 * counts / kT60;
 }
 
-zero_expected_t expected(double factor = 1)
+constexpr zero_expected_t kExpected = {0, kT60, 0};
+
+struct Sample {
+    zero_sample_t measured;
+    zero_instant_t when;
+};
+
+pm_q_t swing(double factor)
 {
-    return {0, fixed(factor * kAmplitude * kPi / 3 / kBase_V, 28), kT60, 0};
+    return fixed(factor * kAmplitude * kPi / 3 / kBase_V, 28);
 }
 
 // Sector in which the crossing is at count 0; a sample of the ideal terminal at another.
 struct Bench {
-    zero_crossing_config_t config = {ZERO_LINK, fixed(0.35 / kBase_V, 28), 1000};
+    zero_crossing_config_t config = {ZERO_LINK, fixed(0.35 / kBase_V, 28), 1000, swing(1), kT60};
     uint32_t sector = 0;
     bool reverse = false;
     zero_legs_t legs = ZERO_LEGS_APART;
@@ -39,33 +46,33 @@ struct Bench {
 
     void open()
     {
-        zero_crossing_open(&self, sector, static_cast<uint32_t>(-static_cast<int>(kT60 / 2)));
+        zero_crossing_open(&self, sector, reverse, static_cast<uint32_t>(-static_cast<int>(kT60 / 2)));
     }
-    zero_sample_t sample(double at) const
+    Sample sample(double at) const
     {
         const double towards = sector % 2 == 0 ? 1 : -1;
         const double rails_V = kV_dc / 2 * legs;
         const double v = rails_V + towards * kAmplitude * std::sin(degrees(at) * kDegree);
         return terminal(at, v);
     }
-    zero_sample_t terminal(double at, double v) const
+    Sample terminal(double at, double v) const
     {
         const sector_t of = sector_legs(sector, reverse);
-        zero_sample_t s = {};
-        s.at = static_cast<uint32_t>(static_cast<int64_t>(at));
-        s.legs = legs;
-        s.v_dc = fixed(kV_dc / kBase_V, 28);
-        s.v[of.open] = fixed(std::min(std::max(v, 0.0), kV_dc + 0.8) / kBase_V, 28);
-        s.v[of.high] = legs == ZERO_LEGS_LOW ? 0 : s.v_dc;
-        s.v[of.low] = legs == ZERO_LEGS_HIGH ? s.v_dc : 0;
+        Sample s = {};
+        s.when.at = static_cast<uint32_t>(static_cast<int64_t>(at));
+        s.when.legs = legs;
+        s.measured.v_dc = fixed(kV_dc / kBase_V, 28);
+        s.measured.v[of.open] = fixed(std::min(std::max(v, 0.0), kV_dc + 0.8) / kBase_V, 28);
+        s.measured.v[of.high] = legs == ZERO_LEGS_LOW ? 0 : s.measured.v_dc;
+        s.measured.v[of.low] = legs == ZERO_LEGS_HIGH ? s.measured.v_dc : 0;
         return s;
     }
-    bool step(const zero_sample_t &s, const zero_expected_t &e = expected())
+    bool step(const Sample &s, const zero_expected_t &e = kExpected)
     {
-        return zero_crossing_step(&self, &config, reverse, &s, &e);
+        return zero_crossing_step(&self, &config, &s.measured, s.when, &e);
     }
     // First sample at `first`, then every kSpacing; the instant that it finds.
-    int32_t find(double first, const zero_expected_t &e = expected())
+    int32_t find(double first, const zero_expected_t &e = kExpected)
     {
         open();
         for (double at = first; at < kT60 / 2.0; at += kSpacing) {
@@ -111,8 +118,8 @@ TEST(ZeroCrossing, EveryReferenceHasItsCrossing)
         b.open();
         bool found = false;
         for (double at = -29000; at < 30000 && !found; at += kSpacing) {
-            zero_sample_t s = b.sample(at);
-            s.v_neutral = fixed(0.3 / kBase_V, 28);
+            Sample s = b.sample(at);
+            s.measured.v_neutral = fixed(0.3 / kBase_V, 28);
             found = b.step(s);
         }
         ASSERT_TRUE(found) << reference;
@@ -138,14 +145,15 @@ TEST(ZeroCrossing, FindsALateCrossingFromItsDistance)
 TEST(ZeroCrossing, TwinFactorOfASineForATrapezoidIsAThirdOff)
 {
     Bench b;
+    b.config.swing = swing(1.5);
     const double first = 6000;
-    EXPECT_NEAR(b.find(first, expected(1.5)), first / 3, 0.02 * first);
+    EXPECT_NEAR(b.find(first), first / 3, 0.02 * first);
 }
 
 TEST(ZeroCrossing, BeforeItIsDueALateCrossingNeedsASecondSample)
 {
     Bench b;
-    zero_expected_t e = expected();
+    zero_expected_t e = kExpected;
     e.at = 20000;
     EXPECT_NEAR(b.find(2000, e), 0, 10);
     b.open();
@@ -167,7 +175,7 @@ TEST(ZeroCrossing, IgnoresTheSwingAfterFreewheeling)
     EXPECT_NEAR(static_cast<int32_t>(b.self.at), 0, kShape_counts);
     // Twin: taken at once it is wrong by most of the sector.
     b.open();
-    zero_expected_t e = expected();
+    zero_expected_t e = kExpected;
     e.at = static_cast<uint32_t>(-30000);
     EXPECT_TRUE(b.step(b.terminal(-24000, kV_dc / 2 + 1.5), e));
     EXPECT_LT(static_cast<int32_t>(b.self.at), -20000);
@@ -177,11 +185,11 @@ TEST(ZeroCrossing, NoRotorIsThatFarPast)
 {
     Bench b;
     b.open();
-    const double swing = kAmplitude * kPi / 3;
+    const double swing_V = kAmplitude * kPi / 3;
     for (double at = 1000; at < 20000; at += 1000) {
-        EXPECT_FALSE(b.step(b.terminal(at, kV_dc / 2 + 0.63 * swing)));
+        EXPECT_FALSE(b.step(b.terminal(at, kV_dc / 2 + 0.63 * swing_V)));
     }
-    EXPECT_TRUE(b.step(b.terminal(21000, kV_dc / 2 + 0.6 * swing)));
+    EXPECT_TRUE(b.step(b.terminal(21000, kV_dc / 2 + 0.6 * swing_V)));
     EXPECT_NEAR(static_cast<int32_t>(b.self.at), 21000 - 0.6 * kT60, 10);
 }
 
@@ -203,7 +211,8 @@ TEST(ZeroCrossing, PassesOverFreewheelingAndBlanking)
         twin.sector = sector;
         twin.config.rail = fixed(-2 / kBase_V, 28);
         twin.open();
-        zero_expected_t e = expected(10);
+        twin.config.swing = swing(10);
+        zero_expected_t e = kExpected;
         e.at = static_cast<uint32_t>(-30000);
         EXPECT_TRUE(twin.step(b.terminal(-29000, rail), e));
     }
@@ -230,10 +239,11 @@ TEST(ZeroCrossing, OffTimeSamplesOfWhichARailCutsHalf)
                 b.open();
                 bool found = false;
                 for (double at = first; at < 30000 && !found; at += kSpacing) {
-                    zero_sample_t s = b.sample(at);
+                    Sample s = b.sample(at);
                     // upper diode: the terminal does not go above
                     const uint8_t open = sector_legs(sector, false).open;
-                    s.v[open] = std::min(s.v[open], s.v_dc + fixed(0.01 / kBase_V, 28));
+                    s.measured.v[open] =
+                        std::min(s.measured.v[open], s.measured.v_dc + fixed(0.01 / kBase_V, 28));
                     found = b.step(s);
                 }
                 ASSERT_TRUE(found);
@@ -246,7 +256,7 @@ TEST(ZeroCrossing, OffTimeSamplesOfWhichARailCutsHalf)
 TEST(ZeroCrossing, ThresholdMovesIt)
 {
     Bench b;
-    zero_expected_t e = expected();
+    zero_expected_t e = kExpected;
     e.threshold = fixed(0.5 / kBase_V, 28);
     const double moved = std::asin(0.5 / kAmplitude) / kDegree / 60 * kT60;
     EXPECT_NEAR(b.find(-29000, e), moved, 2 * kShape_counts);
@@ -255,12 +265,12 @@ TEST(ZeroCrossing, ThresholdMovesIt)
 TEST(ZeroCrossing, InstantsWrap)
 {
     Bench b;
-    zero_crossing_open(&b.self, 0, UINT32_MAX - 5000U);
-    zero_sample_t s = b.sample(-100);
-    s.at = UINT32_MAX - 99U;
+    zero_crossing_open(&b.self, 0, false, UINT32_MAX - 5000U);
+    Sample s = b.sample(-100);
+    s.when.at = UINT32_MAX - 99U;
     EXPECT_FALSE(b.step(s));
     s = b.sample(100);
-    s.at = 100;
+    s.when.at = 100;
     EXPECT_TRUE(b.step(s));
     EXPECT_NEAR(static_cast<int32_t>(b.self.at), 0, kShape_counts);
 }
