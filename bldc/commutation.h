@@ -15,7 +15,7 @@
  * bridge.
  *
  * Speed: omega = turn_base / (sum of six intervals), per-unit, mean over the last turn: under a ramp it is that of
- * half a turn ago. Instants and times in counts as in zero_crossing.h; a sector takes less than 2^28 counts.
+ * half a turn ago. Instants and times in counts as in zero_crossing.h; a sector takes less than 2^27 counts.
  *
  * commutation_crossed(): 45 instructions, once a crossing; commutation_due(): 15; commutation_speed(): one division.
  * Tests: tests/unit/bldc/commutation_test.cpp, six_step_test.cpp. */

@@ -12,6 +12,11 @@ static uint32_t chopped(pattern_id_t id, uint32_t sector)
     return of[id][sector & 1U];
 }
 
+bool pattern_chops_incoming(pattern_id_t id, uint32_t sector)
+{
+    return (chopped(id, sector) & (sector_rising(sector) ? LOW : HIGH)) != 0U;
+}
+
 uint16_t pattern_states(const pattern_config_t *config, uint32_t sector, bool reverse)
 {
     const uint32_t chops = chopped(config->id, sector);

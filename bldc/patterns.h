@@ -54,6 +54,9 @@ typedef struct {
 /* PM_LEGS_... of a sector. */
 uint16_t pattern_states(const pattern_config_t *config, uint32_t sector, bool reverse);
 
+/* The leg that has come with this sector is chopped. */
+bool pattern_chops_incoming(pattern_id_t id, uint32_t sector);
+
 /* Duties of its legs. */
 void pattern_duties(const pattern_config_t *config, uint32_t sector, bool reverse, pm_q_t u, pm_legs_t *out);
 
