@@ -24,26 +24,29 @@ void six_step_reset(six_step_t *self, const six_step_config_t *config, bool reve
     self->crossing.found = true;
     self->commutated = now;
     self->legs = pattern_states(&config->pattern, sector, reverse);
-    const uint32_t period = 2U * config->pattern.half_period;
-    const six_step_plan_t none = {.start = now - period, .sector = (uint8_t)sector};
+    const six_step_plan_t none = {.sector = (uint8_t)sector};
     self->plan[0] = none;
     self->plan[1] = none;
-    self->plan[1].start = now;
 }
 
-static void found(six_step_t *self, const six_step_config_t *config)
+static void found(six_step_t *self)
 {
-    commutation_t *c = &self->commutation;
-    commutation_crossed(c, self->crossing.at);
+    commutation_crossed(&self->commutation, self->crossing.at);
     follow(self);
-    if (c->whole == SECTORS && sector_rising(c->crossed)) {
-        const pm_q_t swing = zero_crossing_swing(&config->crossing, self->expected.t_60);
-        thresholds_learn(&self->thresholds, &config->thresholds, c->crossed, self->reverse, c->interval,
-                         c->sum, swing);
-    }
+    self->learn = self->commutation.whole == SECTORS;
 }
 
-static void look(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in)
+/* In a period that has no crossing to look for. */
+static void learn(six_step_t *self, const six_step_config_t *config)
+{
+    const commutation_t *c = &self->commutation;
+    thresholds_learn(&self->thresholds, &config->thresholds, c->crossed, self->reverse, c->interval, c->sum,
+                     zero_crossing_swing(&config->crossing, self->expected.t_60));
+    self->learn = false;
+}
+
+/* The sample of the period that began at `start`. */
+static void look(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in, uint32_t start)
 {
     const six_step_plan_t *plan = &self->plan[0];
     const bool commutated = plan->commutate_at != 0U && plan->commutate_at < plan->sample_at;
@@ -53,14 +56,17 @@ static void look(six_step_t *self, const six_step_config_t *config, const six_st
             commutation_missed(&self->commutation);
             follow(self);
         }
-        open(self, sector, commutated ? plan->start + plan->commutate_at : self->commutated);
+        open(self, sector, commutated ? start + plan->commutate_at : self->commutated);
     }
     if (self->crossing.found) {
+        if (self->learn) {
+            learn(self, config);
+        }
         return;
     }
-    const zero_instant_t when = {plan->start + plan->sample_at, plan->legs};
+    const zero_instant_t when = {start + plan->sample_at, (zero_legs_t)plan->legs};
     if (zero_crossing_step(&self->crossing, &config->crossing, &in->sample, when, &self->expected)) {
-        found(self, config);
+        found(self);
     } else if (self->crossing.ahead) {
         commutation_ahead(&self->commutation, self->crossing.at);
     } else {
@@ -77,29 +83,29 @@ static void plan_sample(six_step_plan_t *plan, const pattern_config_t *pattern, 
         sample.at = plan->commutate_at < sample.at ? sample.at : 0U;
     }
     plan->sample_at = sample.at;
-    plan->legs = sample.legs;
+    plan->legs = (uint8_t)sample.legs;
 }
 
 void six_step_step(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in,
                    six_step_out_t *out)
 {
-    if (in->sampled) {
-        look(self, config, in);
-    }
-    commutation_t *c = &self->commutation;
-    self->lost = self->lost || commutation_state(c, &config->commutation) == COMMUTATION_LOST;
     const int32_t period = 2 * (int32_t)config->pattern.half_period;
+    const uint32_t ended = in->now - (uint32_t)period, coming = in->now + (uint32_t)period;
+    commutation_t *c = &self->commutation;
+    if (in->sampled) {
+        look(self, config, in, ended);
+    }
+    self->lost = self->lost || commutation_state(c, &config->commutation) == COMMUTATION_LOST;
     if (self->plan[0].commutate_at != 0U) {
-        self->commutated = self->plan[0].start + self->plan[0].commutate_at;
+        self->commutated = ended + self->plan[0].commutate_at;
     }
     self->plan[0] = self->plan[1];
     six_step_plan_t *plan = &self->plan[1];
-    plan->start = in->now + (uint32_t)period;
     plan->sector = c->sector;
     plan->commutate_at = 0;
     pattern_duties(&config->pattern, c->sector, self->reverse, in->u, &out->legs);
     out->legs.legs = self->legs;
-    const int32_t due = (int32_t)(commutation_due(c, &config->commutation) - plan->start);
+    const int32_t due = (int32_t)(commutation_due(c, &config->commutation) - coming);
     if (due < period) {
         plan->commutate_at = (uint16_t)pm_max(due, 1);
         c->sector = (uint8_t)sector_next(c->sector);

@@ -12,8 +12,11 @@
  *   LOCKED     at once; commutation follows crossings
  *   LOST       commutation.h; all legs are off from the next call on, until the next reset
  *
- * six_step_step(), instructions on Cortex-M4 with five periods in a sector: 206 on average without a crossing, at most
- * 273, where it commutates; 286 with a crossing; 492 with one after which it learns. Tests: tests/target/bldc, tests/unit/bldc/six_step_test.cpp. */
+ * six_step_step(), instructions on Cortex-M4 with five periods in a sector:
+ *   without a crossing             213 on average, at most 271
+ *   with one                       335             352
+ *   after one, thresholds learnt   303             397, where it commutates too
+ * Tests: tests/target/bldc, tests/unit/bldc/six_step_test.cpp. */
 #ifndef BLDC_SIX_STEP_H
 #define BLDC_SIX_STEP_H
 
@@ -49,10 +52,9 @@ typedef struct {
 
 /* What was asked for one period. */
 typedef struct {
-    uint32_t start;
     uint16_t commutate_at, sample_at;
     uint8_t sector; /* at the start */
-    zero_legs_t legs;
+    uint8_t legs;   /* zero_legs_t at the sample */
 } six_step_plan_t;
 
 typedef struct {
@@ -63,6 +65,7 @@ typedef struct {
     six_step_plan_t plan[2]; /* [1] of the period that begins now, [0] of the one that has ended */
     uint32_t commutated;     /* instant of the last commutation */
     uint16_t legs;           /* PM_LEGS_... of commutation.sector */
+    bool learn;              /* from the last crossing */
     bool reverse;
     bool lost;
 } six_step_t;

@@ -25,12 +25,15 @@ static pm_q_t learn(pm_q_t u, pm_frac_t k, pm_q_t volts, pm_q_t most)
 void thresholds_learn(thresholds_t *self, const thresholds_config_t *config, uint32_t sector, bool reverse,
                       const uint32_t interval[], uint32_t turn, pm_q_t swing)
 {
-    const uint32_t s0 = sector + 1U, s1 = sector_next(s0), s2 = sector_next(s1), s3 = sector_next(s2);
+    const uint32_t s0 = sector_next(sector), s1 = sector_next(s0), s2 = sector_next(s1);
     const int32_t i_0 = (int32_t)interval[s0], i_2 = (int32_t)interval[s2];
-    const int32_t D_V = 2 * (i_0 + (int32_t)interval[s1] + i_2) - (int32_t)turn;
-    const int32_t D_H = i_2 - i_0 + (int32_t)interval[sector] - (int32_t)interval[s3];
     const uint8_t leg = sector_legs(sector, reverse).open;
-    const pm_q_t v = pm_unit(swing, share(D_V, turn)), h = pm_unit(swing, share(D_H, turn));
-    self->u_V[leg] = learn(self->u_V[leg], config->k_V, v, config->most);
-    self->u_H[leg] = learn(self->u_H[leg], config->k_H, reverse ? -h : h, config->most);
+    if (sector_rising(sector)) {
+        const int32_t D = 2 * (i_0 + (int32_t)interval[s1] + i_2) - (int32_t)turn;
+        self->u_V[leg] = learn(self->u_V[leg], config->k_V, pm_unit(swing, share(D, turn)), config->most);
+    } else {
+        const int32_t D = i_2 - i_0 + (int32_t)interval[sector] - (int32_t)interval[sector_next(s2)];
+        const pm_q_t h = pm_unit(swing, share(reverse ? -D : D, turn));
+        self->u_H[leg] = learn(self->u_H[leg], config->k_H, h, config->most);
+    }
 }

@@ -1,5 +1,5 @@
-/* Periods of block commutation, for count.py: those without a crossing, with one, and with the last one of a turn, after
- * which thresholds are learnt. The rotor turns evenly; its EMF is a sine and the divider of leg A 1 % too high. */
+/* Periods of block commutation, for count.py: those without a crossing, with one, and those after one, in which
+ * thresholds are learnt. The rotor turns evenly; its EMF is a sine and the divider of leg A 1 % too high. */
 #include <stdio.h>
 #include <string.h>
 
@@ -62,7 +62,7 @@ int main(void)
         in.now = k * PERIOD;
         ahead = self;
         six_step_step(&ahead, &config, &in, &out);
-        if (memcmp(&ahead.thresholds, &self.thresholds, sizeof self.thresholds) != 0) {
+        if (self.learn && !ahead.learn) {
             period_learning(&self, &config, &in, &out);
         } else if (ahead.commutation.crossing != self.commutation.crossing) {
             period_crossing(&self, &config, &in, &out);
@@ -73,7 +73,7 @@ int main(void)
         const six_step_plan_t *plan = &self.plan[0];
         in.sampled = plan->sample_at != 0U;
         const bool next = plan->commutate_at != 0U && plan->commutate_at < plan->sample_at;
-        terminals(plan->start + plan->sample_at, next ? sector_next(plan->sector) : plan->sector, &in);
+        terminals(in.now + plan->sample_at, next ? sector_next(plan->sector) : plan->sector, &in);
     }
     printf("bldc_cost plain %u crossing %u learning %u lost %d t_60 %lu u_V %08lx %08lx %08lx state %lu "
            "config %lu\n",

@@ -241,7 +241,7 @@ class Rig
         six_step_out_t out;
         const bool before = six_step.crossing.found;
         const uint32_t sector = six_step.crossing.sector;
-        looked_ = six_step.plan[0].start + six_step.plan[0].sample_at;
+        looked_ = now_ - 2 * machine.plant.inverter.timer_counts + six_step.plan[0].sample_at;
         six_step_step(&six_step, &config, &in, &out);
         if (six_step.crossing.found && !(before && six_step.crossing.sector == sector)) {
             const double ago_s = static_cast<double>(now_ - six_step.crossing.at) * count_s_;

@@ -43,7 +43,7 @@ struct Bench {
             interval[s] = static_cast<uint32_t>(std::lround(kT60 + late(s) - before));
             sum += interval[s];
         }
-        for (uint32_t s = 0; s < SECTORS; s += 2) {
+        for (uint32_t s = 0; s < SECTORS; ++s) {
             thresholds_learn(&self, &config, s, reverse, interval, sum, fixed(kSwing, 28));
         }
     }
