@@ -1,0 +1,74 @@
+/* Which switches are chopped in block commutation (METHODS.md 10.3.1).
+ *
+ *   pattern         first 60 degrees   last 60 degrees      chopped, of the two legs that conduct
+ *   H_PWM_L_PWM     chopped            chopped              both, the pulses of the low one shifted by half a period
+ *   H_PWM_L_ON      high one chopped, low one on            the high one
+ *   H_ON_L_PWM      high one on, low one chopped            the low one
+ *   PWM_ON          chopped            on                   the one that has come
+ *   ON_PWM          on                 chopped              the one that has been there
+ *                                                           (60 degrees: of the 120 a switch conducts)
+ * u is the mean voltage between the two legs over v_dc, 0 ... 1. A switch is on for
+ *   D = u                with one of the legs chopped
+ *   D = (1 + u) / 2      with both: line voltage v_dc for (2 D - 1) T in two pulses, else 0
+ * The line voltage of all five is +v_dc or 0: with a carrier that both legs share the legs of H_PWM_L_PWM are at the
+ * same rail between the pulses, and the ripple has twice the carrier's frequency.
+ * Complementary: the other switch of a chopped leg is closed for the rest, so the current may also flow back
+ * (braking, no load). Else its diode carries the current (NEEDS_ONE_SWITCH), which may cease.
+ *
+ * Sample instants, counts in a period 0 ... 2 N with the high leg's pulse about N, the low leg's about 0:
+ *   late in the on time    the driven legs are apart; `lead` before the switch opens
+ *   late in the off time   both are at one rail, where the on time is shorter than `least`
+ *
+ * The duties are those that each leg needs in this sector or, open, in the next: to commutate only states change.
+ * pattern_duties(): 25 instructions; pattern_states(), at a
+ * commutation: 45; pattern_sample(): 37.
+ * Tests: tests/unit/bldc/patterns_test.cpp. */
+#ifndef BLDC_PATTERNS_H
+#define BLDC_PATTERNS_H
+
+#include "bldc/sectors.h"
+#include "bldc/zero_crossing.h"
+#include "firmware/math/legs.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum {
+    PATTERN_H_PWM_L_PWM,
+    PATTERN_H_PWM_L_ON,
+    PATTERN_H_ON_L_PWM,
+    PATTERN_PWM_ON,
+    PATTERN_ON_PWM,
+    PATTERN_COUNT
+} pattern_id_t;
+
+typedef struct {
+    pattern_id_t id;
+    bool complementary;
+    uint16_t half_period; /* N, counts */
+    uint16_t lead;        /* counts from a sample to the edge it is ahead of: converter and its trigger */
+    uint16_t least; /* on time, counts, of which samples are taken: dead time, settling, lead; below 2 N */
+} pattern_config_t;
+
+/* PM_LEGS_... of a sector. */
+uint16_t pattern_states(const pattern_config_t *config, uint32_t sector, bool reverse);
+
+/* The leg that has come with this sector is chopped. */
+bool pattern_chops_incoming(pattern_id_t id, uint32_t sector);
+
+/* Duties of its legs. */
+void pattern_duties(const pattern_config_t *config, uint32_t sector, bool reverse, pm_q_t u, pm_legs_t *out);
+
+typedef struct {
+    uint16_t at; /* counts from the start of the period, 1 ... 2 N - 1 */
+    zero_legs_t legs;
+} pattern_sample_t;
+
+pattern_sample_t pattern_sample(const pattern_config_t *config, uint32_t sector, pm_q_t u);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

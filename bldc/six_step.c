@@ -1,0 +1,122 @@
+#include "bldc/six_step.h"
+
+/* What is expected of the next sector. */
+static void follow(six_step_t *self)
+{
+    self->expected.t_60 = commutation_t_60(&self->commutation);
+    self->expected.at = self->commutation.crossing + self->expected.t_60;
+}
+
+static void open(six_step_t *self, uint32_t sector, uint32_t since)
+{
+    zero_crossing_open(&self->crossing, sector, self->reverse, since);
+    self->expected.threshold = thresholds_at(&self->thresholds, sector, self->reverse);
+}
+
+void six_step_reset(six_step_t *self, const six_step_config_t *config, bool reverse, uint32_t sector,
+                    uint32_t crossing, uint32_t t_60, uint32_t now)
+{
+    self->reverse = reverse;
+    self->lost = false;
+    commutation_reset(&self->commutation, sector, crossing, t_60);
+    follow(self);
+    open(self, sector, crossing);
+    self->crossing.found = true;
+    self->commutated = now;
+    self->legs = pattern_states(&config->pattern, sector, reverse);
+    const six_step_plan_t none = {.sector = (uint8_t)sector};
+    self->plan[0] = none;
+    self->plan[1] = none;
+}
+
+static void found(six_step_t *self)
+{
+    commutation_crossed(&self->commutation, self->crossing.at);
+    follow(self);
+    self->learn = self->commutation.whole == SECTORS;
+}
+
+/* In a period that has no crossing to look for. */
+static void learn(six_step_t *self, const six_step_config_t *config)
+{
+    const commutation_t *c = &self->commutation;
+    thresholds_learn(&self->thresholds, &config->thresholds, c->crossed, self->reverse, c->interval, c->sum,
+                     zero_crossing_swing(&config->crossing, self->expected.t_60));
+    self->learn = false;
+}
+
+/* The sample of the period that began at `start`. */
+static void look(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in, uint32_t start)
+{
+    const six_step_plan_t *plan = &self->plan[0];
+    const bool commutated = plan->commutate_at != 0U && plan->commutate_at < plan->sample_at;
+    const uint32_t sector = commutated ? sector_next(plan->sector) : plan->sector;
+    if (sector != self->crossing.sector) {
+        if (!self->crossing.found) {
+            commutation_missed(&self->commutation);
+            follow(self);
+        }
+        open(self, sector, commutated ? start + plan->commutate_at : self->commutated);
+    }
+    if (self->crossing.found) {
+        if (self->learn) {
+            learn(self, config);
+        }
+        return;
+    }
+    const zero_instant_t when = {start + plan->sample_at, (zero_legs_t)plan->legs};
+    if (zero_crossing_step(&self->crossing, &config->crossing, &in->sample, when, &self->expected)) {
+        found(self);
+    } else if (self->crossing.ahead) {
+        commutation_ahead(&self->commutation, self->crossing.at);
+    } else {
+        /* nothing is known of it yet */
+    }
+}
+
+/* A commutation ahead of the sample moves it to where the next sector has its own, if that is still to come. */
+static void plan_sample(six_step_plan_t *plan, const pattern_config_t *pattern, pm_q_t u)
+{
+    pattern_sample_t sample = pattern_sample(pattern, plan->sector, u);
+    if (plan->commutate_at != 0U && plan->commutate_at < sample.at) {
+        sample = pattern_sample(pattern, sector_next(plan->sector), u);
+        sample.at = plan->commutate_at < sample.at ? sample.at : 0U;
+    }
+    plan->sample_at = sample.at;
+    plan->legs = (uint8_t)sample.legs;
+}
+
+void six_step_step(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in,
+                   six_step_out_t *out)
+{
+    const int32_t period = 2 * (int32_t)config->pattern.half_period;
+    const uint32_t ended = in->now - (uint32_t)period, coming = in->now + (uint32_t)period;
+    commutation_t *c = &self->commutation;
+    if (in->sampled) {
+        look(self, config, in, ended);
+    }
+    self->lost = self->lost || commutation_state(c, &config->commutation) == COMMUTATION_LOST;
+    if (self->plan[0].commutate_at != 0U) {
+        self->commutated = ended + self->plan[0].commutate_at;
+    }
+    self->plan[0] = self->plan[1];
+    six_step_plan_t *plan = &self->plan[1];
+    plan->sector = c->sector;
+    plan->commutate_at = 0;
+    pattern_duties(&config->pattern, c->sector, self->reverse, in->u, &out->legs);
+    out->legs.legs = self->legs;
+    const int32_t due = (int32_t)(commutation_due(c, &config->commutation) - coming);
+    if (due < period) {
+        plan->commutate_at = (uint16_t)pm_max(due, 1);
+        c->sector = (uint8_t)sector_next(c->sector);
+        self->legs = pattern_states(&config->pattern, c->sector, self->reverse);
+    }
+    plan_sample(plan, &config->pattern, in->u);
+    out->then = self->legs;
+    out->commutate_at = plan->commutate_at;
+    out->sample_at = plan->sample_at;
+    if (self->lost) {
+        out->legs.legs = PM_LEGS_OFF;
+        out->commutate_at = 0;
+    }
+}

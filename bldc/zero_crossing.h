@@ -1,0 +1,104 @@
+/* Instant at which the EMF of the open leg crosses zero, from samples of its terminal (METHODS.md 10.2.3, 10.3.2; rows 110
+ * and 111).
+ *
+ * Terminal against the negative rail, e the phase EMF of the open leg, factor f = 3/2 for a sine, 1 for a trapezoid:
+ *   on time                                  v = v_dc / 2 + f e
+ *   off time, current through lower diodes   v =            f e
+ *   off time, current through upper diodes   v = v_dc     + f e
+ * Reference, of the configuration:
+ *   ZERO_LINK       that of the three that belongs to the instant of the sample
+ *   ZERO_TERMINALS  mean of the three terminals, whatever the instant:  v - mean = (2/3) f e
+ *   ZERO_NEUTRAL    the star point, which needs NEEDS_NEUTRAL:          v - v_N = e
+ * Towards the crossing the difference y rises (its sign is changed in odd sectors). The sample before the crossing and the
+ * one after it, with their instants:
+ *   t_z = t_1 + (t_2 - t_1) (-y_1) / (y_2 - y_1)
+ * so that the carrier may have any ratio to the speed. Where only one of them tells a distance:
+ *   t_z = t - y t_60 / swing,     swing = f e'(0) pi / 3:  what the difference rises by in 60 degrees, t_60 their time
+ * which holds for the late crossing, when the first sample behind the freewheeling is already past it, and for a
+ * sample that the rails have cut.
+ *
+ * Freewheeling: until the current of the leg that has gone is zero its diode holds the terminal at the rail beyond the
+ * crossing (the upper one in even sectors). Samples within `rail` of that rail are passed over until one shows that the
+ * crossing is still to come. Before, `blank` counts after the commutation nothing is looked at: dead time and ringing.
+ * Behind it the terminal swings to its EMF with the capacitance of the leg. So a sample that is past the crossing without
+ * one ahead of it counts where the crossing is due by then, or where the next one says the same; not further past
+ * than 5/8 of the swing, where no rotor in this sector can be.
+ * Where the reference of an off-time sample is that same rail (upward crossing with upper diodes, downward with lower ones)
+ * freewheeling and past look alike, and a late crossing is missed.
+ *
+ * A RC filter of the terminals must settle within the on time and does not delay (METHODS-ADDENDUM.md, E20); what a
+ * comparator delays is taken off by the commutation.
+ *
+ * Instants are counts of the carrier's timer that go on from period to period and wrap after 2^32. Voltages in Q28
+ * per-unit. Error of the instant: (t_2 - t_1) 2^-15 and a count of 2. zero_crossing_step(): 40 instructions, 70 and a
+ * division where it finds a crossing, 110 and two where it is a late one. Once a sample.
+ * Tests: tests/unit/bldc/zero_crossing_test.cpp, six_step_test.cpp. */
+#ifndef BLDC_ZERO_CROSSING_H
+#define BLDC_ZERO_CROSSING_H
+
+#include "bldc/sectors.h"
+#include "firmware/math/fixed.h"
+#include "firmware/math/measure.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum { ZERO_LINK, ZERO_TERMINALS, ZERO_NEUTRAL } zero_reference_t;
+
+/* Where both driven legs are at the instant of a sample. */
+typedef enum { ZERO_LEGS_LOW, ZERO_LEGS_APART, ZERO_LEGS_HIGH } zero_legs_t;
+
+typedef struct {
+    zero_reference_t reference;
+    pm_q_t rail;    /* nearer than this to a rail a sample tells nothing; METHODS-ADDENDUM.md A2: 0.35 V */
+    uint32_t blank; /* counts after a commutation */
+    pm_q_t swing;   /* at base speed, > 0, */
+    uint32_t t_60;  /* where this is the time of 60 degrees, counts */
+} zero_crossing_config_t;
+
+typedef struct {
+    pm_q_t v[PM_LEGS]; /* terminals against the negative rail */
+    pm_q_t v_neutral;  /* star point minus mean of the terminals; ZERO_NEUTRAL only */
+    pm_q_t v_dc;
+} zero_sample_t;
+
+typedef struct {
+    uint32_t at; /* instant */
+    zero_legs_t legs;
+} zero_instant_t;
+
+typedef struct {
+    pm_q_t threshold; /* what y is at the crossing; thresholds.h */
+    uint32_t t_60;    /* counts */
+    uint32_t at;      /* instant of the crossing, from those before */
+} zero_expected_t;
+
+typedef struct {
+    uint8_t sector;
+    uint8_t leg; /* the open one */
+    bool rising;
+    uint32_t open_since; /* instant of the commutation into it */
+    uint32_t at;         /* instant of the crossing, once found; before, of the last sample ahead of it */
+    pm_q_t y;            /* of that sample, < 0 */
+    bool ahead;          /* there was such a sample, */
+    bool cut;            /* and a rail has cut it */
+    bool past;           /* a sample was past the crossing, without one ahead of it */
+    bool found;
+} zero_crossing_t;
+
+/* What the difference rises by in 60 degrees that take t_60, > 0: one division. */
+pm_q_t zero_crossing_swing(const zero_crossing_config_t *config, uint32_t t_60);
+
+/* Looks at the open leg of another sector. */
+void zero_crossing_open(zero_crossing_t *self, uint32_t sector, bool reverse, uint32_t since);
+
+/* One sample of that sector; true when it has found the crossing. Not after that. */
+bool zero_crossing_step(zero_crossing_t *self, const zero_crossing_config_t *config, const zero_sample_t *in,
+                        zero_instant_t when, const zero_expected_t *expected);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

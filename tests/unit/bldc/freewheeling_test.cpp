@@ -1,0 +1,219 @@
+// Prediction of freewheeling against its formula, and against the switching plant.
+#include "bldc/freewheeling.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/sim_plant/six_step.h"
+
+namespace
+{
+
+// METHODS-ADDENDUM.md B (c), row 116.
+constexpr double kFormula = 1e-3;  // of fixed point
+constexpr double kPlant = 0.03;    // with ten periods or more in a freewheel,
+constexpr double kPeriods = 1;     // else
+constexpr double kCurrent = 0.011; // of the inverse
+
+constexpr double kBase_V = 40, kBase_A = 40;
+
+int32_t fixed(double x)
+{
+    return static_cast<int32_t>(std::llround(std::ldexp(x, PM_Q_BITS)));
+}
+
+double real(int32_t x)
+{
+    return std::ldexp(static_cast<double>(x), -PM_Q_BITS);
+}
+
+struct Case {
+    double R_ohm, L_H, emf_Vs; // 2 E / omega
+    double base_rad_s;
+
+    freewheeling_config_t config() const
+    {
+        const double Z = kBase_V / kBase_A;
+        return {fixed(R_ohm / Z), fixed(L_H * base_rad_s / Z), fixed(emf_Vs * base_rad_s / kBase_V)};
+    }
+    freewheeling_in_t in(pattern_id_t pattern, uint32_t sector, double u, double omega,
+                         double v_dc_V = 24) const
+    {
+        return {pattern, sector, fixed(u), fixed(v_dc_V / kBase_V), fixed(omega / base_rad_s)};
+    }
+    double x_V(bool chopped, double u, double omega, double v_dc_V = 24) const
+    {
+        return (chopped ? u : 2 - u) * v_dc_V + emf_Vs * omega;
+    }
+    double angle_rad(double x, double omega, double i_A) const
+    {
+        return omega * L_H / R_ohm * std::log1p(3 * R_ohm * i_A / x);
+    }
+};
+
+constexpr Case kFan = {0.4, 0.5e-3, 2 * 7.5e-3 * 0.822467, 1256.6};
+constexpr Case kHs = {0.025, 25e-6, 1.5 * 1.25e-3, 8377.6};
+
+double angle(const Case &c, const freewheeling_in_t &in, double i_A)
+{
+    const freewheeling_config_t config = c.config();
+    return real(freewheeling_angle(&config, &in, fixed(i_A / kBase_A)));
+}
+
+TEST(Freewheeling, IsThatOfTheFormula)
+{
+    for (const Case &c : {kFan, kHs}) {
+        for (const double share : {0.1, 0.5, 1.0}) {
+            for (const double u : {0.1, 0.5, 1.0}) {
+                for (const double i_A : {1.0, 5.0, 20.0}) {
+                    const double omega = share * c.base_rad_s;
+                    // the leg that has come is the high one in odd sectors
+                    const double chopped = c.angle_rad(c.x_V(true, u, omega), omega, i_A);
+                    const double held = c.angle_rad(c.x_V(false, u, omega), omega, i_A);
+                    if (0.4 * 3 * i_A > 2 * c.x_V(true, u, omega)) {
+                        continue; // beyond the range
+                    }
+                    EXPECT_NEAR(angle(c, c.in(PATTERN_H_PWM_L_ON, 1, u, omega), i_A), chopped,
+                                kFormula * chopped);
+                    EXPECT_NEAR(angle(c, c.in(PATTERN_H_PWM_L_ON, 2, u, omega), i_A), held, kFormula * held);
+                    EXPECT_NEAR(angle(c, c.in(PATTERN_H_ON_L_PWM, 1, u, omega), i_A), held, kFormula * held);
+                    EXPECT_NEAR(angle(c, c.in(PATTERN_H_ON_L_PWM, 2, u, omega), i_A), chopped,
+                                kFormula * chopped);
+                    EXPECT_NEAR(angle(c, c.in(PATTERN_PWM_ON, 3, u, omega), i_A), chopped,
+                                kFormula * chopped);
+                    EXPECT_NEAR(angle(c, c.in(PATTERN_ON_PWM, 4, u, omega), i_A), held, kFormula * held);
+                    const double both = c.angle_rad(24 + c.emf_Vs * omega, omega, i_A);
+                    EXPECT_NEAR(angle(c, c.in(PATTERN_H_PWM_L_PWM, 0, u, omega), i_A), both, kFormula * both);
+                }
+            }
+        }
+    }
+}
+
+// METHODS.md 10.5.3 to 10.5.5: three sweeps.
+TEST(Freewheeling, FollowsResistanceInductanceLinkAndDuty)
+{
+    for (const double factor : {0.5, 0.8, 1.25, 1.5}) {
+        Case c = kFan;
+        c.R_ohm *= factor;
+        c.L_H *= factor;
+        const double by_machine = c.angle_rad(c.x_V(true, 0.5, 600), 600, 4);
+        EXPECT_NEAR(angle(c, c.in(PATTERN_PWM_ON, 0, 0.5, 600), 4), by_machine, kFormula * by_machine);
+        const double by_link = kFan.angle_rad(kFan.x_V(true, 0.5, 600, 24 * factor), 600, 4);
+        EXPECT_NEAR(angle(kFan, kFan.in(PATTERN_PWM_ON, 0, 0.5, 600, 24 * factor), 4), by_link,
+                    kFormula * by_link);
+        const double by_duty = kFan.angle_rad(kFan.x_V(true, 0.6 * factor, 600), 600, 4);
+        EXPECT_NEAR(angle(kFan, kFan.in(PATTERN_PWM_ON, 0, 0.6 * factor, 600), 4), by_duty,
+                    kFormula * by_duty);
+    }
+}
+
+TEST(Freewheeling, CurrentOfAnAngleIsItsInverse)
+{
+    for (const double share : {0.2, 0.5, 1.0}) {
+        const freewheeling_config_t config = kFan.config();
+        const freewheeling_in_t in = kFan.in(PATTERN_PWM_ON, 0, 0.4, share * kFan.base_rad_s);
+        for (const double rad : {0.05, 0.2, 0.3}) {
+            const double i = real(freewheeling_current(&config, &in, fixed(rad)));
+            if (kFan.R_ohm * rad / (share * kFan.base_rad_s * kFan.L_H) <= 1) {
+                EXPECT_NEAR(real(freewheeling_angle(&config, &in, fixed(i))), rad, kCurrent * rad);
+            }
+        }
+    }
+}
+
+TEST(Freewheeling, LowSpeedAllowsAnyCurrent)
+{
+    const freewheeling_config_t config = kFan.config();
+    const freewheeling_in_t in = kFan.in(PATTERN_PWM_ON, 0, 0.4, 1);
+    EXPECT_GT(real(freewheeling_current(&config, &in, fixed(0.3))), 1); // full scale
+    EXPECT_EQ(freewheeling_angle(&config, &in, 0), 0);
+}
+
+constexpr pattern_id_t of(validation::Pattern pattern)
+{
+    return static_cast<pattern_id_t>(pattern); // in the same order
+}
+
+struct Freewheel {
+    double i_A, lasted_s;
+    uint32_t sector;
+};
+
+// Of the plant, from its next commutation until the current of the leg that goes is zero.
+Freewheel next(validation::SixStep &drive)
+{
+    constexpr int parts = 40;
+    while (!drive.run()) {
+    }
+    const int out = drive.sector.open;
+    const double sign = drive.sector.upper_has_come() ? 1 : -1;
+    plant_truth_t t = drive.plant.truth();
+    Freewheel f{sign * t.i_A[out], 0, static_cast<uint32_t>(drive.sector.number)};
+    const double start_s = t.t_s, part_s = drive.plant.period_s() / parts;
+    for (int n = 1; sign * t.i_A[out] > 1e-9 && n < 4000 * parts; n++) {
+        if (n % parts == 0) {
+            drive.run();
+            t = drive.plant.truth();
+        } else {
+            t = drive.plant.at(n % parts * part_s);
+        }
+        f.lasted_s = t.t_s - start_s - part_s / 2;
+    }
+    return f;
+}
+
+struct Worst {
+    double relative = 0, periods = 0, swapped = 1e9, fewest = 1e9;
+};
+
+Worst against_plant(plant_config_t config, const Case &c, double f_pwm_Hz, double omega, double i_A)
+{
+    config.inverter.f_pwm_Hz = f_pwm_Hz;
+    Worst w;
+    for (const validation::Pattern pattern : validation::patterns) {
+        const double u = validation::duty_for(config, validation::Pattern::h_pwm_l_on, omega, i_A);
+        validation::SixStep drive(config, pattern, validation::duty_for(config, pattern, omega, i_A), omega);
+        drive.run_sectors(1 + static_cast<int>(6 * c.L_H / c.R_ohm * omega / (60 * validation::deg)));
+        for (int n = 0; n < 2; n++) {
+            const Freewheel f = next(drive);
+            const auto predicted_s = [&](pattern_id_t id) {
+                return angle(c, c.in(id, f.sector, u, drive.omega_e), f.i_A) / drive.omega_e;
+            };
+            const double own_s = predicted_s(of(pattern));
+            w.relative = std::max(w.relative, std::abs(f.lasted_s / own_s - 1));
+            w.periods = std::max(w.periods, std::abs(f.lasted_s - own_s) * f_pwm_Hz);
+            w.fewest = std::min(w.fewest, f.lasted_s * f_pwm_Hz);
+            if (pattern == validation::Pattern::pwm_on || pattern == validation::Pattern::on_pwm) {
+                const pattern_id_t other = of(pattern) == PATTERN_PWM_ON ? PATTERN_ON_PWM : PATTERN_PWM_ON;
+                w.swapped = std::min(w.swapped, std::abs(f.lasted_s / predicted_s(other) - 1));
+            }
+        }
+    }
+    return w;
+}
+
+TEST(Freewheeling, IsThatOfThePlantInAllPatterns)
+{
+    for (const double omega : {60.0, 100.0}) {
+        const Worst w = against_plant(validation::bldc_fan(), kFan, 100e3, omega, 5);
+        EXPECT_GE(w.fewest, 10);
+        EXPECT_LE(w.relative, kPlant);
+        // Twin: the pattern that holds the other leg
+        EXPECT_GE(w.swapped, 0.5);
+    }
+    const Worst hs = against_plant(validation::bldc_hs(), kHs, 500e3, 100, 15);
+    EXPECT_GE(hs.fewest, 10);
+    EXPECT_LE(hs.relative, kPlant);
+}
+
+TEST(Freewheeling, IsWithinAPeriodOfThePlantWhereThereAreFew)
+{
+    for (const double omega : {100.0, 400.0, 1000.0}) {
+        EXPECT_LE(against_plant(validation::bldc_fan(), kFan, 20e3, omega, 5).periods, kPeriods);
+    }
+    EXPECT_LE(against_plant(validation::bldc_hs(), kHs, 40e3, 2000, 15).periods, kPeriods);
+}
+
+} // namespace

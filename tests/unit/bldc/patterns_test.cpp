@@ -1,0 +1,149 @@
+#include "bldc/patterns.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/bldc/rig.h"
+
+namespace
+{
+
+using bldc_rig::fixed;
+using bldc_rig::kDegree;
+using bldc_rig::real;
+
+constexpr uint16_t kN = 2125;
+constexpr double kDuty = 1e-7;
+
+pattern_config_t make(pattern_id_t id, bool complementary = true)
+{
+    return {id, complementary, kN, 170, 1000};
+}
+
+// Is a terminal at the upper rail at a count of the period?
+bool high_at(pm_leg_t state, double duty, double count)
+{
+    const double from = kN * (1 - duty), to = kN * (1 + duty);
+    return state == PM_LEG_HIGH || (state != PM_LEG_LOW && count >= from && count < to);
+}
+
+// METHODS.md 0.1: EMF of a phase, angles in degrees.
+double emf(int leg, double theta_deg)
+{
+    return -std::sin((theta_deg - 120 * leg) * kDegree);
+}
+
+TEST(Sectors, AreThoseOfTheEmf)
+{
+    for (const bool reverse : {false, true}) {
+        const double way = reverse ? -1 : 1;
+        for (uint32_t s = 0; s < SECTORS; ++s) {
+            const sector_t at = sector_legs(s, reverse);
+            const double middle = way * (60 + 60.0 * s);
+            // driven by the legs with the highest and the lowest EMF, which has the sign of the speed
+            EXPECT_NEAR(way * emf(at.high, middle), std::sqrt(0.75), 1e-9) << s;
+            EXPECT_NEAR(way * emf(at.low, middle), -std::sqrt(0.75), 1e-9) << s;
+            EXPECT_NEAR(emf(at.open, middle), 0, 1e-9) << s;
+            EXPECT_EQ(way * emf(at.open, middle + way) > 0, sector_rising(s)) << s;
+            const sector_t next = sector_legs(sector_next(s), reverse);
+            EXPECT_EQ(sector_rising(s) ? next.high : next.low, at.open) << s;
+            EXPECT_EQ(sector_rising(s) ? next.low : next.high, sector_rising(s) ? at.low : at.high) << s;
+        }
+    }
+    EXPECT_EQ(sector_distance(5, 0), 1U);
+    EXPECT_EQ(sector_distance(1, 5), 4U);
+    EXPECT_EQ(sector_distance(3, 3), 0U);
+}
+
+// METHODS.md 10.3.1: which of a leg's two sectors is chopped.
+TEST(Patterns, ChopWhatTheirNameSays)
+{
+    struct {
+        pattern_id_t id;
+        bool upper_first, upper_last, lower_first, lower_last;
+    } const list[] = {{PATTERN_H_PWM_L_PWM, true, true, true, true},
+                      {PATTERN_H_PWM_L_ON, true, true, false, false},
+                      {PATTERN_H_ON_L_PWM, false, false, true, true},
+                      {PATTERN_PWM_ON, true, false, true, false},
+                      {PATTERN_ON_PWM, false, true, false, true}};
+    for (const auto &p : list) {
+        for (const bool reverse : {false, true}) {
+            for (const bool complementary : {false, true}) {
+                const pattern_config_t c = make(p.id, complementary);
+                for (uint32_t s = 0; s < SECTORS; ++s) {
+                    const uint16_t legs = pattern_states(&c, s, reverse);
+                    const sector_t at = sector_legs(s, reverse);
+                    const bool upper_comes =
+                        !sector_rising(s); // it was open in the sector before, which rose
+                    const bool upper = upper_comes ? p.upper_first : p.upper_last;
+                    const bool lower = upper_comes ? p.lower_last : p.lower_first;
+                    EXPECT_EQ(pm_leg(legs, at.open), PM_LEG_OFF);
+                    EXPECT_EQ(pm_leg(legs, at.high), !upper          ? PM_LEG_HIGH
+                                                     : complementary ? PM_LEG_PWM
+                                                                     : PM_LEG_UPPER);
+                    EXPECT_EQ(pm_leg(legs, at.low), !lower          ? PM_LEG_LOW
+                                                    : complementary ? PM_LEG_PWM
+                                                                    : PM_LEG_LOWER);
+                }
+            }
+        }
+    }
+}
+
+// u is the mean line voltage, whatever the pattern; duties do not change where legs stay or come.
+TEST(Patterns, LineVoltageIsTheCommand)
+{
+    for (int id = 0; id < PATTERN_COUNT; ++id) {
+        const pattern_config_t c = make(static_cast<pattern_id_t>(id));
+        for (const bool reverse : {false, true}) {
+            for (const double u : {0.0, 0.2, 0.7, 1.0}) {
+                for (uint32_t s = 0; s < SECTORS; ++s) {
+                    pm_legs_t out, then;
+                    pattern_duties(&c, s, reverse, fixed(u, 28), &out);
+                    out.legs = pattern_states(&c, s, reverse);
+                    pattern_duties(&c, sector_next(s), reverse, fixed(u, 28), &then);
+                    then.legs = pattern_states(&c, sector_next(s), reverse);
+                    const sector_t at = sector_legs(s, reverse), next = sector_legs(sector_next(s), reverse);
+                    const auto mean = [&](uint32_t leg) {
+                        const pm_leg_t state = pm_leg(out.legs, leg);
+                        return state == PM_LEG_HIGH ? 1 : state == PM_LEG_LOW ? 0 : real(out.duty[leg]);
+                    };
+                    EXPECT_NEAR(mean(at.high) - mean(at.low), u, kDuty);
+                    EXPECT_EQ(out.duty[next.high], then.duty[next.high]);
+                    EXPECT_EQ(out.duty[next.low], then.duty[next.low]);
+                }
+            }
+        }
+    }
+}
+
+// At the instant of a sample the legs are where the reference says, for `lead` before and what is left of the least time.
+TEST(Patterns, SamplesAreTakenWhereTheLegsAreAsTold)
+{
+    for (int id = 0; id < PATTERN_COUNT; ++id) {
+        const pattern_config_t c = make(static_cast<pattern_id_t>(id));
+        for (double u = 0.02; u < 0.985; u += 0.06) {
+            for (uint32_t s = 0; s < SECTORS; ++s) {
+                const pattern_sample_t sample = pattern_sample(&c, s, fixed(u, 28));
+                ASSERT_GE(sample.at, 1);
+                ASSERT_LT(sample.at, 2 * kN);
+                pm_legs_t out;
+                pattern_duties(&c, s, false, fixed(u, 28), &out);
+                out.legs = pattern_states(&c, s, false);
+                const sector_t at = sector_legs(s, false);
+                const double pulses = id == PATTERN_H_PWM_L_PWM ? 2 : 1;
+                EXPECT_EQ(sample.legs == ZERO_LEGS_APART, 2 * kN * u / pulses >= c.least - 1) << id << u;
+                for (int ahead = 0; ahead >= -100; ahead -= 50) {
+                    const double count = sample.at + ahead;
+                    const bool up = high_at(pm_leg(out.legs, at.high), real(out.duty[at.high]), count);
+                    const bool down = high_at(pm_leg(out.legs, at.low), real(out.duty[at.low]), count);
+                    EXPECT_EQ(up, sample.legs != ZERO_LEGS_LOW) << id << ' ' << u << ' ' << s;
+                    EXPECT_EQ(down, sample.legs == ZERO_LEGS_HIGH) << id << ' ' << u << ' ' << s;
+                }
+            }
+        }
+    }
+}
+
+} // namespace

@@ -1,0 +1,278 @@
+// Instants of crossings against the EMF they come from, without a plant.
+#include "bldc/zero_crossing.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/unit/bldc/rig.h"
+
+namespace
+{
+
+using bldc_rig::fixed;
+using bldc_rig::kDegree;
+using bldc_rig::kPi;
+
+constexpr double kV_dc = 24, kBase_V = 40;
+constexpr uint32_t kT60 = 100000;   // counts
+constexpr double kSpacing = 4000;   // counts
+constexpr double kAmplitude = 6;    // of the terminal's swing about its reference, a sine
+constexpr double kError_counts = 4; // rounding of the ratio and of the product, of 4000 counts
+constexpr double kShape_counts = 8; // chord of the sine between two samples 2.4 degrees apart
+
+double degrees(double counts)
+{
+    return 60.0 * counts / kT60;
+}
+
+constexpr zero_expected_t kExpected = {0, kT60, 0};
+
+struct Sample {
+    zero_sample_t measured;
+    zero_instant_t when;
+};
+
+pm_q_t swing(double factor)
+{
+    return fixed(factor * kAmplitude * kPi / 3 / kBase_V, 28);
+}
+
+// Sector in which the crossing is at count 0; a sample of the ideal terminal at another.
+struct Bench {
+    zero_crossing_config_t config = {ZERO_LINK, fixed(0.35 / kBase_V, 28), 1000, swing(1), kT60};
+    uint32_t sector = 0;
+    bool reverse = false;
+    zero_legs_t legs = ZERO_LEGS_APART;
+    zero_crossing_t self = {};
+
+    void open()
+    {
+        zero_crossing_open(&self, sector, reverse, static_cast<uint32_t>(-static_cast<int>(kT60 / 2)));
+    }
+    Sample sample(double at) const
+    {
+        const double towards = sector % 2 == 0 ? 1 : -1;
+        const double rails_V = kV_dc / 2 * legs;
+        const double v = rails_V + towards * kAmplitude * std::sin(degrees(at) * kDegree);
+        return terminal(at, v);
+    }
+    Sample terminal(double at, double v) const
+    {
+        const sector_t of = sector_legs(sector, reverse);
+        Sample s = {};
+        s.when.at = static_cast<uint32_t>(static_cast<int64_t>(at));
+        s.when.legs = legs;
+        s.measured.v_dc = fixed(kV_dc / kBase_V, 28);
+        s.measured.v[of.open] = fixed(std::min(std::max(v, 0.0), kV_dc + 0.8) / kBase_V, 28);
+        s.measured.v[of.high] = legs == ZERO_LEGS_LOW ? 0 : s.measured.v_dc;
+        s.measured.v[of.low] = legs == ZERO_LEGS_HIGH ? s.measured.v_dc : 0;
+        return s;
+    }
+    bool step(const Sample &s, const zero_expected_t &e = kExpected)
+    {
+        return zero_crossing_step(&self, &config, &s.measured, s.when, &e);
+    }
+    // First sample at `first`, then every kSpacing; the instant that it finds.
+    int32_t find(double first, const zero_expected_t &e = kExpected)
+    {
+        open();
+        for (double at = first; at < kT60 / 2.0; at += kSpacing) {
+            if (step(sample(at), e)) {
+                return static_cast<int32_t>(self.at);
+            }
+        }
+        ADD_FAILURE() << "no crossing";
+        return INT32_MAX;
+    }
+};
+
+TEST(ZeroCrossing, InterpolatesInBothDirectionsAndAllSectors)
+{
+    for (const bool reverse : {false, true}) {
+        for (uint32_t sector = 0; sector < SECTORS; ++sector) {
+            Bench b;
+            b.sector = sector;
+            b.reverse = reverse;
+            for (double first = -30000; first < -30000 + kSpacing; first += 333) {
+                EXPECT_NEAR(b.find(first), 0, kShape_counts) << sector << first;
+            }
+        }
+    }
+}
+
+// Twin: without interpolation the crossing is up to the distance of two samples late.
+TEST(ZeroCrossing, TwinFirstSamplePastIsLateByUpToASample)
+{
+    double most = 0;
+    for (double first = -30000; first < -30000 + kSpacing; first += 333) {
+        most = std::max(most, std::fmod(first + 100 * kSpacing, kSpacing));
+    }
+    EXPECT_GT(most, 100 * kShape_counts);
+}
+
+// The star point of a sine is at the mean of the terminals; here it is 0.3 V above, as with another EMF.
+TEST(ZeroCrossing, EveryReferenceHasItsCrossing)
+{
+    for (const zero_reference_t reference : {ZERO_LINK, ZERO_TERMINALS, ZERO_NEUTRAL}) {
+        Bench b;
+        b.config.reference = reference;
+        b.open();
+        bool found = false;
+        for (double at = -29000; at < 30000 && !found; at += kSpacing) {
+            Sample s = b.sample(at);
+            s.measured.v_neutral = fixed(0.3 / kBase_V, 28);
+            found = b.step(s);
+        }
+        ASSERT_TRUE(found) << reference;
+        const double at_V =
+            reference == ZERO_NEUTRAL ? 1.5 * 0.3 : 0; // two thirds of the terminal's is its phase's
+        const double crossing = std::asin(at_V / kAmplitude) / kDegree / 60 * kT60;
+        EXPECT_NEAR(static_cast<int32_t>(b.self.at), crossing, kShape_counts) << reference;
+    }
+}
+
+// METHODS.md 10.2.3, late rule: from one sample and the slope of the EMF.
+TEST(ZeroCrossing, FindsALateCrossingFromItsDistance)
+{
+    Bench b;
+    for (const double first : {1000.0, 4000.0, 9000.0}) {
+        // a sine instead of the line that the slope stands for
+        const double line = std::sin(degrees(first) * kDegree) / kDegree / 60 * kT60;
+        EXPECT_NEAR(b.find(first), first - line, kError_counts) << first;
+    }
+}
+
+// METHODS.md B (c), row 111.
+TEST(ZeroCrossing, TwinFactorOfASineForATrapezoidIsAThirdOff)
+{
+    Bench b;
+    b.config.swing = swing(1.5);
+    const double first = 6000;
+    EXPECT_NEAR(b.find(first), first / 3, 0.02 * first);
+}
+
+TEST(ZeroCrossing, BeforeItIsDueALateCrossingNeedsASecondSample)
+{
+    Bench b;
+    zero_expected_t e = kExpected;
+    e.at = 20000;
+    EXPECT_NEAR(b.find(2000, e), 0, 10);
+    b.open();
+    EXPECT_FALSE(b.step(b.sample(2000), e));
+    EXPECT_TRUE(b.step(b.sample(2000 + kSpacing), e));
+}
+
+// A terminal on its way from the rail to the EMF: past at first, then ahead of the crossing.
+TEST(ZeroCrossing, IgnoresTheSwingAfterFreewheeling)
+{
+    Bench b;
+    b.open();
+    EXPECT_FALSE(b.step(b.terminal(-28000, kV_dc + 0.8)));
+    EXPECT_FALSE(b.step(b.terminal(-24000, kV_dc / 2 + 1.5)));
+    for (double at = -20000; at < 0; at += kSpacing) {
+        EXPECT_FALSE(b.step(b.sample(at)));
+    }
+    EXPECT_TRUE(b.step(b.sample(1000)));
+    EXPECT_NEAR(static_cast<int32_t>(b.self.at), 0, kShape_counts);
+    // Twin: taken at once it is wrong by most of the sector.
+    b.open();
+    zero_expected_t e = kExpected;
+    e.at = static_cast<uint32_t>(-30000);
+    EXPECT_TRUE(b.step(b.terminal(-24000, kV_dc / 2 + 1.5), e));
+    EXPECT_LT(static_cast<int32_t>(b.self.at), -20000);
+}
+
+TEST(ZeroCrossing, NoRotorIsThatFarPast)
+{
+    Bench b;
+    b.open();
+    const double swing_V = kAmplitude * kPi / 3;
+    for (double at = 1000; at < 20000; at += 1000) {
+        EXPECT_FALSE(b.step(b.terminal(at, kV_dc / 2 + 0.63 * swing_V)));
+    }
+    EXPECT_TRUE(b.step(b.terminal(21000, kV_dc / 2 + 0.6 * swing_V)));
+    EXPECT_NEAR(static_cast<int32_t>(b.self.at), 21000 - 0.6 * kT60, 10);
+}
+
+TEST(ZeroCrossing, PassesOverFreewheelingAndBlanking)
+{
+    for (uint32_t sector = 0; sector < 2; ++sector) {
+        Bench b;
+        b.sector = sector;
+        b.open();
+        const double rail = sector == 0 ? kV_dc + 0.8 : 0;
+        for (double at = -29500; at < 15000; at += kSpacing) {
+            EXPECT_FALSE(b.step(b.terminal(at, rail)));
+        }
+        // Longer than 30 degrees: found late, where it was.
+        EXPECT_TRUE(b.step(b.sample(16000)));
+        EXPECT_LT(std::abs(degrees(static_cast<int32_t>(b.self.at))), 0.3);
+        // Twin: without the rail's margin the first sample is a crossing.
+        Bench twin;
+        twin.sector = sector;
+        twin.config.rail = fixed(-2 / kBase_V, 28);
+        twin.open();
+        twin.config.swing = swing(10);
+        zero_expected_t e = kExpected;
+        e.at = static_cast<uint32_t>(-30000);
+        EXPECT_TRUE(twin.step(b.terminal(-29000, rail), e));
+    }
+    Bench b;
+    b.config.blank = 20000;
+    b.open();
+    EXPECT_FALSE(b.step(b.sample(-40000)));
+    EXPECT_FALSE(b.self.ahead);
+    EXPECT_FALSE(b.step(b.sample(-30001)));
+    EXPECT_FALSE(b.self.ahead);
+    EXPECT_FALSE(b.step(b.sample(-10000)));
+    EXPECT_TRUE(b.self.ahead);
+}
+
+// Off time: the rail cuts one side of the EMF; the distance of the sample on the other side counts (10.3.2).
+TEST(ZeroCrossing, OffTimeSamplesOfWhichARailCutsHalf)
+{
+    for (const zero_legs_t legs : {ZERO_LEGS_LOW, ZERO_LEGS_HIGH}) {
+        for (uint32_t sector = 0; sector < 2; ++sector) {
+            Bench b;
+            b.sector = sector;
+            b.legs = legs;
+            for (double first = -29000; first < -29000 + kSpacing; first += 500) {
+                b.open();
+                bool found = false;
+                for (double at = first; at < 30000 && !found; at += kSpacing) {
+                    Sample s = b.sample(at);
+                    // upper diode: the terminal does not go above
+                    const uint8_t open = sector_legs(sector, false).open;
+                    s.measured.v[open] =
+                        std::min(s.measured.v[open], s.measured.v_dc + fixed(0.01 / kBase_V, 28));
+                    found = b.step(s);
+                }
+                ASSERT_TRUE(found);
+                EXPECT_LT(std::abs(degrees(static_cast<int32_t>(b.self.at))), 0.5) << legs << sector << first;
+            }
+        }
+    }
+}
+
+TEST(ZeroCrossing, ThresholdMovesIt)
+{
+    Bench b;
+    zero_expected_t e = kExpected;
+    e.threshold = fixed(0.5 / kBase_V, 28);
+    const double moved = std::asin(0.5 / kAmplitude) / kDegree / 60 * kT60;
+    EXPECT_NEAR(b.find(-29000, e), moved, 2 * kShape_counts);
+}
+
+TEST(ZeroCrossing, InstantsWrap)
+{
+    Bench b;
+    zero_crossing_open(&b.self, 0, false, UINT32_MAX - 5000U);
+    Sample s = b.sample(-100);
+    s.when.at = UINT32_MAX - 99U;
+    EXPECT_FALSE(b.step(s));
+    s = b.sample(100);
+    s.when.at = 100;
+    EXPECT_TRUE(b.step(s));
+    EXPECT_NEAR(static_cast<int32_t>(b.self.at), 0, kShape_counts);
+}
+
+} // namespace
