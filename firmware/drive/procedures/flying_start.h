@@ -24,8 +24,8 @@
  * its most, and ends no wait.
  * On boards with PM_BOOTSTRAP the pulses go on until the low switches have been on for what charge.h takes, since the
  * caught rotor must not be shorted for as long.
- * The step costs at most 150 instructions. Tests: tests/unit/drive/flying_start_test.cpp,
- * tests/scenario/flying_start.yaml, tests/contract/procedure_contract_test.cpp. */
+ * The control interrupt takes at most 324 instructions with it. Tests: tests/unit/drive/flying_start_test.cpp,
+ * tests/scenario/flying_start.yaml, tests/contract/procedure_contract_test.cpp, tests/target/board. */
 #ifndef DRIVE_PROCEDURES_FLYING_START_H
 #define DRIVE_PROCEDURES_FLYING_START_H
 
