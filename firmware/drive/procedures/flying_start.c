@@ -30,7 +30,8 @@ static uint32_t seen_of(uint32_t length)
     return length < (uint32_t)PARTS ? length : 2U * length;
 }
 
-static int32_t times(pm_q_t x, uint32_t n) /* at most 4 */
+/* n x, at most 4. */
+static int32_t times(pm_q_t x, uint32_t n)
 {
     return n >= (uint32_t)PM_Q(4.0) / (uint32_t)pm_max(x, 1) ? PM_Q(4.0) : x * (int32_t)n;
 }
@@ -39,8 +40,8 @@ static int32_t times(pm_q_t x, uint32_t n) /* at most 4 */
 static uint32_t longer(const flying_start_t *self, const flying_start_config_t *c, pm_q_t i)
 {
     const uint32_t now = seen_of(self->length);
-    for (uint32_t times = 4; times >= 2U; times /= 2U) {
-        const uint32_t next = times * self->length;
+    for (uint32_t factor = 4; factor >= 2U; factor /= 2U) {
+        const uint32_t next = factor * self->length;
         if (next <= c->longest && i < 2 * c->i_enough / (int32_t)(seen_of(next) / now)) {
             return next;
         }

@@ -9,9 +9,9 @@
  * theta belongs to the end of the pulse. What devices drop along the current is added as i_drop = V_drop tau / L_q in each leg.
  *
  * The first pulse is a period long; on boards that have PWM on one switch and different halves of a period, a 64th of one,
- * at its end. A pulse twice or four times as long follows while it cannot carry more than about 40 % of rated current, nor of
- * psi_m / L_q, where the rotor has turned by 0.4 rad and saturation would count, and is not longer than 3.2 ms. Five of the length that is left, at distances that double, give the speed: each tells how many turns lie before
- * the next.
+ * at its end. A pulse twice or four times as long follows while it cannot carry more than about 40 % of rated current, is not
+ * longer than 3.2 ms, and the rotor does not turn by more than 0.2 rad meanwhile: then an error of L_q / L_d costs little.
+ * Five of the length that is left, at distances that double, give the speed: each tells how many turns lie before the next.
  *   w = (angle of i_n - angle of i_0) / (t_n - t_0)
  * At rest (PM_FAILED_NOT_TURNING): currents below twenty times their noise or three times i_drop, or a turn that noise could
  * make, 0.16 |i| |turn in rad| below 1.5 times the noise of a current. A 12-bit converter of 2.5 times rated current sees 5 to
@@ -24,8 +24,8 @@
  * its most, and ends no wait.
  * On boards with PM_BOOTSTRAP the pulses go on until the low switches have been on for what charge.h takes, since the
  * caught rotor must not be shorted for as long.
- * The step costs at most 150 instructions. Tests: tests/unit/drive/flying_start_test.cpp,
- * tests/scenario/flying_start.yaml, tests/contract/procedure_contract_test.cpp. */
+ * The control interrupt takes at most 324 instructions with it. Tests: tests/unit/drive/flying_start_test.cpp,
+ * tests/scenario/flying_start.yaml, tests/contract/procedure_contract_test.cpp, tests/target/board. */
 #ifndef DRIVE_PROCEDURES_FLYING_START_H
 #define DRIVE_PROCEDURES_FLYING_START_H
 

@@ -31,7 +31,9 @@ void make_flying_start(maker_t *m, flying_start_config_t *c)
     while (2UL * c->longest / FLYING_START_PARTS <= f / 1000U * LONGEST_US / 1000U) {
         c->longest = (uint16_t)(2U * c->longest);
     }
-    const pm_num_t turns = pm_num_div(si(m, DRIVE_PARAM_psi_m), si(m, DRIVE_PARAM_L_q)); /* by a radian */
+    /* 0.2 rad, since a pulse twice as long may follow */
+    const pm_num_t turns =
+        mul3(pm_num_ratio(1, 2), si(m, DRIVE_PARAM_psi_m), pm_num_div(pm_num(1), si(m, DRIVE_PARAM_L_q)));
     const pm_num_t i = pm_num_mul(least(si(m, DRIVE_PARAM_i_rated), turns), pm_num_ratio(1, 5));
     c->i_enough = fixed(m, pm_num_div(i, m->base.i), Q_BITS, DRIVE_PARAM_i_rated);
     c->noise = pm_max(per_unit(m, DRIVE_PARAM_i_noise, m->base.i), PM_Q(0.5 / 4096.0));
