@@ -58,18 +58,22 @@ bool follow_slow(follow_t *self, const pm_machine_t *machine, const follow_in_t 
     (void)pm_lp1(&self->along, in->v.d - pm_mul(self->R, in->i), K_MEAN);
     (void)pm_lp1(&self->across, in->v.q - pm_mul(reactance, in->i), K_MEAN);
     self->emf = pm_mul(pm_abs(in->omega), m->psi_m);
-    self->turned = PM_HAS(load_current) ? pm_min(self->turned + in->turn, self->least) : 0;
+    if (PM_HAS(load_current)) {
+        self->turned = pm_min(self->turned + in->turn, self->least);
+    }
     if (self->emf / 2 <= pm_mul(self->R_doubt, in->i) + in->v_dc / 512) {
         self->emf = 0;
         self->ms = 0;
-        self->follows_ms = 0;
-        self->follows = false;
+        if (PM_HAS(load_current)) {
+            self->follows_ms = 0;
+            self->follows = false;
+        }
         return false;
     }
     if (!is_seen(self, in->omega)) {
-        self->follows_ms = 0;
+        self->follows_ms = PM_HAS(load_current) ? 0U : self->follows_ms;
         self->ms = (uint16_t)pm_min(self->ms + 1, FOLLOW_STANDS_MS);
-        return self->ms == FOLLOW_STANDS_MS && self->turned >= self->least;
+        return self->ms == FOLLOW_STANDS_MS && (!PM_HAS(load_current) || self->turned >= self->least);
     }
     self->ms = (uint16_t)pm_max(self->ms - 2, 0);
     if (!PM_HAS(load_current)) {
