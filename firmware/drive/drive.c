@@ -389,7 +389,11 @@ PM_RARE void drive_prepare(drive_t *drive)
     const int32_t turn = pm_omega_to_angle(omega, c->k_theta);
     /* On an imposed angle an observer drifts at low speed, and on the way up it slips. */
     const pm_q_t lead_to = open_loop_ramps(drive) ? c->position.omega_high : c->position.omega_low;
-    drive->forced = open && pm_abs(drive->omega_ramp) < lead_to;
+    const bool forced = open && pm_abs(drive->omega_ramp) < lead_to;
+    if (open && drive->forced && !forced) {
+        open_loop_release(drive);
+    }
+    drive->forced = forced;
     if (drive->forced) {
         const pm_pll_t along = {.theta = drive->theta_open, .omega = omega};
         position_force(&drive->position, &c->position, &along);

@@ -77,6 +77,7 @@ void open_loop_hold(drive_t *drive); /* the vector stays, but for a rotor that s
 void open_loop_rested(drive_t *drive); /* the end of the align: what its voltage says of R */
 void open_loop_slow(drive_t *drive);
 void open_loop_resume(drive_t *drive);
+void open_loop_release(drive_t *drive); /* the observer goes its own way from here, from where the rotor is seen */
 bool open_loop_ramps(const drive_t *drive);  /* the imposed speed is not what is wanted yet */
 
 #ifdef __cplusplus

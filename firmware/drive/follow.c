@@ -2,22 +2,23 @@
 
 #include "firmware/math/filter.h"
 #include "firmware/math/root.h"
+#include "firmware/math/trig.h"
 
 #define K_MEAN PM_FRAC(0.05) /* 20 ms */
 
 void follow_reset(follow_t *self, const pm_machine_t *machine)
 {
-    *self = (follow_t){.R = machine->R_s, .R_doubt = machine->R_s / 4};
+    *self = (follow_t){.R = machine->R_s, .R_doubt = machine->R_s / 4, .least = FOLLOW_STANDS};
 }
 
-void follow_again(follow_t *self)
+void follow_again(follow_t *self, int32_t least)
 {
-    *self = (follow_t){.R = self->R, .R_doubt = self->R_doubt};
+    *self = (follow_t){.R = self->R, .R_doubt = self->R_doubt, .least = least};
 }
 
 void follow_resume(follow_t *self)
 {
-    follow_again(self);
+    follow_again(self, FOLLOW_STANDS);
     self->follows = true;
 }
 
@@ -57,16 +58,22 @@ bool follow_slow(follow_t *self, const pm_machine_t *machine, const follow_in_t 
     (void)pm_lp1(&self->along, in->v.d - pm_mul(self->R, in->i), K_MEAN);
     (void)pm_lp1(&self->across, in->v.q - pm_mul(reactance, in->i), K_MEAN);
     self->emf = pm_mul(pm_abs(in->omega), m->psi_m);
-    self->turned = PM_HAS(load_current) ? pm_min(self->turned + in->turn, FOLLOW_STANDS) : 0;
+    if (PM_HAS(load_current)) {
+        self->turned = pm_min(self->turned + in->turn, self->least);
+    }
     if (self->emf / 2 <= pm_mul(self->R_doubt, in->i) + in->v_dc / 512) {
         self->emf = 0;
         self->ms = 0;
+        if (PM_HAS(load_current)) {
+            self->follows_ms = 0;
+            self->follows = false;
+        }
         return false;
     }
     if (!is_seen(self, in->omega)) {
-        self->follows_ms = 0;
+        self->follows_ms = PM_HAS(load_current) ? 0U : self->follows_ms;
         self->ms = (uint16_t)pm_min(self->ms + 1, FOLLOW_STANDS_MS);
-        return self->ms == FOLLOW_STANDS_MS && self->turned >= FOLLOW_STANDS;
+        return self->ms == FOLLOW_STANDS_MS && (!PM_HAS(load_current) || self->turned >= self->least);
     }
     self->ms = (uint16_t)pm_max(self->ms - 2, 0);
     if (!PM_HAS(load_current)) {
@@ -78,10 +85,16 @@ bool follow_slow(follow_t *self, const pm_machine_t *machine, const follow_in_t 
     return false;
 }
 
+pm_angle_t follow_lag(const follow_t *self, pm_q_t omega)
+{
+    const bool back = omega < 0;
+    return pm_atan2(back ? -self->along : self->along, back ? -self->across : self->across);
+}
+
 int32_t follow_load(const follow_t *self)
 {
     const pm_q_t along = pm_abs(self->along);
-    if (self->emf == 0 || !self->follows) {
+    if (self->follows_ms == 0U || !self->follows) { /* stands, or is not seen */
         return 0;
     }
     if (along > pm_mul(self->emf, PM_Q(0.65))) {

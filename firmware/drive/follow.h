@@ -30,7 +30,8 @@ extern "C" {
 #endif
 
 /* For how long it must stand, twice what spoke for a rotor that follows taken off, and how far the vector must turn meanwhile:
- * friction F holds a rotor for 2 asin(F / i). Images without load_current wait for a longer time alone. */
+ * friction F holds a rotor for 2 asin(F / i), and one that did not move in the
+ * align until the vector comes round. Images without load_current wait for a longer time alone. */
 #define FOLLOW_STANDS_MS (PM_HAS(load_current) ? 60 : 300)
 #define FOLLOW_TURN      65536
 #define FOLLOW_STANDS    (PM_HAS(load_current) ? FOLLOW_TURN / 3 : 0)
@@ -50,16 +51,17 @@ typedef struct {
     pm_q_t R, R_doubt;
     pm_q_t along, across; /* filtered; at rest: v_d */
     pm_q_t emf;           /* |omega| psi_m where it says something, else 0 */
-    int32_t turned;       /* by the vector since the rotor was seen to follow */
+    int32_t turned;       /* by the vector since the rotor was seen to follow, ... */
+    int32_t least;        /* ... and what it must, of FOLLOW_TURN */
     uint16_t ms;          /* that it stands, or has rested */
     uint8_t follows_ms;
-    bool follows; /* has been seen to, or was under control */
+    bool follows; /* has been seen to since the vector stood */
 } follow_t;
 
 void follow_reset(follow_t *self, const pm_machine_t *machine);
 
-/* The vector begins anew: from standstill, or from the angle of a rotor that turns. R stays. */
-void follow_again(follow_t *self);
+/* The vector begins anew: from standstill with a rotor that may be anywhere, or from the angle of one that turns. R stays. */
+void follow_again(follow_t *self, int32_t least);
 void follow_resume(follow_t *self);
 
 /* A millisecond with vector and rotor at rest, and the end of the rest. */
@@ -68,6 +70,9 @@ void follow_rested(follow_t *self, const pm_machine_t *machine, pm_q_t i, pm_q_t
 
 /* True: the rotor does not follow. */
 bool follow_slow(follow_t *self, const pm_machine_t *machine, const follow_in_t *in);
+
+/* By how much the rotor is behind a vector that turns at omega, delta of above. */
+pm_angle_t follow_lag(const follow_t *self, pm_q_t omega);
 
 /* 1: the load asks for more current; -1: for less; 0 neither, or not known. */
 int32_t follow_load(const follow_t *self);

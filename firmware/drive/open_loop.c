@@ -44,7 +44,7 @@ void open_loop_start(drive_t *drive)
 static pm_dq_t with_margin(const drive_t *drive, pm_dq_t i)
 {
     const drive_config_t *c = &drive->config;
-    const pm_q_t wanted = pm_max(c->open_loop.i, pm_abs(i.q) + pm_abs(i.q) / 2);
+    const pm_q_t wanted = pm_max(c->open_loop.i, 2 * pm_abs(i.q) + c->open_loop.i / 2);
     const pm_q_t length = pm_min(wanted, pm_max(c->i_max, pm_abs(i.q)));
     return (pm_dq_t){.d = pm_sqrt(pm_mul(length, length) - pm_mul(i.q, i.q)), .q = i.q};
 }
@@ -83,6 +83,15 @@ static void hand_over(drive_t *drive)
     drive->i_open = i.alpha;
     drive->position.carrier = drive_injects(drive); /* at lower speeds */
     drive->stage = STAGE_VECTOR;
+}
+
+void open_loop_release(drive_t *drive)
+{
+    const position_config_t *c = &drive->config.position;
+    if (PM_HAS(load_current) && drive->follow.follows) {
+        position_turn(&drive->position, c, 0U - follow_lag(&drive->follow, drive->omega_ramp), drive->i_ab);
+        position_set_resistance(&drive->position, c, drive->follow.R);
+    }
 }
 
 static pm_q_t approach(pm_q_t x, pm_q_t target, pm_q_t step)
@@ -137,9 +146,7 @@ static pm_q_t emf_of_speed(const drive_t *drive)
     if (!PM_HAS(load_current) || !is_fast(drive) || !f->follows) {
         return e.alpha;
     }
-    const bool back = drive->omega_ramp < 0;
-    const pm_angle_t lag = pm_atan2(back ? -f->along : f->along, back ? -f->across : f->across);
-    return pm_park(e, pm_dir(lag)).d;
+    return pm_park(e, pm_dir(follow_lag(f, drive->omega_ramp))).d;
 }
 
 /* A rotor on a vector of constant current swings undamped: the vector falls behind one that is too fast and runs ahead of
@@ -184,7 +191,7 @@ static void try_again(drive_t *drive)
     drive->omega_ramp = 0;
     drive->rest_ms = REST_MS;
     drive->wait_ms = 0;
-    follow_again(&drive->follow);
+    follow_again(&drive->follow, FOLLOW_TURN);
 }
 
 /* The current follows the load, where that shows. */

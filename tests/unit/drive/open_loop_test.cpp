@@ -334,8 +334,8 @@ TEST(OpenLoop, CurrentFollowsTheLoad)
     }
 }
 
-// Back below omega_low: the imposed vector makes the torque that there was, with half as much again of current as it takes, or
-// i_open_loop (0.2) if that is more, at most i_max (0.5).
+// Back below omega_low: the imposed vector makes the torque that there was, with twice the current that it takes and half of
+// i_open_loop (0.2), at least i_open_loop, at most i_max (0.5).
 TEST(OpenLoop, ResumeKeepsTorqueAndVoltage)
 {
     for (const Complex i : {Complex{-0.05, 0.2}, Complex{0.1, -0.15}, Complex{0, 0.01}, Complex{0, 0.45}}) {
@@ -352,7 +352,7 @@ TEST(OpenLoop, ResumeKeepsTorqueAndVoltage)
         const Complex wanted = real(x.d.i_open) * std::polar(1.0, frame - rotor);
         EXPECT_NEAR(wanted.imag(), i.imag(), kVector);
         EXPECT_GT(wanted.real(), 0);
-        EXPECT_NEAR(real(x.d.i_open), std::clamp(1.5 * std::abs(i.imag()), 0.2, 0.5), kVector);
+        EXPECT_NEAR(real(x.d.i_open), std::clamp(2 * std::abs(i.imag()) + 0.1, 0.2, 0.5), kVector);
         const Complex u = Complex{-0.03, 0.08} * std::polar(1.0, rotor - frame);
         const pm_dq_t present = bench::dq(i * std::polar(1.0, rotor - frame));
         EXPECT_NEAR(std::abs(next_voltage(x.d, present, x.d.omega_ramp) - u), 0, kVector);

@@ -241,7 +241,7 @@ ENTRIES = (
  'flux linkage'), "3.2.2 #22"),
     Entry(0x2300, 6, "speed_low", "position", "i32", "live", "rad/s", -3, 0, 10, 5000000, 21000, False, True, "application", "none", {}, 'below: injection alone', "5.9 #69"),
     Entry(0x2300, 7, "speed_high", "position", "i32", "live", "rad/s", -3, 0, 20, 10000000, 40000, False, True, "application", "none", {}, 'above: flux observer alone', "5.9 #69"),
-    Entry(0x2300, 8, "i_open_loop", "position", "i32", "live", "A", -3, 0, 20, 1000000, 2000, False, True, "application", "none", {}, 'current of align and open-loop start', ""),
+    Entry(0x2300, 8, "i_open_loop", "position", "i32", "live", "A", -3, 0, 20, 1000000, 2000, False, True, "application", "none", {}, 'current of align and open-loop start, up to i_max where the load asks for it', ""),
     Entry(0x2300, 9, "t_align", "position", "i32", "live", "s", -3, 0, 10, 10000, 300, False, True, "application", "none", {}, 'time to align in the open-loop start', ""),
     Entry(0x2300, 10, "open_loop_acceleration", "position", "i32", "live", "rad/s2", -3, 0, 10, 100000000, 50000, False, True, "application", "none", {}, 'acceleration of the open-loop start', ""),
     Entry(0x2300, 11, "observer", "position", "i32", "live", "1", 0, 0, 0, 10, 0, False, True, "application", "none", {0: 'active flux', 1: 'back-EMF (round machines)', 2: 'extended EMF, estimated frame', 3: 'extended EMF, stationary frame', 4: 'flux linkage (round machines)', 5: 'sliding mode', 6: 'Kalman filter of full order', 7: 'Kalman filter of reduced order', 8: 'model reference, current model', 9: 'model reference, voltage model', 10: 'model reference, simplified voltage model'}, 'fundamental-model observer: leads above speed_high', "2.3.3 #17"),
@@ -306,7 +306,8 @@ ENTRIES = (
     Entry(0x2600, 6, "temp_trip", "protections", "i32", "locked", "degC", -1, 0, 0, 2000, 1100, False, True, "application", "none", {}, 'over-temperature fault', ""),
     Entry(0x2600, 7, "offset_max", "protections", "i32", "locked", "A", -3, 0, 1, 100000, 300, False, True, "application", "none", {}, 'largest accepted offset of a current sensor', ""),
     Entry(0x2600, 8, "speed_trip", "protections", "i32", "locked", "rad/s", -3, 0, 1000, 20000000, 180000, False, True, "application", "none", {}, 'over-speed fault', ""),
-    Entry(0x2600, 9, "t_stall", "protections", "i32", "locked", "s", -3, 0, 50, 60000, 1000, False, True, "application", "none", {}, 'stall fault: time at the current limit without turning', ""),
+    Entry(0x2600, 9, "t_stall", "protections", "i32", "locked", "s", -3, 0, 50, 60000, 1000, False, True, "application", "none", {}, ('stall fault: time with three quarters of rated current, or its torque, '
+ 'without turning'), ""),
     Entry(0x2600, 10, "t_lost", "protections", "i32", "locked", "s", -3, 0, 1, 1000, 30, False, True, "application", "none", {}, 'position lost: time with the quality below its limit', ""),
     Entry(0x2600, 11, "t_winding", "protections", "i32", "locked", "s", 0, 0, 1, 2000, 60, False, True, "application", "none", {}, 'overload: thermal time constant of the windings, which bear i_rated for good', ""),
     Entry(0x2600, 12, "fault_short", "protections", "i32", "locked", "1", 0, 0, 0, 1, 0, False, True, "application", "none", {0: 'every fault opens the bridge', 1: 'low switches on while the EMF exceeds v_dc'}, ('what follows a fault in field weakening; 1 needs i_trip above the '
