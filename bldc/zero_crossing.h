@@ -30,8 +30,8 @@
  * comparator delays is taken off by the commutation.
  *
  * Instants are counts of the carrier's timer that go on from period to period and wrap after 2^32. Voltages in Q28
- * per-unit. Error of the instant: (t_2 - t_1) 2^-15 and a count of 2. zero_crossing_step(): 40 instructions, 70 and a
- * division where it finds a crossing, 110 and two where it is a late one. Once a sample.
+ * per-unit. Error of the instant: (t_2 - t_1) 2^-15 and a count of 2. zero_crossing_step(): 60 instructions, 78 with
+ * a division where it finds a crossing, 50 and a division more where that is a late one. Once a sample.
  * Tests: tests/unit/bldc/zero_crossing_test.cpp, six_step_test.cpp. */
 #ifndef BLDC_ZERO_CROSSING_H
 #define BLDC_ZERO_CROSSING_H
