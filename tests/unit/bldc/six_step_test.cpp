@@ -295,6 +295,23 @@ TEST(SixStep, ThresholdsRaiseTorquePerAmpere)
     EXPECT_LE(gain, 1.1);
 }
 
+// Demagnetisation beyond 30 degrees: each crossing is behind it, and found by the late rule (10.2.3).
+TEST(SixStep, SurvivesFreewheelingBeyondTheCrossing)
+{
+    const double omega = electrical(hs(), 40e3), R = hs().plant.machine.R_s_ohm,
+                 L = hs().plant.machine.L_d0_H;
+    Rig r(hs(), {}, omega);
+    r.measure(60, 40, 0.9);
+    const double x_V = 0.9 * 24 + 1.5 * hs().peak_Vs() * omega; // of 10.5.1.1, the faster of the two decays
+    EXPECT_GT(omega * L / R * std::log1p(3 * R * r.conducted_A() / x_V), 30 * kDegree);
+    expect_locked(r, kRms, kMost);
+    // Twin: none is believed.
+    Rig twin(hs(), {}, omega);
+    twin.config.crossing.swing = 1000;
+    twin.measure(60, 40, 0.9);
+    EXPECT_TRUE(twin.six_step.lost);
+}
+
 // Free rotor, its load stepped from a half to one and a half times and back.
 TEST(SixStep, LoadStepsKeepSynchronism)
 {
