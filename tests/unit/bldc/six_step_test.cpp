@@ -131,6 +131,25 @@ TEST(SixStep, TheCarrierDoesNotLockTheCommutation)
     EXPECT_GE(twin, 10);
 }
 
+// Two periods in a sector, by a machine wound for that speed.
+TEST(SixStep, TwoHundredThousandElectricalRpmAt40kHz)
+{
+    for (const bool reverse : {false, true}) {
+        for (const double rpm : {195e3, 200e3, 203e3}) {
+            Machine m = hs();
+            m.plant.machine.psi_m_Wb /= 2.5;
+            m.plant.machine.L_d0_H /= 2.5;
+            m.plant.machine.L_q0_H /= 2.5;
+            Options o;
+            o.reverse = reverse;
+            Rig r(m, o, electrical(m, rpm));
+            r.measure(100, 100, 0.85);
+            SCOPED_TRACE(rpm);
+            expect_locked(r, kRatioRms, 3 * kRatioRms);
+        }
+    }
+}
+
 // Each of the five carries the machine; ideal EMF, so the crossings are those of the rotor.
 TEST(SixStep, FivePatternsAtBothFreewheelings)
 {
