@@ -20,6 +20,7 @@
  * Freewheeling: until the current of the leg that has gone is zero its diode holds the terminal at the rail beyond the
  * crossing (the upper one in even sectors). Samples within `rail` of that rail are passed over until one shows that the
  * crossing is still to come. Before, `blank` counts after the commutation nothing is looked at: dead time and ringing.
+ * A braking current holds it at the other rail, where no on-time sample of an EMF can be: passed over too.
  * Behind it the terminal swings to its EMF with the capacitance of the leg. So a sample that is past the crossing without
  * one ahead of it counts where the crossing is due by then, or where the next one says the same; not further past
  * than 5/8 of the swing, where no rotor in this sector can be.

@@ -380,6 +380,37 @@ TEST(SixStep, FastThrottleKeepsSynchronism)
     }
 }
 
+// The same between 30 and 98 % with a limit of 30 A for driving and braking, while thresholds are learnt.
+TEST(SixStep, ThrottleWithinACurrentLimitIsFollowedWithinADegree)
+{
+    for (const bool complementary : {false, true}) {
+        Options o;
+        o.complementary = complementary;
+        o.k_V = o.k_H = 0.02;
+        Rig r(hs(), o, electrical(hs(), 15e3));
+        const auto run = [&r](double time_s, double from, double to) {
+            for (double t_s = 0; t_s < time_s; t_s += 25e-6) {
+                const double back = duty(r.machine, r.omega_e(), 0), limit = 2 * 0.025 * 30.0 / 24;
+                const double u = from + (to - from) * t_s / time_s;
+                r.period(std::min(
+                    0.98, std::max(back - limit, std::min(u, back + limit + 0.08)))); // 0.08: dead time
+            }
+        };
+        run(5e-3, 0.3, 0.3);
+        r.release();
+        run(20e-3, 0.3, 0.3);
+        r.clear();
+        for (int n = 0; n < 2; ++n) {
+            run(50e-3, 0.3, 0.98);
+            run(30e-3, 0.98, 0.98);
+            run(50e-3, 0.98, 0.3);
+            run(100e-3, 0.3, 0.3);
+        }
+        EXPECT_FALSE(r.six_step.lost);
+        EXPECT_LE(r.commutations.most, 1);
+    }
+}
+
 // A rotor that stops at once, or is another 180 degrees on: all legs off within a few sectors.
 TEST(SixStep, LostSynchronismOpensTheBridge)
 {
