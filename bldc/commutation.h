@@ -17,7 +17,7 @@
  * Speed: omega = turn_base / (sum of six intervals), per-unit, mean over the last turn: under a ramp it is that of
  * half a turn ago. Instants and times in counts as in zero_crossing.h; a sector takes less than 2^27 counts.
  *
- * commutation_crossed(): 45 instructions, once a crossing; commutation_due(): 15; commutation_speed(): one division.
+ * commutation_crossed(): 50 instructions; commutation_due(): 25; commutation_speed(): 40.
  * Tests: tests/unit/bldc/commutation_test.cpp, six_step_test.cpp. */
 #ifndef BLDC_COMMUTATION_H
 #define BLDC_COMMUTATION_H

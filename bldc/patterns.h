@@ -20,8 +20,7 @@
  *   late in the off time   both are at one rail, where the on time is shorter than `least`
  *
  * The duties are those that each leg needs in this sector or, open, in the next: to commutate only states change.
- * pattern_duties(): 25 instructions; pattern_states(), at a
- * commutation: 45; pattern_sample(): 37.
+ * pattern_duties(): 20 instructions; pattern_states(), at a commutation: 44; pattern_sample(): 37.
  * Tests: tests/unit/bldc/patterns_test.cpp. */
 #ifndef BLDC_PATTERNS_H
 #define BLDC_PATTERNS_H

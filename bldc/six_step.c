@@ -1,5 +1,9 @@
 #include "bldc/six_step.h"
 
+#include "firmware/math/root.h"
+
+#define SIXTH PM_TURN(1.0 / 6)
+
 /* What is expected of the next sector. */
 static void follow(six_step_t *self)
 {
@@ -13,17 +17,23 @@ static void open(six_step_t *self, uint32_t sector, uint32_t since)
     self->expected.threshold = thresholds_at(&self->thresholds, sector, self->reverse);
 }
 
-void six_step_reset(six_step_t *self, const six_step_config_t *config, bool reverse, uint32_t sector,
-                    uint32_t crossing, uint32_t t_60, uint32_t now)
+void six_step_reset(six_step_t *self, const six_step_config_t *config, pm_angle_t theta, pm_q_t omega,
+                    uint32_t now)
 {
-    self->reverse = reverse;
+    self->reverse = omega < 0;
     self->lost = false;
-    commutation_reset(&self->commutation, sector, crossing, t_60);
+    self->learn = false;
+    /* Sectors from one crossing to the next: the rotor is in the latter half of `sector` or in the first of the next. */
+    const pm_angle_t from = (self->reverse ? 0U - theta : theta) - SIXTH;
+    const uint32_t sector = (uint32_t)pm_min((int32_t)(from / SIXTH), (int32_t)SECTORS - 1);
+    const int32_t turn = pm_div((pm_q_t)config->commutation.turn_base, pm_max(pm_abs(omega), 1));
+    const uint32_t since = (uint32_t)pm_mulh((int32_t)(from - sector * SIXTH), turn);
+    commutation_reset(&self->commutation, sector, now - since, (uint32_t)pm_frac(turn, PM_FRAC(1.0 / 6)));
     follow(self);
-    open(self, sector, crossing);
+    open(self, sector, now - since);
     self->crossing.found = true;
     self->commutated = now;
-    self->legs = pattern_states(&config->pattern, sector, reverse);
+    self->legs = pattern_states(&config->pattern, sector, self->reverse);
     const six_step_plan_t none = {.sector = (uint8_t)sector};
     self->plan[0] = none;
     self->plan[1] = none;

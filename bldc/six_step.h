@@ -8,14 +8,14 @@
  *   sample_at       where all terminals and the DC link are to be sampled
  * Instants are counts from the start of the period. `now` is the count at t_k; it goes on by 2 N a period and wraps.
  *
- * Start: six_step_reset() with a rotor that is known to turn. Then
- *   LOCKED     at once; commutation follows crossings
- *   LOST       commutation.h; all legs are off from the next call on, until the next reset
+ * Start: six_step_reset() with the angle and speed of a rotor that turns, from a drive with field orientation, an open
+ * loop or a rotor that was caught; 20 degrees and 10 % of the speed may be missing. After COMMUTATION_LOST
+ * (commutation.h) `lost` is set and all legs are off from the next call on, until the next reset.
  *
  * six_step_step(), instructions on Cortex-M4 with five periods in a sector:
- *   without a crossing             213 on average, at most 271
- *   with one                       335             352
- *   after one, thresholds learnt   303             397, where it commutates too
+ *   without a crossing             218 on average, at most 277
+ *   with one                       340             356
+ *   after one, thresholds learnt   304             398, where it commutates too
  * Tests: tests/target/bldc, tests/unit/bldc/six_step_test.cpp. */
 #ifndef BLDC_SIX_STEP_H
 #define BLDC_SIX_STEP_H
@@ -70,9 +70,10 @@ typedef struct {
     bool lost;
 } six_step_t;
 
-/* Rotor in `sector` with its crossing at `crossing`, t_60 counts for each; thresholds are kept. */
-void six_step_reset(six_step_t *self, const six_step_config_t *config, bool reverse, uint32_t sector,
-                    uint32_t crossing, uint32_t t_60, uint32_t now);
+/* theta at `now`; omega: electrical, per-unit, negative for the other direction; six sectors take less than 2^29 counts.
+ * Thresholds are kept. */
+void six_step_reset(six_step_t *self, const six_step_config_t *config, pm_angle_t theta, pm_q_t omega,
+                    uint32_t now);
 
 void six_step_step(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in,
                    six_step_out_t *out);

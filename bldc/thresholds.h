@@ -14,8 +14,8 @@
  * with swing of zero_crossing.h, so that k_V and k_H are the share of a deviation that is taken off in a turn: 0.05
  * settles within 100 turns. Horizontal deviations show by their differences only: their mean is taken as zero.
  *
- * Q28 per-unit; each value is held within +-most. thresholds_learn(): 60 instructions with a short division,
- * after a crossing if all six of the last turn are good. thresholds_at(): 8.
+ * Q28 per-unit; each value is held within +-most. thresholds_learn(): 76 instructions with a division,
+ * after a crossing if all six of the last turn are good. thresholds_at(): 17.
  * Tests: tests/unit/bldc/thresholds_test.cpp, six_step_test.cpp. */
 #ifndef BLDC_THRESHOLDS_H
 #define BLDC_THRESHOLDS_H

@@ -76,10 +76,10 @@ bool zero_crossing_step(zero_crossing_t *self, const zero_crossing_config_t *con
     const pm_q_t v = in->v[self->leg];
     const bool low = v <= config->rail, high = v >= in->v_dc - config->rail;
     const bool past = rising ? high : low;
-    if (past && !self->ahead) {
-        return false; /* freewheeling */
-    }
     const bool cut = rising ? low : high;
+    if ((past && !self->ahead) || (cut && when.legs == ZERO_LEGS_APART)) {
+        return false; /* freewheeling, of a braking current at the other rail */
+    }
     const pm_q_t difference = against_reference(config, in, when.legs, v);
     const pm_q_t y = (rising ? difference : -difference) - expected->threshold;
     if (y < 0 || cut) {

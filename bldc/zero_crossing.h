@@ -20,6 +20,7 @@
  * Freewheeling: until the current of the leg that has gone is zero its diode holds the terminal at the rail beyond the
  * crossing (the upper one in even sectors). Samples within `rail` of that rail are passed over until one shows that the
  * crossing is still to come. Before, `blank` counts after the commutation nothing is looked at: dead time and ringing.
+ * A braking current holds it at the other rail, where no on-time sample of an EMF can be: passed over too.
  * Behind it the terminal swings to its EMF with the capacitance of the leg. So a sample that is past the crossing without
  * one ahead of it counts where the crossing is due by then, or where the next one says the same; not further past
  * than 5/8 of the swing, where no rotor in this sector can be.
@@ -30,8 +31,8 @@
  * comparator delays is taken off by the commutation.
  *
  * Instants are counts of the carrier's timer that go on from period to period and wrap after 2^32. Voltages in Q28
- * per-unit. Error of the instant: (t_2 - t_1) 2^-15 and a count of 2. zero_crossing_step(): 40 instructions, 70 and a
- * division where it finds a crossing, 110 and two where it is a late one. Once a sample.
+ * per-unit. Error of the instant: (t_2 - t_1) 2^-15 and a count of 2. zero_crossing_step(): 60 instructions, 78 with
+ * a division where it finds a crossing, 50 and a division more where that is a late one. Once a sample.
  * Tests: tests/unit/bldc/zero_crossing_test.cpp, six_step_test.cpp. */
 #ifndef BLDC_ZERO_CROSSING_H
 #define BLDC_ZERO_CROSSING_H

@@ -56,7 +56,7 @@ int main(void)
     static six_step_t self, ahead;
     static six_step_in_t in;
     six_step_out_t out;
-    six_step_reset(&self, &config, false, 5, 0U - T_60 / 2U, T_60, 0);
+    six_step_reset(&self, &config, PM_TURN(1.0 / 12), PM_ONE, 0);
     in.u = PM_Q(0.85);
     for (uint32_t k = 0; k < 3000; k++) {
         in.now = k * PERIOD;

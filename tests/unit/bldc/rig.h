@@ -177,21 +177,20 @@ class Rig
 {
   public:
     // The rotor turns at omega_e already; the drive is told its angle and speed with errors.
-    Rig(const Machine &m, const Options &o, double omega_e_rad_s, double off_deg = 3, double off_speed = 1.03)
+    Rig(const Machine &m, const Options &o, double omega_e_rad_s, double off_deg = 3, double off_speed = 1.03,
+        double start_rad = 95 * kDegree)
         : machine(m), options(o), config(make(m, o)), period_s_(1 / m.plant.inverter.f_pwm_Hz),
           count_s_(0.5 * period_s_ / m.plant.inverter.timer_counts), sign_(o.reverse ? -1 : 1)
     {
         const char *error = nullptr;
-        const double start_rad = 95 * kDegree; // of the machine as it turns: in sector 1, behind commutation
         plant_.reset(plant_create(&machine.plant, sign_ * start_rad, &error));
         EXPECT_EQ(error, nullptr) << error;
         impose(omega_e_rad_s);
-        const double t_60 = kPi / 3 / omega_e_rad_s / count_s_;
-        const double behind = (35 + off_deg) / 60 * t_60; // since the crossing of sector 0, at 60
-        six_step_reset(&six_step, &config, o.reverse, 1, static_cast<uint32_t>(-std::lround(behind)),
-                       static_cast<uint32_t>(std::lround(t_60 * off_speed)), 0);
-        six_step.commutation.crossed = 0;
-        six_step.crossing.found = false;
+        const double theta_rad = std::remainder(sign_ * (start_rad + off_deg * kDegree), 2 * kPi);
+        six_step_reset(&six_step, &config,
+                       static_cast<pm_angle_t>(std::llround(std::ldexp(theta_rad / 2 / kPi, 32))),
+                       fixed(sign_ * off_speed * omega_e_rad_s / base_rad_s(machine), PM_Q_BITS), 0);
+        sector_ = next_sector_ = six_step.commutation.sector;
     }
 
     void impose(double omega_e_rad_s)
@@ -376,7 +375,7 @@ class Rig
     const double period_s_, count_s_, sign_;
     double turn_s_ = 0, torque_ = 0, current_ = 0;
     int periods_ = 0;
-    uint32_t now_ = 0, looked_ = 0, sector_ = 1, next_sector_ = 1;
+    uint32_t now_ = 0, looked_ = 0, sector_ = 0, next_sector_ = 0;
     bool sampled_ = false;
     plant_adc_t adc_ = {};
     six_step_out_t asked_ = {};

@@ -131,6 +131,25 @@ TEST(SixStep, TheCarrierDoesNotLockTheCommutation)
     EXPECT_GE(twin, 10);
 }
 
+// Two periods in a sector, by a machine wound for that speed.
+TEST(SixStep, TwoHundredThousandElectricalRpmAt40kHz)
+{
+    for (const bool reverse : {false, true}) {
+        for (const double rpm : {195e3, 200e3, 203e3}) {
+            Machine m = hs();
+            m.plant.machine.psi_m_Wb /= 2.5;
+            m.plant.machine.L_d0_H /= 2.5;
+            m.plant.machine.L_q0_H /= 2.5;
+            Options o;
+            o.reverse = reverse;
+            Rig r(m, o, electrical(m, rpm));
+            r.measure(100, 100, 0.85);
+            SCOPED_TRACE(rpm);
+            expect_locked(r, kRatioRms, 3 * kRatioRms);
+        }
+    }
+}
+
 // Each of the five carries the machine; ideal EMF, so the crossings are those of the rotor.
 TEST(SixStep, FivePatternsAtBothFreewheelings)
 {
@@ -295,6 +314,23 @@ TEST(SixStep, ThresholdsRaiseTorquePerAmpere)
     EXPECT_LE(gain, 1.1);
 }
 
+// Demagnetisation beyond 30 degrees: each crossing is behind it, and found by the late rule (10.2.3).
+TEST(SixStep, SurvivesFreewheelingBeyondTheCrossing)
+{
+    const double omega = electrical(hs(), 40e3), R = hs().plant.machine.R_s_ohm,
+                 L = hs().plant.machine.L_d0_H;
+    Rig r(hs(), {}, omega);
+    r.measure(60, 40, 0.9);
+    const double x_V = 0.9 * 24 + 1.5 * hs().peak_Vs() * omega; // of 10.5.1.1, the faster of the two decays
+    EXPECT_GT(omega * L / R * std::log1p(3 * R * r.conducted_A() / x_V), 30 * kDegree);
+    expect_locked(r, kRms, kMost);
+    // Twin: none is believed.
+    Rig twin(hs(), {}, omega);
+    twin.config.crossing.swing = 1000;
+    twin.measure(60, 40, 0.9);
+    EXPECT_TRUE(twin.six_step.lost);
+}
+
 // Free rotor, its load stepped from a half to one and a half times and back.
 TEST(SixStep, LoadStepsKeepSynchronism)
 {
@@ -344,6 +380,37 @@ TEST(SixStep, FastThrottleKeepsSynchronism)
     }
 }
 
+// The same between 30 and 98 % with a limit of 30 A for driving and braking, while thresholds are learnt.
+TEST(SixStep, ThrottleWithinACurrentLimitIsFollowedWithinADegree)
+{
+    for (const bool complementary : {false, true}) {
+        Options o;
+        o.complementary = complementary;
+        o.k_V = o.k_H = 0.02;
+        Rig r(hs(), o, electrical(hs(), 15e3));
+        const auto run = [&r](double time_s, double from, double to) {
+            for (double t_s = 0; t_s < time_s; t_s += 25e-6) {
+                const double back = duty(r.machine, r.omega_e(), 0), limit = 2 * 0.025 * 30.0 / 24;
+                const double u = from + (to - from) * t_s / time_s;
+                r.period(std::min(
+                    0.98, std::max(back - limit, std::min(u, back + limit + 0.08)))); // 0.08: dead time
+            }
+        };
+        run(5e-3, 0.3, 0.3);
+        r.release();
+        run(20e-3, 0.3, 0.3);
+        r.clear();
+        for (int n = 0; n < 2; ++n) {
+            run(50e-3, 0.3, 0.98);
+            run(30e-3, 0.98, 0.98);
+            run(50e-3, 0.98, 0.3);
+            run(100e-3, 0.3, 0.3);
+        }
+        EXPECT_FALSE(r.six_step.lost);
+        EXPECT_LE(r.commutations.most, 1);
+    }
+}
+
 // A rotor that stops at once, or is another 180 degrees on: all legs off within a few sectors.
 TEST(SixStep, LostSynchronismOpensTheBridge)
 {
@@ -358,16 +425,35 @@ TEST(SixStep, LostSynchronismOpensTheBridge)
     }
 }
 
-// The rotor is told up to 20 degrees and 10 % of its speed wrong.
+// From any angle, in both directions, told up to 20 degrees and 10 % of the speed wrong.
 TEST(SixStep, LocksOnFromAWrongStart)
 {
-    for (const double off_deg : {-20.0, 0.0, 20.0}) {
-        for (const double off_speed : {0.9, 1.1}) {
-            Rig r(hs(), {}, electrical(hs(), 40e3), off_deg, off_speed);
-            r.measure(10, 20, u_of(40e3));
-            EXPECT_FALSE(r.six_step.lost) << off_deg << ' ' << off_speed;
-            EXPECT_LE(r.commutations.rms(), kRms) << off_deg << ' ' << off_speed;
-        }
+    for (int n = 0; n < 24; ++n) {
+        Options o;
+        o.reverse = n % 2 == 1;
+        const double off_deg = 20.0 * (n / 2 % 3 - 1), off_speed = n / 6 % 2 == 0 ? 0.9 : 1.1;
+        Rig r(hs(), o, electrical(hs(), 40e3), off_deg, off_speed, (7 + 15 * n) * kDegree);
+        r.measure(10, 20, u_of(40e3));
+        SCOPED_TRACE(n);
+        expect_locked(r, kRms, kMost);
+    }
+}
+
+// What it is told is where it commutates: without any crossing yet.
+TEST(SixStep, FirstCommutationFollowsFromTheAngleToldAtTheStart)
+{
+    for (int n = 0; n < 24; ++n) {
+        const double theta_deg = 15 * n + 4;
+        const six_step_config_t config = make(hs(), {});
+        six_step_t s = {};
+        six_step_reset(&s, &config, static_cast<pm_angle_t>(std::llround(std::ldexp(theta_deg / 360, 32))),
+                       PM_ONE, 1000000U);
+        const double t_60 = config.commutation.turn_base / 6.0;
+        const double due_deg =
+            (static_cast<double>(commutation_due(&s.commutation, &config.commutation)) - 1e6) / t_60 * 60;
+        const double commutation_deg = 90 + 60 * s.commutation.sector; // out of it
+        EXPECT_NEAR(std::remainder(theta_deg + due_deg - commutation_deg, 360), 0, 0.01) << n;
+        EXPECT_LT(std::abs(due_deg), 30.1) << n; // the crossing was less than 60 degrees ago
     }
 }
 

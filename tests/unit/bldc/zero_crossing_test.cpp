@@ -227,6 +227,22 @@ TEST(ZeroCrossing, PassesOverFreewheelingAndBlanking)
     EXPECT_TRUE(b.self.ahead);
 }
 
+// The current of a machine that brakes freewheels at the other rail: nothing is known of the crossing.
+TEST(ZeroCrossing, PassesOverFreewheelingOfABrakingCurrent)
+{
+    for (uint32_t sector = 0; sector < 2; ++sector) {
+        Bench b;
+        b.sector = sector;
+        b.open();
+        for (double at = -29000; at < 10000; at += kSpacing) {
+            EXPECT_FALSE(b.step(b.terminal(at, sector == 0 ? 0 : kV_dc + 0.8)));
+            EXPECT_FALSE(b.self.ahead);
+        }
+        EXPECT_TRUE(b.step(b.sample(12000)));
+        EXPECT_LT(std::abs(degrees(static_cast<int32_t>(b.self.at))), 0.3);
+    }
+}
+
 // Off time: the rail cuts one side of the EMF; the distance of the sample on the other side counts (10.3.2).
 TEST(ZeroCrossing, OffTimeSamplesOfWhichARailCutsHalf)
 {
