@@ -336,11 +336,21 @@ TEST(Polarity, AnOpenMotorIsRefusedByEach)
         drive_params_t p = direct::params(1);
         p.position_find = 1;
         p.polarity = polarity;
+        p.start_fallback = 0;
         direct::Drive x(p);
         x.enable(true);
         x.run_ms(400);
         EXPECT_EQ(x.fault(), DRIVE_FAULT_POSITION_NOT_FOUND);
         EXPECT_EQ(drive_status(&x.d)->refusal.procedure, PROCEDURE_lock);
+
+        // to the lock it looks like a round one: the open loop that the fall-back leads to ends in a fault, too
+        p.start_fallback = 1;
+        direct::Drive y(p);
+        y.command.speed_mrad_s = 60000;
+        y.enable(true);
+        y.run_ms(4000);
+        EXPECT_NE(y.fault(), DRIVE_FAULT_NONE);
+        EXPECT_EQ(drive_status(&y.d)->refusal.reason, PM_FAILED_SALIENCY);
     }
 }
 
