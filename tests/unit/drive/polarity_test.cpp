@@ -416,6 +416,7 @@ TEST(Polarity, AnOpenMotorIsRefusedByEach)
         drive_params_t p = direct::params(1);
         p.position_find = 1;
         p.polarity = polarity;
+        p.start_fallback = 0;
         direct::Drive x(p);
         x.enable(true);
         x.run_ms(400);
