@@ -19,6 +19,7 @@ from dictionary.source import SourceError  # noqa: E402
 
 GOOD = (ROOT / generate.SOURCE).read_text(encoding="utf-8")
 LIST = "observers/observers.def"
+PROCEDURES = "firmware/drive/procedures/procedures.def"
 PART = "observers/sliding_mode.yaml"
 POLE_PAIRS = '{sub: 1, name: pole_pairs, unit: "1", exp10: 0, range: [1, 50], preset: 3, help: pole pairs}'
 
@@ -31,7 +32,7 @@ class Project:
         self.root = Path(self.folder.name)
         headers = [path.relative_to(ROOT).as_posix()
                    for folder in ("observers", "injection", "firmware/control") for path in sorted(ROOT.glob(f"{folder}/*.[hd]*"))]
-        for path in (generate.SOURCE, generate.FAULTS, generate.LEDGER, LIST, methods.OPTIONS, *headers, *generate.parts(ROOT)):
+        for path in (generate.SOURCE, generate.FAULTS, generate.LEDGER, LIST, PROCEDURES, methods.OPTIONS, *headers, *generate.parts(ROOT)):
             (self.root / path).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / path, self.root / path)
         return self
