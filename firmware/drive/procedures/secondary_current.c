@@ -42,10 +42,10 @@ static pm_q_t alike(pm_q_t y, pm_q_t x)
     return pm_max(x > 0 ? y : -y, 0);
 }
 
-/* Of what is beside, that which saturation does not make: all with the sign of x, else beyond a quarter of x. */
+/* Of what is beside, that which saturation does not make: all with the sign of x, else beyond half of x. */
 static pm_q_t strange(pm_q_t y, pm_q_t x)
 {
-    return pm_max(alike(y, x), pm_abs(y) - pm_abs(x) / 4);
+    return pm_max(alike(y, x), pm_abs(y) - pm_abs(x) / 2);
 }
 
 /* What the inverter may have made of it. */
