@@ -1,5 +1,6 @@
 #include "injection/polarity.h"
 
+#include "firmware/math/num.h"
 #include "firmware/math/root.h"
 
 #define MOST PM_Q(0.125)
@@ -14,7 +15,7 @@ void polarity_add(polarity_mean_t *self, pm_q_t x)
 
 pm_q_t polarity_mean(const polarity_mean_t *self)
 {
-    return self->count == 0U ? 0 : (pm_q_t)(self->sum / (int32_t)self->count);
+    return self->count == 0U ? 0 : (pm_q_t)pm_quotient(self->sum, self->count);
 }
 
 /* Root of an integer below 2^60. */
@@ -35,7 +36,7 @@ pm_q_t polarity_noise(const polarity_mean_t *self)
         return 0;
     }
     const int32_t count = (int32_t)self->count;
-    const int64_t mean = self->sum / count;
+    const int64_t mean = pm_quotient(self->sum, count);
     const int64_t spread = self->square - mean * self->sum;
     return spread <= 0 ? 0 : root(spread) / count;
 }

@@ -1,5 +1,6 @@
 #include "injection/three_phase_hf.h"
 
+#include "firmware/math/num.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
 
@@ -128,8 +129,8 @@ static complex_t phasors(const three_phase_hf_t *self, const three_phase_hf_conf
     pm_ab_t positive = {0, 0};
     for (uint32_t x = 0; x < PULSES_AXES; x++) {
         const int32_t count = (int32_t)config->block * config->wanted;
-        q[x].re = (pm_q_t)(2 * self->cosine[x] / count); /* Q27 to Q28 */
-        q[x].im = (pm_q_t)(-2 * self->sine[x] / count);
+        q[x].re = (pm_q_t)pm_quotient(2 * self->cosine[x], count); /* Q27 to Q28 */
+        q[x].im = (pm_q_t)pm_quotient(-2 * self->sine[x], count);
         const pm_ab_t turned = pm_park_inverse((pm_dq_t){q[x].re / 3, q[x].im / 3}, pm_dir(pulses_axis[x]));
         positive.alpha += turned.alpha;
         positive.beta += turned.beta;

@@ -1,5 +1,6 @@
 /* Parameters that are the board's to say. */
 #include "firmware/app/app_parts.h"
+#include "firmware/math/num.h"
 
 static void take(int32_t *parameter, int32_t value)
 {
@@ -78,12 +79,12 @@ static const wound_t wound[] = {
     {DRIVE_PARAM_comp_zone, OF_CURRENT},
 };
 
-static void scale(int64_t *value, int64_t *by, int32_t power, int32_t now, int32_t preset)
+static int32_t scaled(int32_t value, int32_t power, int32_t now, int32_t preset)
 {
-    if (power != 0) {
-        *value *= power > 0 ? now : preset;
-        *by *= power > 0 ? preset : now;
+    if (power == 0) {
+        return value;
     }
+    return (int32_t)pm_quotient((int64_t)value * (power > 0 ? now : preset), power > 0 ? preset : now);
 }
 
 void app_preset(const hal_t *hal, drive_params_t *params)
@@ -93,10 +94,8 @@ void app_preset(const hal_t *hal, drive_params_t *params)
     const int32_t i = params->i_full_scale;
     app_take_board(hal, params);
     for (uint32_t n = 0; n < sizeof wound / sizeof wound[0]; n++) {
-        int64_t value = drive_param_get(params, wound[n].id);
-        int64_t by = 1;
-        scale(&value, &by, wound[n].of.v, params->v_full_scale, v);
-        scale(&value, &by, wound[n].of.i, params->i_full_scale, i);
-        drive_param_set(params, wound[n].id, (int32_t)(value / by));
+        const int32_t of_voltage =
+            scaled(drive_param_get(params, wound[n].id), wound[n].of.v, params->v_full_scale, v);
+        drive_param_set(params, wound[n].id, scaled(of_voltage, wound[n].of.i, params->i_full_scale, i));
     }
 }

@@ -121,10 +121,10 @@ void Bench::running()
     boot();
     run_ms(5);
     for (int n = 0; n < 20 && watched()->drive.state != DRIVE_RUNNING; n++) {
-        command(true, DRIVE_MODE_CURRENT, 10000);
+        command(true, DRIVE_MODE_CURRENT, 0);
         run_ms(100);
     }
-    command(true, DRIVE_MODE_CURRENT, 10000);
+    command(true, DRIVE_MODE_CURRENT, 0);
     run_ms(100);
     ASSERT_EQ(watched()->drive.state, DRIVE_RUNNING) << console();
     ASSERT_TRUE(bridge_on());

@@ -51,7 +51,7 @@ class Scope : public Bench
         boot();
         pass(5e-3);
         for (int n = 0; n < 10; n++) {
-            command(true, DRIVE_MODE_CURRENT, 30000);
+            command(true, DRIVE_MODE_CURRENT, 0);
             pass(0.1);
         }
         EXPECT_EQ(watched()->drive.state, DRIVE_RUNNING) << console();
@@ -180,13 +180,13 @@ TEST(BoardTrace, FourSignalsAt20kHzAreWholeAlignedAndSoonThere)
     }
     x.seen.clear();
     x.set(0x3100, 1, 1, 1); // arm, triggered at once
-    x.command(true, DRIVE_MODE_CURRENT, 30000);
+    x.command(true, DRIVE_MODE_CURRENT, 0);
     while ((x.get(0x3100, 2) & 0xFF) != TRACE_COMPLETE && x.seen.size() < 4 * samples) {
         x.pass(5e-3);
     }
     ASSERT_EQ(x.get(0x3100, 8), samples);
 
-    x.command(true, DRIVE_MODE_CURRENT, 30000);
+    x.command(true, DRIVE_MODE_CURRENT, 0);
     const double began_s = x.t_s;
     x.stuffed_s = 0.0;
     const Bytes bytes = x.upload();
