@@ -35,11 +35,8 @@ pm_procedure_t three_phase_hf_step(three_phase_hf_t *self, const three_phase_hf_
                                    pulses_out_t *out)
 {
     *out = (pulses_out_t){.driven = false};
-    if (config->block == 0U) {
-        return PM_FAILED_NO_CURRENT; /* not what the configuration is for */
-    }
     if (self->values >= config->wanted) {
-        return PM_DONE;
+        return PM_DONE; /* at once where the configuration is for another way: then there is no current */
     }
     const pm_angle_t phi = carrier_angle(&self->phase, config->sine.step);
     carrier_advance(&self->phase, config->sine.n);

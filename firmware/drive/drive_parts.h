@@ -73,12 +73,13 @@ void reference_reset(drive_t *drive, pm_q_t i_q);
 
 /* open_loop.c: align, open-loop start, current mode, hand-over to the observer and back. */
 void open_loop_start(drive_t *drive);
-void open_loop_hold(drive_t *drive); /* the vector stays, but for a rotor that swings */
+void open_loop_hold(drive_t *drive);   /* the vector stays, but for a rotor that swings */
 void open_loop_rested(drive_t *drive); /* the end of the align: what its voltage says of R */
 void open_loop_slow(drive_t *drive);
 void open_loop_resume(drive_t *drive);
-void open_loop_release(drive_t *drive); /* the observer goes its own way from here, from where the rotor is seen */
-bool open_loop_ramps(const drive_t *drive);  /* the imposed speed is not what is wanted yet */
+void open_loop_release(
+    drive_t *drive); /* the observer goes its own way from here, from where the rotor is seen */
+bool open_loop_ramps(const drive_t *drive); /* the imposed speed is not what is wanted yet */
 
 #ifdef __cplusplus
 }
