@@ -87,8 +87,8 @@ static void hand_over(drive_t *drive)
 
 void open_loop_release(drive_t *drive)
 {
-    const position_config_t *c = &drive->config.position;
     if (PM_HAS(load_current) && drive->follow.follows) {
+        const position_config_t *c = &drive->config.position;
         position_turn(&drive->position, c, 0U - follow_lag(&drive->follow, drive->omega_ramp), drive->i_ab);
         position_set_resistance(&drive->position, c, drive->follow.R);
     }
@@ -180,14 +180,14 @@ void open_loop_hold(drive_t *drive)
  * tried again. */
 static void try_again(drive_t *drive)
 {
-    const drive_config_t *c = &drive->config;
-    const bool may = drive->command.mode != DRIVE_MODE_CURRENT && !drive->follow.follows;
-    if (!PM_HAS(load_current) || !may || drive->tried) {
+    const bool may =
+        PM_HAS(load_current) && drive->command.mode != DRIVE_MODE_CURRENT && !drive->follow.follows;
+    if (!may || drive->tried) {
         drive_trip(drive, DRIVE_FAULT_STALL);
         return;
     }
     drive->tried = true;
-    drive->i_vector = c->i_max;
+    drive->i_vector = drive->config.i_max;
     drive->omega_ramp = 0;
     drive->rest_ms = REST_MS;
     drive->wait_ms = 0;
@@ -239,10 +239,10 @@ static void hand_over_in_time(drive_t *drive)
 
 void open_loop_rested(drive_t *drive)
 {
-    const drive_config_t *c = &drive->config;
     if (!PM_HAS(load_current) || !is_mean(drive)) {
         return;
     }
+    const drive_config_t *c = &drive->config;
     follow_rested(&drive->follow, &c->machine, drive->i_open, drive->status.v_dc);
     position_set_resistance(&drive->position, &c->position, drive->follow.R);
 }
