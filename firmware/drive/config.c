@@ -110,9 +110,10 @@ static void make_protection(maker_t *m, protection_config_t *c)
     c->k_bridge_heat =
         fixed(m, pm_num_div(m->t_slow, si(m, DRIVE_PARAM_t_bridge)), FRAC_BITS, DRIVE_PARAM_t_bridge);
     /* a current that dead time holds at zero is not one that does not conduct */
-    const pm_q_t zone = 2 * fixed(m, pm_num_div(m->comp_zone, m->base.i), Q_BITS, DRIVE_PARAM_comp_zone);
-    const pm_q_t noise = 8 * per_unit(m, DRIVE_PARAM_i_noise, m->base.i);
-    const pm_q_t judged = pm_max(pm_max(zone, noise), i_rated / 64);
+    const pm_q_t zone = fixed(m, pm_num_div(m->comp_zone, m->base.i), Q_BITS, DRIVE_PARAM_comp_zone);
+    const pm_q_t noise = per_unit(m, DRIVE_PARAM_i_noise, m->base.i);
+    const pm_q_t hidden = pm_max(2 * pm_min(zone, PM_Q_MAX / 2), 8 * pm_min(noise, PM_Q_MAX / 8));
+    const pm_q_t judged = pm_max(hidden, i_rated / 64);
     c->judged = pm_mul(judged, judged);
     c->temp_derate_dC = (int16_t)p->temp_derate;
     c->temp_trip_dC = (int16_t)p->temp_trip;

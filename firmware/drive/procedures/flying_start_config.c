@@ -37,7 +37,7 @@ void make_flying_start(maker_t *m, flying_start_config_t *c)
     const pm_num_t i = pm_num_mul(least(si(m, DRIVE_PARAM_i_rated), turns), pm_num_ratio(1, 5));
     c->i_enough = fixed(m, pm_num_div(i, m->base.i), Q_BITS, DRIVE_PARAM_i_rated);
     c->noise = pm_max(per_unit(m, DRIVE_PARAM_i_noise, m->base.i), PM_Q(0.5 / 4096.0));
-    c->i_zero = pm_max(5 * c->noise, PM_Q(8.0 / 4096.0));
+    c->i_zero = pm_max(5 * pm_min(c->noise, PM_Q_MAX / 5), PM_Q(8.0 / 4096.0));
     c->i_rings = pm_max(make_ringing(m), c->i_zero);
     c->decay = per_part(m, si(m, DRIVE_PARAM_R_s), DRIVE_PARAM_R_s);
     c->drop = per_part(m, pm_num_div(si(m, DRIVE_PARAM_device_drop), m->base.i), DRIVE_PARAM_device_drop);

@@ -51,7 +51,7 @@ struct Bench {
     Sample sample(double at) const
     {
         const double towards = sector % 2 == 0 ? 1 : -1;
-        const double rails_V = kV_dc / 2 * legs;
+        const double rails_V = kV_dc / 2 * static_cast<double>(legs);
         const double v = rails_V + towards * kAmplitude * std::sin(degrees(at) * kDegree);
         return terminal(at, v);
     }

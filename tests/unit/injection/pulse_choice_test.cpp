@@ -11,8 +11,6 @@ namespace
 
 using namespace pulse_rig;
 
-const Method<initial_pulses_t> kSix = {&initial_pulses_step, &initial_pulses_find};
-
 drive_params_t chosen()
 {
     drive_params_t p; // IPM-1000
@@ -27,7 +25,7 @@ double current_A(const drive_params_t &p)
 {
     drive_config_t c = {};
     if (!drive_configure(&c, &p, PM_ALL).ok) {
-        return NAN;
+        return std::nan("");
     }
     const double flux_Vs = 2.0 / 3 * p.v_dc_nominal * 1e-3 * real(c.pulses.duty) * c.pulses.periods / p.f_pwm;
     return flux_Vs / (p.L_d * 1e-9);

@@ -197,7 +197,8 @@ TEST(ThreePhaseHf, TakesAnySequencesOfItsCurrents)
             const double g = 2 * bench::kPi / 3 * x;
             const std::complex<double> I =
                 std::polar(I_p, -g) +
-                std::polar(I_n, -(2 * theta - bench::rad(pm_rad_to_angle(c.rho_R)) - g));
+                std::polar(I_n,
+                           -(2 * theta - bench::rad(static_cast<pm_angle_t>(pm_rad_to_angle(c.rho_R))) - g));
             const double scale = std::ldexp(c.block * c.wanted / 2.0, 27);
             self.cosine[x] = static_cast<int64_t>(I.real() * scale);
             self.sine[x] = static_cast<int64_t>(-I.imag() * scale);

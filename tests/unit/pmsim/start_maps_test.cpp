@@ -68,7 +68,7 @@ double value_of(const Scenario &scenario, const RunResult &result, const std::st
         }
     }
     ADD_FAILURE() << metric;
-    return NAN;
+    return std::nan("");
 }
 
 // L_d falls with demagnetising current, on which side of zero ever the current lies: ten methods, seven angles.
