@@ -95,9 +95,9 @@ PM_RARE static void go_on(drive_t *drive)
 #endif
 
 #if PM_HAS(flying_start)
-/* Called from drive_slow() itself, as begin_step(). The EMF is the voltage that keeps the current at zero, from the period that has begun on; where the link has less, the
- * current that weakens the field is wanted at once. Any other comes little by little. At a speed where neither source sees
- * the rotor it is held by a vector along its d-axis. */
+/* The EMF is the voltage that keeps the current at zero, from the period that has begun on. Where the link has less, the
+ * current that weakens the field is wanted at once; any other comes little by little. At a speed where neither source
+ * sees the rotor it is held by a vector along its d-axis. */
 PM_RARE static void begin_caught(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
