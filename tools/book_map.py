@@ -78,7 +78,7 @@ def claims(root):
             where = f"{path.relative_to(root).as_posix()}:{number}"
             claim = CLAIM.fullmatch(line)
             if not claim:
-                raise Refused(f"{where}: not {{row: N, parameter: name or \"\", proof: scenario or folder/test}}")
+                raise Refused(f"{where}: not {{row: N, parameter: name or none or \"\", proof: scenario or folder/test}}")
             row = int(claim[1])
             if row in found:
                 raise Refused(f"{where}: row {row} is claimed already")
@@ -122,13 +122,13 @@ def page(methods, files):
     for row, section, name, state, parameter, scenario in methods:
         if state == "IMPLEMENTED":
             where = " ".join(link(path) for path in sorted(files.get(row, ())))
-            selected = f"`{parameter}`" if parameter else "always"
+            selected = {"": "always", "none": "in no image yet"}.get(parameter, f"`{parameter}`")
             cells = where, selected, link(proof_of(scenario)), result_of(scenario)
         else:
             cells = "not yet", "", "", ""
         lines.append(f"| {section} | {row} | {name} | " + " | ".join(cells) + " |\n")
-    done = sum(1 for method in methods if method[3] == "IMPLEMENTED")
-    return HEAD + "".join(lines) + f"\n{done} of {len(methods)} rows.\n"
+    done = [method[4] for method in methods if method[3] == "IMPLEMENTED"]
+    return HEAD + "".join(lines) + f"\n{len(done)} of {len(methods)} rows, {done.count('none')} of them in no image yet.\n"
 
 
 def main():

@@ -71,7 +71,7 @@ class BookMap(unittest.TestCase):
         self.assertIn("| 2.2.2 | 13 | Active flux | [flux.h](../observers/flux.h) | always | "
                       "[active_test.cpp](../tests/unit/observers/active_test.cpp) | in the test |", page)
         self.assertIn("| 2.3.1 | 14 | Back-EMF | not yet |", page)
-        self.assertIn("2 of 3 rows.", page)
+        self.assertIn("2 of 3 rows, 0 of them in no image yet.", page)
 
     def test_a_method_of_a_list_claims_its_rows(self):
         claim = {"observers/x.yaml": "# X.\nbook:\n- {row: 14, parameter: \"\", proof: spm}\nknows: R\n",
@@ -80,7 +80,11 @@ class BookMap(unittest.TestCase):
         code, message, page = run(claim)
         self.assertEqual((code, message), (0, ""))
         self.assertIn("| 2.3.1 | 14 | Back-EMF | [x.h](../observers/x.h) | always | [spm.yaml]", page)
-        self.assertIn("3 of 3 rows.", page)
+        self.assertIn("3 of 3 rows, 0 of them in no image yet.", page)
+        library = {**claim, "observers/x.yaml": claim["observers/x.yaml"].replace('""', "none")}
+        _, _, page = run(library)
+        self.assertIn("| in no image yet | [spm.yaml]", page)
+        self.assertIn("3 of 3 rows, 1 of them in no image yet.", page)
         code, message, _ = run({**claim, "tests/acceptance.yaml": ASKED})
         self.assertEqual(code, 1)
         self.assertIn("row 14 is implemented, but tests/acceptance.yaml asks nothing of it", message)

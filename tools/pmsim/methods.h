@@ -12,7 +12,7 @@ struct Method {
     int row;
     std::string section, name;
     bool implemented;
-    std::string parameter; // selects or tunes it; empty: always on
+    std::string parameter; // selects or tunes it; empty: always on; none: in no image yet
     std::string scenario;  // in tests/scenario
 };
 
