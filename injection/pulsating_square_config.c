@@ -1,10 +1,14 @@
 #include "injection/pulsating_square.h"
 #include "injection/saliency_config.h"
 
-/* The mean of two samples is half a period old: up to there control of the current overshoots by a tenth. */
+/* The mean of two samples is half a period old: up to there control of the current overshoots by a tenth. From
+ * -F / (2 L_d) to F / (2 L_d) in a period, with the edges at about a quarter and three quarters of it. */
 injection_limits_t pulsating_square_limits(const maker_t *m)
 {
-    return (injection_limits_t){.current_max = pm_num_div(si(m, DRIVE_PARAM_f_pwm), pm_num(20))};
+    return (injection_limits_t){
+        .current_max = pm_num_div(si(m, DRIVE_PARAM_f_pwm), pm_num(20)),
+        .swing = pm_num_div(flux_of_period(m), pm_num_mul(pm_num(4), si(m, DRIVE_PARAM_L_d))),
+    };
 }
 
 void make_pulsating_square(maker_t *m, pulsating_square_config_t *c)

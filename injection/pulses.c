@@ -112,17 +112,13 @@ pm_procedure_t pulses_balance(pulses_t *self)
     return PM_RUNNING;
 }
 
+/* A vector is turned by 120 degrees as its phases change places: c becomes a, a b, and b c. */
 pm_ab_t pulses_saliency(const pulses_t *self)
 {
-    pm_ab_t y = {0, 0};
-    for (uint32_t x = 0; x < PULSES_AXES; x++) {
-        const pm_q_t *e = self->e[x];
-        const pm_ab_t i = pm_clarke((pm_abc_t){.a = e[0], .b = e[1], .c = e[2]});
-        const pm_ab_t turned = pm_park_inverse((pm_dq_t){.d = i.alpha, .q = i.beta}, pm_dir(pulses_axis[x]));
-        y.alpha += turned.alpha;
-        y.beta += turned.beta;
-    }
-    return y;
+    const pm_q_t *of_a = self->e[0], *of_b = self->e[1], *of_c = self->e[2];
+    return pm_clarke((pm_abc_t){.a = of_a[0] + of_b[2] + of_c[1],
+                                .b = of_a[1] + of_b[0] + of_c[2],
+                                .c = of_a[2] + of_b[1] + of_c[0]});
 }
 
 pm_sigma_t pulses_margin(pm_q_t length, pm_q_t noise)

@@ -12,8 +12,12 @@ typedef struct {
 void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t v_dc)
 {
     const int32_t lost = config->dead + pm_mulh(config->drop, pm_per_volt(v_dc));
-    const int32_t all = config->compensate ? pm_shl(pm_sat(lost, PM_SHARE_BITS - 2), PM_HEIGHT_BITS) : 0;
-    self->far = pm_frac(all, config->far);
+    const int32_t all = pm_shl(pm_sat(lost, PM_SHARE_BITS - 2), PM_HEIGHT_BITS);
+    const uint32_t n = self->carrier ? 1U : 0U;
+    self->zone_alpha = config->per_zone[n];
+    self->zone_beta =
+        pm_mulh_sub(self->zone_alpha, self->zone_alpha, PM_FRAC(0.133974596)); /* 1 - sqrt(3)/2 */
+    self->far = pm_frac(all, config->far[n]);
     self->near = all - self->far;
     self->room = PM_UNIT_MAX;
     if (config->top != PM_SHARE_ONE) {
@@ -22,7 +26,7 @@ void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t 
         self->seen = config->top - may_lose - MODULATOR_ROUNDING;
         self->room = pm_share_to_unit(2 * self->seen - PM_SHARE_ONE);
         const int32_t all_seen = self->seen - self->lowest - MODULATOR_ROUNDING;
-        self->per_seen = self->all ? pm_div(PM_ONE, pm_shl(all_seen, PM_Q_BITS - PM_SHARE_BITS)) : PM_ONE;
+        self->per_seen = self->carrier ? pm_div(PM_ONE, pm_shl(all_seen, PM_Q_BITS - PM_SHARE_BITS)) : PM_ONE;
     }
 }
 
@@ -41,9 +45,9 @@ static inline centred_t centred(pm_ab_t v)
     };
 }
 
-static inline pm_abc_t lost_by(const modulator_config_t *config, pm_ab_t i)
+static inline pm_abc_t lost_by(const modulator_t *self, pm_ab_t i)
 {
-    const pm_pair_t zone = pm_pair(&config->zone_alpha, &config->zone_beta);
+    const pm_pair_t zone = pm_pair(&self->zone_alpha, &self->zone_beta);
     const int32_t a = pm_mulh(i.alpha, zone.first);
     const int32_t y = pm_mulh(i.beta, zone.second);
     return (pm_abc_t){.a = a, .b = y - pm_half(a), .c = y + pm_half(a)}; /* c has the opposite sign */
@@ -74,7 +78,7 @@ static inline int32_t largest(const pm_abc_t *leg)
 static inline void write_shares(const modulator_t *self, const modulator_config_t *config, const centred_t *u,
                                 int32_t centre, int32_t per_volt, pm_ab_t i_quarter, modulator_out_t *out)
 {
-    const pm_abc_t i = lost_by(config, i_quarter);
+    const pm_abc_t i = lost_by(self, i_quarter);
     const int32_t whole = config->whole;
     const pm_pair_t lost = pm_pair(&self->near, &self->far);
     const int32_t a = zones_add(pm_mulh_add(centre, u->leg.a, per_volt), i.a, lost);

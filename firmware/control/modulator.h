@@ -12,6 +12,9 @@
  *   f = i / (2 I_1) up to I_1, 1 - I_1 / (2 i) beyond
  * f is made of two linear parts, 3/4 up to 1.7 I_1 and 1/4 up to 8 times that; error 0.07. Without
  * capacitance, or where `comp_zone` is larger than 1.7 I_1, there is one part, up to `comp_zone`.
+ * A carrier that swings the current about its mean has each leg switch on and off on either side of it, by s for
+ * the vector: below that the edges see the carrier's signs and lose nothing in the mean. While one is added, f is one
+ * part up to s, which is what the legs' shares of a vector that turns give in the mean.
  * The returned vector is the one without compensation, which is what the motor then receives. Legs are
  * shares of the period up to the last step, where one saturation keeps each within the timer's counts.
  *
@@ -22,7 +25,7 @@
  * time and what it may lose, which the motor does not see. If that leg is hidden all the same, two currents are
  * measured and the third follows. The middle leg is seen as long as the vector stays within
  *   2/3 top' v_dc,   top' = top - T_dt f_pwm - 2 lost
- * which is part of the voltage limit, modulator_reach(): all of v_dc/sqrt(3) from top' = 0.866 on. While `all` is
+ * which is part of the voltage limit, modulator_reach(): all of v_dc/sqrt(3) from top' = 0.866 on. While `carrier` is
  * set the vector is shortened further, so that the largest leg stays below top': the leg that a carrier hides
  * would be another in each period.
  * With t_settle = 0, shunts in the lines, nothing of this happens.
@@ -44,27 +47,27 @@ extern "C" {
 #endif
 
 typedef struct {
-    int32_t counts;     /* timer counts of half a period */
-    int32_t whole;      /* the same for pm_share_of() */
-    int32_t top;        /* on-time above which the current of a leg is hidden, Q20; one: never */
-    int32_t zone_alpha; /* pm_mulh(zone / 4, zone_alpha) = 2^PM_ZONE_BITS */
-    int32_t zone_beta;  /* sqrt(3)/2 zone_alpha */
-    pm_frac_t far;      /* share of the second part: 1/4 or 0 */
-    int32_t dead;       /* share of the period that dead time takes, Q20 */
-    pm_q_t drop;        /* device drop */
-    bool compensate;
+    int32_t counts; /* timer counts of half a period */
+    int32_t whole;  /* the same for pm_share_of() */
+    int32_t top;    /* on-time above which the current of a leg is hidden, Q20; one: never */
+    int32_t per_zone
+        [2]; /* pm_mulh(edge / 4, per_zone) = 2^PM_ZONE_BITS; 0: no compensation; [1]: while a carrier is added */
+    pm_frac_t far[2]; /* share of the second part: 1/4 or 0 */
+    int32_t dead;     /* share of the period that dead time takes, Q20 */
+    pm_q_t drop;      /* device drop */
 } modulator_config_t;
 
 typedef struct {
-    int32_t hidden;    /* legs of the last period's output in bits 8 to 10, of the one before in 0 to 2 */
+    int32_t hidden; /* legs of the last period's output in bits 8 to 10, of the one before in 0 to 2 */
+    int32_t zone_alpha, zone_beta; /* present one: 1 over its edge, sqrt(3)/2 of that */
     int32_t near, far; /* share that dead time and drops take, in two parts, Q33; together below a quarter */
     int32_t limited;   /* not 0 when the vector was shortened: the share of it; the reader clears it */
     pm_unit_t room;    /* share of v_dc up to which the span of centred legs hides none */
     /* of low-side shunts, on-times without compensation, Q20: */
     int32_t seen;    /* the largest leg's up to which its current is seen */
     int32_t lowest;  /* the lowest leg's when they are moved down */
-    pm_q_t per_seen; /* with `all`, 1 over the on-time of a vector that hides none; else 1 */
-    bool all;        /* hide none: the user's choice, before modulator_slow() */
+    pm_q_t per_seen; /* with `carrier`, 1 over the on-time of a vector that hides none; else 1 */
+    bool carrier;    /* one is added, and none is hidden: the user's choice, before modulator_slow() */
 } modulator_t;
 
 typedef struct {

@@ -12,6 +12,12 @@ static pm_num_t zone_of_capacitance(const maker_t *m)
     return pm_num_mul(pm_num_div(charge, si(m, DRIVE_PARAM_dead_time)), pm_num_ratio(17, 10));
 }
 
+static int32_t per_edge(maker_t *m, pm_num_t edge)
+{
+    const int bits = PM_ZONE_BITS + 32 - (Q_BITS - 2);
+    return fixed(m, pm_num_div(m->base.i, edge), bits, DRIVE_PARAM_comp_zone);
+}
+
 void make_modulator(maker_t *m, modulator_config_t *c)
 {
     const pm_num_t duty = pm_num_mul(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm));
@@ -20,8 +26,11 @@ void make_modulator(maker_t *m, modulator_config_t *c)
     const pm_num_t by_capacitance = zone_of_capacitance(m);
     const bool two_parts = pm_num_cmp(by_capacitance, least_zone) > 0;
     m->comp_zone = two_parts ? by_capacitance : least_zone;
-    const pm_num_t zone = pm_num_div(m->comp_zone, m->base.i);
-    c->far = two_parts ? PM_FRAC(0.25) : 0;
+    c->per_zone[0] = per_edge(m, m->comp_zone);
+    c->far[0] = two_parts ? PM_FRAC(0.25) : 0;
+    const bool swings = pm_num_cmp(m->swing, m->comp_zone) > 0;
+    c->per_zone[1] = swings ? per_edge(m, m->swing) : c->per_zone[0];
+    c->far[1] = swings ? 0 : c->far[0];
     c->counts = m->params->timer_counts;
     c->whole = pm_share_whole(c->counts);
     c->top = seen_on_time(m);
@@ -30,12 +39,10 @@ void make_modulator(maker_t *m, modulator_config_t *c)
     }
     c->dead = fixed(m, duty, PM_SHARE_BITS, DRIVE_PARAM_dead_time);
     c->drop = per_unit(m, DRIVE_PARAM_device_drop, m->base.v);
-    const pm_num_t per_zone = pm_num_div(pm_num(1), zone);
-    const int bits = PM_ZONE_BITS + 32 - (Q_BITS - 2);
-    c->zone_alpha = fixed(m, per_zone, bits, DRIVE_PARAM_comp_zone);
-    c->zone_beta =
-        fixed(m, pm_num_mul(per_zone, pm_num_sqrt(pm_num_ratio(3, 4))), bits, DRIVE_PARAM_comp_zone);
-    c->compensate = m->params->dead_time_comp != 0;
+    if (m->params->dead_time_comp == 0) {
+        c->per_zone[0] = 0;
+        c->per_zone[1] = 0;
+    }
 }
 
 pm_unit_t modulator_reach(maker_t *m, const modulator_config_t *c)

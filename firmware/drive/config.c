@@ -225,7 +225,9 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
         params->start_method % 2 == 1 || (params->start_method == 0 && injection_sees_saliency(&m));
     choose_start(&m, config, channels);
     if (config->injection) {
-        m.comp_zone = injection_limits(&m).comp_zone;
+        const injection_limits_t limits = injection_limits(&m);
+        m.comp_zone = limits.comp_zone;
+        m.swing = limits.swing;
     }
     make_modulator(&m, &config->modulator);
     make_regulator(&m, &config->regulator);

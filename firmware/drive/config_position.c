@@ -27,11 +27,26 @@ static int32_t per_span(maker_t *m)
                  DRIVE_PARAM_speed_high);
 }
 
+/* While tied, an observer whose voltage is off by U disagrees by U / (k_q psi_m) at standstill. Half of what dead time and
+ * devices take may not be compensated where a leg's current is near zero: that may count 0.15, half of what means lost. */
+static pm_unit_t tied_share(maker_t *m)
+{
+    const pm_num_t dead =
+        mul3(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm), si(m, DRIVE_PARAM_v_dc_nominal));
+    const pm_num_t lost = pm_num_add(dead, si(m, DRIVE_PARAM_device_drop));
+    const pm_num_t sure =
+        mul3(pm_num_ratio(3, 10), angular(m, DRIVE_PARAM_flux_bandwidth), si(m, DRIVE_PARAM_psi_m));
+    return pm_num_cmp(lost, sure) > 0
+               ? fixed(m, pm_num_div(sure, lost), UNIT_BITS, DRIVE_PARAM_flux_bandwidth)
+               : PM_UNIT_MAX;
+}
+
 void make_position(maker_t *m, position_config_t *c, bool injection)
 {
     make_observer(m, &c->observer);
     c->injects = injection;
     c->current_low = PM_UNIT_MAX;
+    c->tied_share = tied_share(m);
     c->omega_low = speed(m, DRIVE_PARAM_speed_low);
     c->omega_high = speed(m, DRIVE_PARAM_speed_high);
     make_loop(m, &c->loop, &c->pll_low, &c->pll_high);

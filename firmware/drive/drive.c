@@ -408,7 +408,7 @@ PM_RARE void drive_prepare(drive_t *drive)
         drive->v_share = pm_max(c->v_share - reserved, c->v_share / 4);
     }
     prepare_current_control(drive);
-    drive->modulator.all = drive->carrier;
+    drive->modulator.carrier = drive->carrier;
     modulator_slow(&drive->modulator, &c->modulator, pm_max(v_dc, V_DC_LEAST));
 #if SEQUENCE_HAS_POLARITY
     if (procedure_without_current(drive)) {

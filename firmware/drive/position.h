@@ -34,10 +34,11 @@ typedef struct {
     second_harmonic_config_t second_harmonic;
     mismatch_config_t mismatch;
     speed_config_t speed;
-    uint8_t traits; /* of the low-speed source */
     pm_q_t omega_low, omega_high;
     int32_t per_span;      /* 1 / (omega_high - omega_low), Q20 */
     pm_unit_t current_low; /* share of the bandwidth of current control while injection leads */
+    pm_unit_t tied_share;  /* what a tied observer's disagreement counts */
+    uint8_t traits;        /* of the low-speed source */
     bool injects;          /* the low-speed source leads at low speed; else the observer at all speeds */
     bool corrects;         /* one of the optional stages is on */
 } position_config_t;

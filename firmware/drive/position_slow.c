@@ -148,7 +148,11 @@ static void set_quality(position_t *self, const position_config_t *config, const
     const pm_q_t low_eps = magnitude_after(&self->injection_eps, low.eps);
     /* also while the observer is tied: an EMF that the position does not explain */
     pm_q_t eps = magnitude_after(&self->observer_eps, seen->eps + mismatch_eps(&self->mismatch, i));
-    pm_q_t misfit = self->weight > 0 ? pm_abs(seen->misfit) : 0;
+    pm_q_t misfit = pm_abs(seen->misfit);
+    if (self->weight == 0) {
+        eps = pm_unit(eps, config->tied_share);
+        misfit = 0;
+    }
     if (self->weight < PM_ONE) {
         eps = pm_max(eps, low_eps);
         misfit = pm_max(misfit, pm_abs(low.misfit));

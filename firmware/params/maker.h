@@ -26,6 +26,7 @@ struct maker {
     uint32_t slow_divider;          /* periods per slow step: the nearest to 1 ms ... */
     pm_num_t t_slow;                /* ... and what that is, s */
     pm_num_t comp_zone;             /* what the source asks for, then what the modulator has, A */
+    pm_num_t swing;                 /* injection_limits_t, A */
     pm_q_t i_d_rated;               /* of maximum torque per ampere at rated current */
     drive_result_t result;
     uint32_t channels; /* that the board has and the image carries: NEEDS_... */

@@ -10,7 +10,7 @@
 #define CLOSE_MS 40U
 #define APART    PM_TURN(0.125)
 /* A = 1/2 with the machine's data. */
-#define LEAST PM_Q(0.125)
+#define LEAST PM_Q(0.2)
 
 void procedure_lock_begin(drive_t *drive)
 {

@@ -46,9 +46,8 @@ modulator_config_t compensating(int counts = kCounts)
     modulator_config_t c = plain(counts);
     c.dead = fixed(kDead, PM_SHARE_BITS);
     c.drop = fixed(kDrop, 28);
-    c.zone_alpha = fixed(1 / kZone, PM_ZONE_BITS + 6); // 2^PM_ZONE_BITS at the edge: zone/4 2^28 gain 2^-32
-    c.zone_beta = fixed(std::sqrt(0.75) / kZone, PM_ZONE_BITS + 6);
-    c.compensate = true;
+    c.per_zone[0] = fixed(1 / kZone, PM_ZONE_BITS + 6); // 2^PM_ZONE_BITS at the edge: zone/4 2^28 gain 2^-32
+    c.per_zone[1] = c.per_zone[0];
     return c;
 }
 
@@ -104,6 +103,25 @@ Out step(const modulator_config_t &c, Complex v, double v_dc, Complex i = 0)
     modulator_step(&self, &c, bench::ab(v), fixed(v_dc, 28), bench::ab(i / 4.0), &out);
     out.limited = self.limited != 0;
     return out;
+}
+
+// While a carrier moves the edges off the mean current, that zone holds, and only then.
+TEST(Modulator, ACarrierWidensTheZone)
+{
+    modulator_config_t c = compensating();
+    constexpr double swing = 20 * kZone, lost = kDead + kDrop / kLink;
+    c.per_zone[1] = fixed(1 / swing, PM_ZONE_BITS + 6);
+    for (const bool carrier : {false, true}) {
+        for (const double i : {0.25, 0.5, 1.0, 2.0}) {
+            modulator_t self = {};
+            modulator_out_t out;
+            self.carrier = carrier;
+            modulator_slow(&self, &c, fixed(kLink, 28));
+            modulator_step(&self, &c, bench::ab(0), fixed(kLink, 28), bench::ab(i * swing / 4), &out);
+            const double on = double(out.on[0]) / kCounts - 0.5;
+            EXPECT_NEAR(on, lost * (carrier ? std::min(i, 1.0) : 1), 2.0 / kCounts) << carrier << ' ' << i;
+        }
+    }
 }
 
 TEST(Modulator, DutyIsThatOfTheTextbook)
@@ -291,7 +309,7 @@ TEST(Modulator, LowSideShuntsSeeAllLegsOfACarrier)
                 const Complex v = std::polar(size * kLink / std::sqrt(3.0), angle * kDegree);
                 modulator_t self = {};
                 modulator_out_t out;
-                self.all = true;
+                self.carrier = true;
                 modulator_slow(&self, &c, fixed(kLink, 28));
                 modulator_step(&self, &c, bench::ab(v), fixed(kLink, 28), bench::ab(v / 8.0), &out);
                 ASSERT_EQ(self.hidden, 0) << size << ' ' << angle;
@@ -338,7 +356,9 @@ TEST(Modulator, CountsStayWithinTheTimer)
     for (int n = 0; n < 100000; ++n) {
         const int counts = 200 + (random.word() & 0x7fff) % (32768 - 200);
         modulator_config_t c = compensating(counts);
-        c.compensate = (n & 1) != 0;
+        if ((n & 1) != 0) {
+            c.per_zone[0] = 0;
+        }
         const Complex v = std::polar(random.within(0, 3.99), random.within(-4, 4));
         const Complex i = std::polar(random.within(0, 2), random.within(-4, 4));
         const Out out = step(c, v, random.within(1.0 / 16, 1), i);
@@ -358,7 +378,7 @@ TEST(Modulator, CompensationGivesBackWhatDeadTimeTakes)
 {
     const modulator_config_t on = compensating();
     modulator_config_t off = on;
-    off.compensate = false;
+    off.per_zone[0] = 0;
     for (const double v_dc : {0.25, kLink, 1.0}) {
         for (int a = 0; a < 360; a += 7) {
             const Complex i = std::polar(0.3, a * kDegree);
@@ -430,7 +450,7 @@ TEST(Modulator, CapacitanceOfALegIsFollowedWithinItsError)
 TEST(Modulator, CompensationSwitchedOffIsNone)
 {
     modulator_config_t c = compensating();
-    c.compensate = false;
+    c.per_zone[0] = 0;
     const modulator_config_t none = plain();
     for (int a = 0; a < 360; a += 5) {
         const Complex i = std::polar(0.5, a * kDegree);
@@ -516,10 +536,9 @@ TEST(Modulator, CompensationSaturatesAtAQuarterOfThePeriod)
 {
     for (const double lost : {0.2, 0.24, 0.3, 0.6, 1.5}) {
         modulator_config_t c = plain();
-        c.compensate = true;
         c.dead = fixed(lost, PM_SHARE_BITS);
         c.drop = 0;
-        c.far = 0;
+        c.far[0] = 0;
         modulator_t self = {};
         modulator_slow(&self, &c, fixed(kLink, 28));
         EXPECT_NEAR(real(self.near, PM_SHARE_BITS + PM_HEIGHT_BITS), std::min(lost, 0.25), 1e-5) << lost;

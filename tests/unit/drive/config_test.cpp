@@ -186,8 +186,8 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
     return {
         {"dead", c.modulator.dead, 20, 2e-6 * 10e3},
         {"drop", c.modulator.drop, 28, 1 / V},
-        {"zone_alpha", c.modulator.zone_alpha, 20, I / 0.03},
-        {"zone_beta", c.modulator.zone_beta, 20, std::sqrt(0.75) * I / 0.03},
+        {"per_zone", c.modulator.per_zone[0], 20, I / 0.03},
+        {"per_swing", c.modulator.per_zone[1], 20, I / (flux / (4 * L_d))},
         {"d.kp", c.regulator.synchronous_pi.d.kp, 26, w_c * L_d / Z},
         {"d.ki", c.regulator.synchronous_pi.d.ki, 26, w_c * R * T / Z},
         {"d.kb", c.regulator.synchronous_pi.d.kb, 31, R * T / L_d},
@@ -234,7 +234,7 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
         {"h_d_inverse", c.position.injection.pulsating_square.h_d_inverse, 20, I * L_d / flux},
         {"pulse duty", c.pulses.duty, 28, exact / std::round(exact)},
         {"i_zero", c.pulses.i_zero, 28, 5 * 5e-3 / I},
-        {"y_min", c.pulses.y_min, 28, 0.75 * (L_q - L_d) / L_q * 4 / I},
+        {"y_min", c.pulses.y_min, 28, 1.2 * (L_q - L_d) / L_q * 4 / I},
         {"i_noise", c.pulses.i_noise, 28, 5e-3 / I},
         {"i_bridge", c.pulses.i_bridge, 28, 4.0 / 3 * std::round(exact) * 2e-6 * 300 / L_d / I},
         {"open-loop i", c.open_loop.i, 28, 2 / I},
@@ -353,7 +353,7 @@ TEST(Config, IsTheFormulasForIpm1000)
     EXPECT_NEAR(value(c.base.t_s), 1e-4, 1e-4 * kRelative);
     EXPECT_EQ(c.pulses.periods, std::lround(4 * 43e-3 / (2.0 / 3 * 300 * 1e-4)));
     EXPECT_EQ(c.modulator.counts, 8500);
-    EXPECT_TRUE(c.modulator.compensate);
+    EXPECT_GT(c.modulator.per_zone[0], 0);
     EXPECT_EQ(c.open_loop.align_ms, 300);
     EXPECT_NEAR(c.open_loop.sweep * 0x1p-32, 0.5 / 300, 1e-6);
     EXPECT_EQ(c.protection.stall_ms, 1000);
@@ -362,10 +362,44 @@ TEST(Config, IsTheFormulasForIpm1000)
     EXPECT_EQ(c.protection.temp_trip_dC, 1100);
 }
 
+// Limits that may be reached.
+TEST(Config, UpToTheLimitIsAccepted)
+{
+    configure(changed({{DRIVE_PARAM_i_trip, 10}}));
+    configure(changed({{DRIVE_PARAM_v_dc_max, 450}}));
+    configure(changed({{DRIVE_PARAM_i_open_loop, 5}}));
+    configure(changed({{DRIVE_PARAM_i_pulse, 9}}));
+}
+
+// Twice the zone of dead time, eight times the noise or a 64th of rated current, whichever is most; squared.
+TEST(Config, OpenPhaseIsJudgedAboveWhatIsNotKnown)
+{
+    const double A = 1 / 10.0;
+    const auto judged = [](const Changes &x) { return real(configure(changed(x)).protection.judged); };
+    const Changes none = {
+        {DRIVE_PARAM_leg_capacitance, 0}, {DRIVE_PARAM_comp_zone, 0.02}, {DRIVE_PARAM_i_noise, 1e-3}};
+    EXPECT_NEAR(judged(none), std::pow(4 * A / 64, 2), 1e-6);
+    Changes zone = none, noise = none;
+    zone[1].second = 0.3;
+    noise[2].second = 0.05;
+    EXPECT_NEAR(judged(zone), std::pow(0.6 * A, 2), 1e-6);
+    EXPECT_NEAR(judged(noise), std::pow(0.4 * A, 2), 1e-6);
+}
+
+// What half of the lost voltage may turn a tied observer by counts 0.15 at most: IPM-1000 is sure of its EMF, a
+// bridge of five times the dead time is not.
+TEST(Config, ATiedObserverCountsAsFarAsItsVoltageIsKnown)
+{
+    EXPECT_EQ(configure(defaults()).position.tied_share, PM_UNIT_MAX);
+    const double lost = 10e-6 * 10e3 * 300 + 1;
+    EXPECT_NEAR(real(configure(changed({{DRIVE_PARAM_dead_time, 10e-6}})).position.tied_share, 31),
+                0.3 * 2 * M_PI * 25 * 0.236 / lost, 1e-6);
+}
+
 TEST(Config, SwitchesSwitch)
 {
     EXPECT_EQ(configure(changed({{DRIVE_PARAM_mtpa, 0}})).mtpa.h, 0);
-    EXPECT_FALSE(configure(changed({{DRIVE_PARAM_dead_time_comp, 0}})).modulator.compensate);
+    EXPECT_EQ(configure(changed({{DRIVE_PARAM_dead_time_comp, 0}})).modulator.per_zone[0], 0);
     EXPECT_EQ(configure(changed({{DRIVE_PARAM_saturation_comp, 0}})).position.observer.active_flux.model.L_q2,
               0);
     EXPECT_EQ(configure(changed({{DRIVE_PARAM_resistance_adaptation, 0}}))
@@ -502,7 +536,7 @@ TEST(Config, CapacitanceOfALegNeedsADeadTime)
 {
     const auto far = [](double dead_time_s) {
         return configure(changed({{DRIVE_PARAM_leg_capacitance, 2e-9}, {DRIVE_PARAM_dead_time, dead_time_s}}))
-            .modulator.far;
+            .modulator.far[0];
     };
     EXPECT_EQ(far(0), 0);
     EXPECT_NE(far(2e-6), 0);
@@ -606,8 +640,6 @@ Names must_be_positive(const drive_config_t &c)
 {
     Names x = {
         {"counts", c.modulator.counts},
-        {"zone_alpha", c.modulator.zone_alpha},
-        {"zone_beta", c.modulator.zone_beta},
         {"L_d", c.machine.L_d},
         {"L_q", c.machine.L_q},
         {"psi_m", c.machine.psi_m},

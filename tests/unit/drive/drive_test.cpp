@@ -434,7 +434,7 @@ TEST(Drive, ACarrierSlowsCurrentControlDown)
         x.d.position.inject = on;
         x.d.position.weight = PM_ONE / 16 * 15; // the observer leads almost
         drive_prepare(&x.d);
-        EXPECT_EQ(x.d.modulator.all, on);
+        EXPECT_EQ(x.d.modulator.carrier, on);
         EXPECT_EQ(x.d.regulator_config.synchronous_pi.d.kp < kp, on);
     }
 }

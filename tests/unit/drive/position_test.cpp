@@ -56,6 +56,7 @@ position_config_t config(bool injection = true)
     c.per_span = fixed(1 / (kHigh - kLow), 20);
     c.injects = injection;
     c.current_low = PM_UNIT_MAX;
+    c.tied_share = PM_UNIT_MAX;
     return c;
 }
 
@@ -246,6 +247,18 @@ TEST(Position, QualityFallsWithoutTheCarrier)
         position_slow(&self, &c, {0, 0}, {0, 0});
     }
     EXPECT_LE(ms, kLost_ms);
+}
+
+// The resistance that an open loop has seen is taken within half of what the drive is told.
+TEST(Position, ResistanceIsTakenWithinHalfOfItself)
+{
+    const position_config_t c = config(true);
+    const double R = real(c.observer.active_flux.model.R);
+    for (const double share : {0.2, 0.49, 0.51, 1.0, 1.49, 1.51, 3.0}) {
+        position_t self = started(c);
+        position_set_resistance(&self, &c, fixed(share * R, 28));
+        EXPECT_NEAR(real(self.observer.active_flux.R), R * std::clamp(share, 0.5, 1.5), 1e-6) << share;
+    }
 }
 
 TEST(Position, ImposedAngleReplacesTheEstimate)

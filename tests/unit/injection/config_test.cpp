@@ -177,8 +177,8 @@ TEST(InjectionConfig, ShiftIsHalfTheAngleOfTheCoupling)
 // Three times I_p of the rotating sine, unless more is told: below, the carrier governs the signs of the currents.
 TEST(InjectionConfig, RotatingSineWidensTheZoneOfTheCompensation)
 {
-    const auto zone_A = [](const drive_params_t &p) { // zone_alpha is its inverse
-        return 1 / double(configure(p).modulator.zone_alpha);
+    const auto zone_A = [](const drive_params_t &p) { // per_zone is its inverse
+        return 1 / double(configure(p).modulator.per_zone[0]);
     };
     drive_params_t p = with(INJECTION_rotating_sine), none = p;
     none.start_method = 2;
@@ -238,7 +238,82 @@ TEST(InjectionConfig, PulseIsThatOfItsFlux)
         EXPECT_EQ(c.periods, whole) << i_A;
         EXPECT_EQ(c.timeout, 8 * whole + 50) << i_A;
         EXPECT_NEAR(real(c.duty), std::min(1.0, exact / whole), 1e-6) << i_A;
-        EXPECT_NEAR(real(c.y_min), 0.75 * (p.L_q - p.L_d) / p.L_q * i_A / 10, 1e-6) << i_A;
+        EXPECT_NEAR(real(c.y_min), 1.2 * (p.L_q - p.L_d) / p.L_q * i_A / 10, 1e-6) << i_A;
+    }
+}
+
+// What rings with the legs' capacitance, 2 v_dc sqrt(C / L_d), and what dead time makes; a current below five times the noise,
+// four steps of a 12-bit converter or the ringing is zero.
+TEST(InjectionConfig, PulsesAllowForBridgeAndNoise)
+{
+    for (const double C_nF : {0.0, 0.5, 20.0}) {
+        drive_params_t p = with(INJECTION_pulsating_square);
+        p.polarity = 1;
+        p.leg_capacitance = static_cast<int32_t>(
+            std::lround(C_nF * 1e-9 * std::pow(10, -drive_param_exp10[DRIVE_PARAM_leg_capacitance])));
+        const drive_config_t c = configure(p);
+        const double v_dc = p.v_dc_nominal * 1e-3, L_d = p.L_d * 1e-9;
+        const double ringing = 2 * v_dc * std::sqrt(C_nF * 1e-9 / L_d) / 10;
+        const double edges = v_dc * 4 * c.pulses.periods / 3.0 * 2e-6 / L_d / 10;
+        const double noise = p.i_noise * std::pow(10, drive_param_exp10[DRIVE_PARAM_i_noise]) / 10;
+        const double zero = std::max({5 * noise, 8.0 / 4096, ringing});
+        EXPECT_NEAR(real(c.pulses.i_bridge), edges + ringing, 1e-5) << C_nF;
+        EXPECT_NEAR(real(c.pulses.i_zero), zero, 1e-6) << C_nF;
+        EXPECT_NEAR(real(c.dual_pulses.ringing), ringing, 1e-6) << C_nF;
+        EXPECT_NEAR(real(c.dual_pulses.i_zero), zero, 1e-6) << C_nF;
+        EXPECT_NEAR(real(c.dual_pulses.noise), 2 * noise, 1e-7) << C_nF;
+        EXPECT_NEAR(real(c.dual_pulses.i_least), p.i_pulse * 1e-3 / 10 / 4, 1e-6) << C_nF;
+    }
+}
+
+TEST(InjectionConfig, BoundaryThresholdIsThatOfTheParameter)
+{
+    for (const double told : {0.0, 0.3}) {
+        drive_params_t p = with(INJECTION_pulsating_square);
+        p.position_pulses = 3;
+        p.boundary_threshold = static_cast<int32_t>(
+            std::lround(told * std::pow(10, -drive_param_exp10[DRIVE_PARAM_boundary_threshold])));
+        const boundary_detection_config_t c = configure(p).boundary_detection;
+        EXPECT_NEAR(real(c.threshold), told, 1e-6);
+        EXPECT_EQ(c.interpolated, told == 0);
+    }
+}
+
+// Six pulses as often as told, and the noise of as many: 0.775 of a step of the converter each.
+TEST(InjectionConfig, LinkPulsesAreAsManyAsTold)
+{
+    for (const int32_t repeats : {1, 4}) {
+        drive_params_t p = with(INJECTION_pulsating_square);
+        p.position_pulses = 4;
+        p.dc_link_repeats = repeats;
+        const dc_link_pulses_config_t c = configure(p).dc_link_pulses;
+        EXPECT_EQ(c.pulses, 6 * repeats);
+        EXPECT_NEAR(real(c.limits.pole.noise), 0.775 / 4096 * std::sqrt(repeats), 1e-6);
+    }
+}
+
+// Values of two milliseconds or more, whole periods of the carrier: eight of them, and twice as many as long as they end
+// within 64 ms. I_p by its carrier's flux.
+TEST(InjectionConfig, ThreePhaseValuesFillTheTime)
+{
+    for (const int n : {8, 10, 20, 40}) {
+        drive_params_t p = with(INJECTION_pulsating_sine);
+        p.position_find = 2;
+        p.f_injection = static_cast<int32_t>(
+            std::lround(kF_pwm / n * std::pow(10, -drive_param_exp10[DRIVE_PARAM_f_injection])));
+        p.injection_bandwidth = 1000;
+        const three_phase_hf_config_t c = configure(p).three_phase_hf;
+        const int block = (20 + n - 1) / n * n;
+        int wanted = 8;
+        while (wanted < 32 && 2 * wanted * block <= 640) {
+            wanted *= 2;
+        }
+        EXPECT_EQ(c.block, block) << n;
+        EXPECT_EQ(c.wanted, wanted) << n;
+        const double x = M_PI / n, omega = 2 * M_PI * kF_pwm / n;
+        const double flux = p.v_injection * 1e-3 / omega * (x / std::sin(x));
+        const double I_p = flux * (1 / (p.L_d * 1e-9) + 1 / (p.L_q * 1e-9)) / 2;
+        EXPECT_NEAR(real(c.i_least), I_p / 2 / 4 / 10, 1e-5) << n;
     }
 }
 

@@ -176,9 +176,9 @@ ENTRIES = (
     Entry(0x2001, 1, "shunt", "schematic", "i32", "read", "ohm", -6, 0, 0, 1000000, 0, False, False, "none", "none", {}, 'shunt of a leg; 0: another sensor', ""),
     Entry(0x2001, 2, "current_gain", "schematic", "i32", "read", "1", -3, 0, 0, 1000000, 0, False, False, "none", "none", {}, 'from the shunt to the converter', ""),
     Entry(0x2001, 3, "voltage_divider", "schematic", "i32", "read", "1", -3, 0, 0, 1000000, 0, False, False, "none", "none", {}, 'from the converter to the DC link', ""),
-    Entry(0x2001, 4, "i_limit", "schematic", "i32", "read", "A", -3, 0, 1, 1000000, 1000000, False, False, "none", "none", {}, 'peak phase current: i_max at most', ""),
+    Entry(0x2001, 4, "i_limit", "schematic", "i32", "read", "A", -3, 0, 1, 4000000, 1000000, False, False, "none", "none", {}, 'peak phase current: i_max at most', ""),
     Entry(0x2001, 5, "v_limit", "schematic", "i32", "read", "V", -3, 0, 1, 1200000, 1200000, False, False, "none", "none", {}, 'DC link: v_dc_max at most', ""),
-    Entry(0x2001, 6, "i_bridge", "schematic", "i32", "read", "A", -3, 0, 1, 1000000, 1000000, False, False, "none", "none", {}, 'phase current, peak, that the bridge bears for good', ""),
+    Entry(0x2001, 6, "i_bridge", "schematic", "i32", "read", "A", -3, 0, 1, 4000000, 1000000, False, False, "none", "none", {}, 'phase current, peak, that the bridge bears for good', ""),
     Entry(0x2001, 7, "t_bridge", "schematic", "i32", "read", "s", -3, 0, 10, 1000000, 10000, False, False, "none", "none", {}, 'thermal time constant of the bridge, for more than that', ""),
     Entry(0x2001, 8, "dead_time_least", "schematic", "i32", "read", "s", -9, 0, 0, 10000, 0, False, False, "none", "none", {}, 'dead_time at least', ""),
     Entry(0x2001, 9, "f_pwm_least", "schematic", "i32", "read", "Hz", 0, 0, 4000, 60000, 4000, False, False, "none", "none", {}, 'f_pwm at least', ""),
@@ -203,7 +203,7 @@ ENTRIES = (
     Entry(0x2100, 3, "L_d", "machine", "i32", "locked", "H", -9, 0, 500, 1000000000, 43000000, False, True, "machine", "none", {}, 'd-axis inductance at zero current', "1.3.1.3 #3"),
     Entry(0x2100, 4, "L_q", "machine", "i32", "locked", "H", -9, 0, 500, 1000000000, 75000000, False, True, "machine", "none", {}, 'q-axis inductance at zero current', "1.3.1.3 #3"),
     Entry(0x2100, 5, "psi_m", "machine", "i32", "locked", "Wb", -9, 0, 100000, 2000000000, 236000000, False, True, "machine", "none", {}, 'magnet flux linkage', "1.3.1.3 #3"),
-    Entry(0x2100, 6, "i_rated", "machine", "i32", "locked", "A", -3, 0, 50, 1000000, 4000, False, True, "machine", "none", {}, ('rated current, which the windings bear for good; q-axis current at which the '
+    Entry(0x2100, 6, "i_rated", "machine", "i32", "locked", "A", -3, 0, 50, 4000000, 4000, False, True, "machine", "none", {}, ('rated current, which the windings bear for good; q-axis current at which the '
  '*_rated inductances are given'), ""),
     Entry(0x2100, 7, "L_q_rated", "machine", "i32", "locked", "H", -9, 0, 500, 1000000000, 70835000, False, True, "machine", "none", {}, 'apparent q-axis inductance psi_q/i_q at rated current', "2.2.2 #13"),
     Entry(0x2100, 8, "L_dh_rated", "machine", "i32", "locked", "H", -9, 0, 500, 1000000000, 42550000, False, True, "machine", "none", {}, 'incremental d-axis inductance at rated current', "4.2 #36"),
@@ -215,17 +215,17 @@ ENTRIES = (
  'i_d = -half rated; 0: none'), "3.4.2 #27"),
     Entry(0x2100, 14, "L_qd_strong", "machine", "i32", "locked", "H", -9, 0, -1000000000, 1000000000, 0, False, True, "machine", "none", {}, "the same with i_d = +half rated, in the magnet's direction", "3.4.2 #27"),
     Entry(0x2200, 0, "control.count", "control", "u8", "const", "", 0, 0, None, None, 13, False, False, "none", "none", {}, 'highest sub-index', ""),
-    Entry(0x2200, 1, "i_max", "control", "i32", "live", "A", -3, 0, 50, 1000000, 5000, False, True, "application", "none", {}, 'limit of the current amplitude', ""),
+    Entry(0x2200, 1, "i_max", "control", "i32", "live", "A", -3, 0, 50, 4000000, 5000, False, True, "application", "none", {}, 'limit of the current amplitude', ""),
     Entry(0x2200, 2, "speed_max", "control", "i32", "live", "rad/s", -3, 0, 1000, 20000000, 150000, False, True, "application", "none", {}, 'largest speed reference', ""),
     Entry(0x2200, 3, "acceleration", "control", "i32", "live", "rad/s2", -3, 0, 100, 1000000000, 200000, False, True, "application", "none", {}, 'slope of the speed reference', ""),
     Entry(0x2200, 4, "current_bandwidth", "control", "i32", "live", "Hz", -3, 0, 10000, 5000000, 500000, False, True, "application", "none", {}, 'current control bandwidth', "1.3.2.2 #5"),
     Entry(0x2200, 5, "speed_bandwidth", "control", "i32", "live", "Hz", -3, 0, 100, 200000, 4000, False, True, "application", "none", {}, 'speed control bandwidth', "1.3.2.2 #5"),
     Entry(0x2200, 6, "mtpa", "control", "i32", "live", "1", 0, 0, 0, 1, 1, False, True, "application", "none", {}, '1: maximum torque per ampere; 0: i_d = 0', "1.3.2.2 #5"),
-    Entry(0x2200, 7, "i_d_light", "control", "i32", "live", "A", -3, 0, -100000, 100000, 200, False, True, "application", "none", {}, ('least demagnetising current on the flux observer: keeps light load out of '
+    Entry(0x2200, 7, "i_d_light", "control", "i32", "live", "A", -3, 0, -400000, 400000, 200, False, True, "application", "none", {}, ('least demagnetising current on the flux observer: keeps light load out of '
  "the dead time's blind zone; < 0: magnetises"), "5.6.1.1 #57"),
-    Entry(0x2200, 8, "i_fw_max", "control", "i32", "live", "A", -3, 0, 0, 1000000, 3000, False, True, "application", "none", {}, 'largest demagnetising current of field weakening; 0: off', ""),
+    Entry(0x2200, 8, "i_fw_max", "control", "i32", "live", "A", -3, 0, 0, 4000000, 3000, False, True, "application", "none", {}, 'largest demagnetising current of field weakening; 0: off', ""),
     Entry(0x2200, 9, "dead_time_comp", "control", "i32", "live", "1", 0, 0, 0, 1, 1, False, True, "application", "none", {}, '1: compensate dead time and device drops', "5.6.1.1 #57"),
-    Entry(0x2200, 10, "comp_zone", "control", "i32", "live", "A", -3, 0, 1, 100000, 30, False, True, "application", "none", {}, 'least current below which the compensation is linear; more by leg_capacitance', "5.6.1.1 #57"),
+    Entry(0x2200, 10, "comp_zone", "control", "i32", "live", "A", -3, 0, 1, 400000, 30, False, True, "application", "none", {}, 'least current below which the compensation is linear; more by leg_capacitance', "5.6.1.1 #57"),
     Entry(0x2200, 11, "regulator", "control", "i32", "off", "1", 0, 0, 0, 2, 0, False, True, "application", "none", {0: 'PI in the estimated frame, bandwidth as current_bandwidth', 1: 'deadbeat: the current predicted at the end of the period reaches its reference in the next', 2: 'deadbeat, legs held in the nearest of eight switch states: without injection'}, 'control of the current', "12.5.2 #146"),
     Entry(0x2200, 12, "leg_capacitance", "control", "i32", "live", "F", -12, 0, 0, 1000000, 0, False, True, "application", "none", {}, ('output capacitance of a leg, both switches: gives back part of what dead '
  'time takes at small currents'), "5.6.1.2 #58"),
@@ -241,7 +241,7 @@ ENTRIES = (
  'flux linkage'), "3.2.2 #22"),
     Entry(0x2300, 6, "speed_low", "position", "i32", "live", "rad/s", -3, 0, 10, 5000000, 21000, False, True, "application", "none", {}, 'below: injection alone', "5.9 #69"),
     Entry(0x2300, 7, "speed_high", "position", "i32", "live", "rad/s", -3, 0, 20, 10000000, 40000, False, True, "application", "none", {}, 'above: flux observer alone', "5.9 #69"),
-    Entry(0x2300, 8, "i_open_loop", "position", "i32", "live", "A", -3, 0, 20, 1000000, 2000, False, True, "application", "none", {}, 'current of align and open-loop start, up to i_max where the load asks for it', ""),
+    Entry(0x2300, 8, "i_open_loop", "position", "i32", "live", "A", -3, 0, 20, 4000000, 2000, False, True, "application", "none", {}, 'current of align and open-loop start, up to i_max where the load asks for it', ""),
     Entry(0x2300, 9, "t_align", "position", "i32", "live", "s", -3, 0, 10, 10000, 300, False, True, "application", "none", {}, 'time to align in the open-loop start', ""),
     Entry(0x2300, 10, "open_loop_acceleration", "position", "i32", "live", "rad/s2", -3, 0, 10, 100000000, 50000, False, True, "application", "none", {}, 'acceleration of the open-loop start', ""),
     Entry(0x2300, 11, "observer", "position", "i32", "live", "1", 0, 0, 0, 10, 0, False, True, "application", "none", {0: 'active flux', 1: 'back-EMF (round machines)', 2: 'extended EMF, estimated frame', 3: 'extended EMF, stationary frame', 4: 'flux linkage (round machines)', 5: 'sliding mode', 6: 'Kalman filter of full order', 7: 'Kalman filter of reduced order', 8: 'model reference, current model', 9: 'model reference, voltage model', 10: 'model reference, simplified voltage model'}, 'fundamental-model observer: leads above speed_high', "2.3.3 #17"),
@@ -253,7 +253,7 @@ ENTRIES = (
  '#29 to #31 of the book too.'), "3.5.2.4 #32"),
     Entry(0x2300, 17, "mismatch_frequency", "position", "i32", "live", "Hz", -3, 0, 2000, 100000, 40000, False, True, "application", "none", {}, ('of that current; on the d-axis at most a quarter of the electrical '
  'frequency. A step of 1 kHz is a whole part of its period'), "3.5.2.1 #29"),
-    Entry(0x2300, 18, "mismatch_current", "position", "i32", "live", "A", -3, 0, 10, 1000000, 400, False, True, "application", "none", {}, 'its amplitude, a tenth of the rated current; J must be right for the q-axis', "3.5.2.2 #30"),
+    Entry(0x2300, 18, "mismatch_current", "position", "i32", "live", "A", -3, 0, 10, 4000000, 400, False, True, "application", "none", {}, 'its amplitude, a tenth of the rated current; J must be right for the q-axis', "3.5.2.2 #30"),
     Entry(0x2300, 19, "open_loop_damping", "position", "i32", "live", "1", -3, 0, 0, 3000, 700, False, True, "application", "none", {}, ('damping ratio of the rotor on the vector of align and open-loop start, for '
  'the inertia J; 0: it swings'), ""),
     Entry(0x2300, 20, "start_fallback", "position", "i32", "off", "1", 0, 0, 0, 1, 1, False, True, "application", "none", {0: 'fault', 1: 'align'}, 'where a start leads whose pulses found no polarity or no saliency', "9.4.2 #101"),
@@ -270,7 +270,7 @@ ENTRIES = (
     Entry(0x2320, 2, "ekf_speed_noise", "ekf", "i32", "live", "1", -4, 0, 1, 1000000, 3000, False, True, "application", "none", {}, 'rms wander of the speed in a second, of acceleration times one second', "12.4.5 #144"),
     Entry(0x2320, 3, "ekf_angle_noise", "ekf", "i32", "live", "rad", -4, 0, 1, 100000, 1000, False, True, "application", "none", {}, 'rms wander of the angle in a second that the model does not explain', "12.4.5 #144"),
     Entry(0x2400, 0, "injection.count", "injection", "u8", "const", "", 0, 0, None, None, 35, False, False, "none", "none", {}, 'highest sub-index', ""),
-    Entry(0x2400, 1, "i_pulse", "injection", "i32", "live", "A", -3, 0, 50, 1000000, 4000, False, True, "application", "none", {}, 'peak current of the initial-position pulses', "9.4.2 #101"),
+    Entry(0x2400, 1, "i_pulse", "injection", "i32", "live", "A", -3, 0, 50, 4000000, 4000, False, True, "application", "none", {}, 'peak current of the initial-position pulses', "9.4.2 #101"),
     Entry(0x2400, 2, "v_injection", "injection", "i32", "live", "V", -3, 0, 100, 500000, 70000, False, True, "application", "none", {}, 'amplitude of the square-wave injection', "4.3.2 #38"),
     Entry(0x2400, 3, "cross_coupling_comp", "injection", "i32", "live", "1", 0, 0, 0, 1, 1, False, True, "application", "none", {}, '1: indirect cross-coupling compensation of the injection', "5.2.2.2 #51"),
     Entry(0x2400, 4, "injection_bandwidth", "injection", "i32", "live", "Hz", -3, 0, 1000, 500000, 25000, False, True, "application", "none", {}, 'position loop bandwidth on injection', "4.5.1 #44"),
@@ -293,18 +293,18 @@ ENTRIES = (
     Entry(0x2400, 13, "dc_link_repeats", "injection", "i32", "off", "1", 0, 0, 1, 64, 4, False, True, "application", "none", {}, 'how often the six pulses that the DC-link voltage shows are repeated', "9.5 #103"),
     Entry(0x2400, 32, "position_find", "injection", "i32", "off", "1", 0, 0, 0, 2, 0, False, True, "application", "none", {0: 'pulses', 1: 'injection locks, polarity by the parameter of that name', 2: 'a rotating voltage of v_injection and f_injection'}, 'what finds the initial position', "9.7.2 #107"),
     Entry(0x2400, 33, "polarity", "injection", "i32", "off", "1", 0, 0, 0, 3, 0, False, True, "application", "none", {0: 'by what finds the position', 1: 'two pulses along d', 2: 'i_polarity along d, with injection 0 or 4', 3: 'second harmonic of injection 4'}, "a step of the start of its own that tells the magnet's north from its south", "8.4.2 #96"),
-    Entry(0x2400, 34, "i_polarity", "injection", "i32", "off", "A", -3, 0, 0, 1000000, 2000, False, True, "application", "none", {}, 'current along d, both ways, that shows the polarity', "8.3.1 #94"),
+    Entry(0x2400, 34, "i_polarity", "injection", "i32", "off", "A", -3, 0, 0, 4000000, 2000, False, True, "application", "none", {}, 'current along d, both ways, that shows the polarity', "8.3.1 #94"),
     Entry(0x2400, 35, "L_d_falls", "injection", "i32", "off", "1", 0, 0, 0, 1, 0, False, True, "application", "none", {0: 'with magnetising current', 1: 'with demagnetising current, as bridges that the magnet holds saturated make it'}, ('what saturates the machine, as no start can tell: wrong, and it takes the '
  'wrong pole'), "8.2 #93"),
     Entry(0x2600, 0, "protections.count", "protections", "u8", "const", "", 0, 0, None, None, 12, False, False, "none", "none", {}, 'highest sub-index', ""),
-    Entry(0x2600, 1, "i_trip", "protections", "i32", "locked", "A", -3, 0, 100, 1000000, 9000, False, True, "application", "none", {}, 'over-current fault, instantaneous, any phase', ""),
+    Entry(0x2600, 1, "i_trip", "protections", "i32", "locked", "A", -3, 0, 100, 4000000, 9000, False, True, "application", "none", {}, 'over-current fault, instantaneous, any phase', ""),
     Entry(0x2600, 2, "v_dc_max", "protections", "i32", "locked", "V", -3, 0, 5000, 1200000, 400000, False, True, "application", "none", {}, 'DC over-voltage fault', ""),
     Entry(0x2600, 3, "v_dc_min", "protections", "i32", "locked", "V", -3, 0, 2000, 1200000, 60000, False, True, "application", "none", {}, 'DC under-voltage fault', ""),
     Entry(0x2600, 4, "v_dc_derate", "protections", "i32", "locked", "V", -3, 0, 5000, 1200000, 380000, False, True, "application", "none", {}, ('regenerated torque is reduced above, to zero at three quarters of the way to '
  'v_dc_max'), ""),
     Entry(0x2600, 5, "temp_derate", "protections", "i32", "locked", "degC", -1, 0, 0, 2000, 900, False, True, "application", "none", {}, 'current is reduced above, to zero at temp_trip', ""),
     Entry(0x2600, 6, "temp_trip", "protections", "i32", "locked", "degC", -1, 0, 0, 2000, 1100, False, True, "application", "none", {}, 'over-temperature fault', ""),
-    Entry(0x2600, 7, "offset_max", "protections", "i32", "locked", "A", -3, 0, 1, 100000, 300, False, True, "application", "none", {}, 'largest accepted offset of a current sensor', ""),
+    Entry(0x2600, 7, "offset_max", "protections", "i32", "locked", "A", -3, 0, 1, 400000, 300, False, True, "application", "none", {}, 'largest accepted offset of a current sensor', ""),
     Entry(0x2600, 8, "speed_trip", "protections", "i32", "locked", "rad/s", -3, 0, 1000, 20000000, 180000, False, True, "application", "none", {}, 'over-speed fault', ""),
     Entry(0x2600, 9, "t_stall", "protections", "i32", "locked", "s", -3, 0, 50, 60000, 1000, False, True, "application", "none", {}, ('stall fault: time with three quarters of rated current, or its torque, '
  'without turning'), ""),
@@ -313,12 +313,12 @@ ENTRIES = (
     Entry(0x2600, 12, "fault_short", "protections", "i32", "locked", "1", 0, 0, 0, 1, 0, False, True, "application", "none", {0: 'every fault opens the bridge', 1: 'low switches on while the EMF exceeds v_dc'}, ('what follows a fault in field weakening; 1 needs i_trip above the '
  'short-circuit current, psi_m / L_d and its transient'), ""),
     Entry(0x2700, 0, "sensors.count", "sensors", "u8", "const", "", 0, 0, None, None, 4, False, False, "none", "none", {}, 'highest sub-index', ""),
-    Entry(0x2700, 1, "i_full_scale", "sensors", "i32", "read", "A", -3, 0, 100, 1000000, 10000, False, False, "none", "none", {}, "phase current at full scale of the converter, by the board's schematic", ""),
+    Entry(0x2700, 1, "i_full_scale", "sensors", "i32", "read", "A", -3, 0, 100, 4000000, 10000, False, False, "none", "none", {}, "phase current at full scale of the converter, by the board's schematic", ""),
     Entry(0x2700, 2, "v_full_scale", "sensors", "i32", "read", "V", -3, 0, 5000, 1200000, 450000, False, False, "none", "none", {}, "DC-link voltage at full scale of the converter, by the board's schematic", ""),
     Entry(0x2700, 3, "i_noise", "sensors", "i32", "live", "A", -6, 0, 0, 10000000, 5000, False, True, "application", "none", {}, 'rms noise of a current sample, for the quality limits', "5.8.1 #65"),
     Entry(0x2700, 4, "t_settle", "sensors", "i32", "locked", "s", -9, 0, 0, 10000, 0, False, True, "application", "none", {}, 'low-side shunts: settling after edge and dead time; 0: shunts in the lines', "5.8.1 #65"),
     Entry(0x2800, 0, "reference.count", "reference", "u8", "const", "", 0, 0, None, None, 1, False, False, "none", "none", {}, 'highest sub-index', ""),
-    Entry(0x2800, 1, "target_current", "reference", "i32", "live", "A", -3, 0, 0, 1000000, 0, False, False, "none", "rx", {}, ('amplitude of the current vector in open-loop current mode, which turns at '
+    Entry(0x2800, 1, "target_current", "reference", "i32", "live", "A", -3, 0, 0, 4000000, 0, False, False, "none", "rx", {}, ('amplitude of the current vector in open-loop current mode, which turns at '
  'target_velocity, and in identification'), ""),
     Entry(0x2900, 0, "measured.count", "measured", "u8", "const", "", 0, 0, None, None, 17, False, False, "none", "none", {}, 'highest sub-index', ""),
     Entry(0x2900, 1, "i_d", "measured", "i32", "read", "A", -3, 0, None, None, None, False, False, "none", "tx", {}, 'd-axis current', ""),
