@@ -79,7 +79,7 @@ class Source
     {
         pm_measure_t codes = {};
         codes.sampled = asked_[1] ? 1 : 0;
-        const obs_more_t more = {&codes, {seen.between, {0, 0}}};
+        const obs_more_t more = {&codes, {seen.between, {0, 0}}, 0};
         obs_in_t in = seen;
         in.more = &more;
         asked_[1] = asked_[0];
