@@ -28,7 +28,8 @@ typedef struct {
     pm_ab_t i_sample[PM_SAMPLES]; /* per-unit; where codes->sampled says so */
 #endif
 #if PM_CARRIES(NEEDS_NEUTRAL)
-    pm_q_t v_zero; /* mean of the terminals minus star point at k, behind its RC, per-unit (drive/neutral.h) */
+    pm_q_t
+        v_zero; /* mean of the terminals minus star point at k, behind its RC, per-unit (drive/neutral.h) */
 #endif
 } obs_more_t;
 #endif

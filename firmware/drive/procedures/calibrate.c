@@ -18,7 +18,8 @@ static pm_procedure_t conclude(drive_t *drive)
     }
 #if PM_CARRIES(NEEDS_NEUTRAL)
     drive->neutral.zero = pm_shl(drive->procedure.calibrate.neutral, PM_Q_BITS - 15 - CALIBRATE_BITS);
-    if (drive->neutral.zero != 0 && pm_abs(drive->neutral.zero - PM_ONE) > PM_ONE / 4) { /* 0: the board has none */
+    if (drive->neutral.zero != 0 &&
+        pm_abs(drive->neutral.zero - PM_ONE) > PM_ONE / 4) { /* 0: the board has none */
         result = PM_FAILED_OFFSET;
     }
 #endif

@@ -23,7 +23,8 @@ TEST(Neutral, ACodeIsAShareOfFullScaleAgainstItsZero)
     self.zero = PM_ONE + PM_ONE / 64;
     for (const int code : {0, 1, 20000, 32768, 33280, 65535}) {
         const double v_V = (1 + 1.0 / 64 - code / 32768.0) * kFullScale_V;
-        EXPECT_NEAR(neutral_signal(&self, &c.neutral, static_cast<uint16_t>(code)) * kBase_V / PM_ONE, v_V, 1e-5)
+        EXPECT_NEAR(neutral_signal(&self, &c.neutral, static_cast<uint16_t>(code)) * kBase_V / PM_ONE, v_V,
+                    1e-5)
             << code;
     }
 }
@@ -76,7 +77,8 @@ struct Loop {
     double seen_V() const
     {
         const app_t &app = loop.app;
-        return neutral_signal(&app.drive.neutral, &app.drive.config.neutral, app.in.more.v_neutral) * kBase_V / PM_ONE;
+        return neutral_signal(&app.drive.neutral, &app.drive.config.neutral, app.in.more.v_neutral) *
+               kBase_V / PM_ONE;
     }
 };
 
