@@ -32,7 +32,8 @@ void third_integration_step(third_integration_t *self, const third_integration_c
     const int32_t y = pm_mean(x, self->x);
     const int32_t psi = self->psi;
     self->x = x;
-    self->psi = pm_add_sat(pm_mulh_sub(psi, psi, self->leak), pm_mulh(x, config->third.t_s));
+    const int32_t rise = pm_mulh(x, config->third.t_s);
+    self->psi = pm_add_sat(pm_mulh_sub(psi, psi + pm_half(rise), self->leak), rise);
     const int32_t q = pm_shl_sat(pm_mulh(psi, self->lift), 3, 30) - pm_shl(pm_mulh(y, self->back), 2);
     third_compare(&self->third, in, y, q, out);
 }

@@ -1,6 +1,6 @@
 /* Third harmonic by integration (METHODS.md 11.4.1, row 127): the third harmonic's flux, without drift and without lag.
  *
- *   psi' += T (v_zero - w_c psi'),   w_c = g 3 |omega|
+ *   psi' += T (v_zero - w_c (psi' + T v_zero/2)),   w_c = g 3 |omega|
  *   psi_0 = (1 + g^2) psi' - g v_zero / (3 |omega|)
  * exact at 3 omega, since (1 + g^2) psi' - g (v_zero / 3 |omega|) turns and stretches psi' back by 1 - j g sgn omega. The pair
  * of third.h is y = v_zero, q = 3 omega psi_0: the quotient of both in place of the arc cosine of psi_0 with the branch by the
