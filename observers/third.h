@@ -1,5 +1,5 @@
 /* Common part of the third-harmonic sources: what the star point says of three times the position (METHODS.md 11.2.1, 11.4,
- * 11.6.3, 11.6.4, rows 133 and 134).
+ * 11.6.3, 11.6.4, rows 132 to 134).
  *
  *   v_zero = p psi_0 behind an RC,   psi_0 = Re(L e^{j 3 theta}),   L = psi_3 - dL_0/2 i_d - j dL_0/2 i_q
  * dL_0 = L_s2 - M_s2 turns the third harmonic with the load, by atan(dL_0/2 i_q / (psi_3 - dL_0/2 i_d)) / 3: 9.8 degrees
@@ -110,9 +110,9 @@ static inline void third_describe(pm_dq_t z, obs_out_t *out)
 {
     const unsigned lift = PM_Q_BITS - THIRD_Z_BITS;
     const pm_dq_t vector = {pm_shl(pm_sat(z.d, THIRD_Z_BITS + 2), lift),
-                            pm_shl(pm_sat(z.q, THIRD_Z_BITS + 2), lift)};
+                            pm_shl(pm_sat(z.q, THIRD_Z_BITS), lift)};
     out->vector = vector;
-    out->eps = pm_frac(pm_shl(pm_sat(z.q, THIRD_Z_BITS), lift), PM_FRAC(1.0 / 3));
+    out->eps = pm_frac(vector.q, PM_FRAC(1.0 / 3));
     out->misfit = pm_shl(pm_sat(THIRD_Z_ONE - z.d, THIRD_Z_BITS), lift);
 }
 
