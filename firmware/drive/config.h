@@ -11,6 +11,7 @@
 #include "firmware/control/regulator.h"
 #include "firmware/control/speed_control.h"
 #include "firmware/drive/fault_short.h"
+#include "firmware/drive/neutral.h"
 #include "firmware/drive/position.h"
 #include "firmware/drive/procedures/flying_start.h"
 #include "firmware/drive/procedures/sequence.h"
@@ -67,6 +68,9 @@ typedef struct {
     mtpa_config_t mtpa;
     field_weakening_config_t field_weakening;
     position_config_t position;
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    neutral_config_t neutral;
+#endif
     pulses_config_t pulses;
     PM_IN_IMAGE(boundary_detection, boundary_detection_config_t boundary_detection;)
     PM_IN_IMAGE(dc_link_pulses, dc_link_pulses_config_t dc_link_pulses;)

@@ -138,6 +138,9 @@ static inline pm_abc_t currents(const drive_t *drive, const uint16_t code[DRIVE_
 static inline obs_more_t measure_more(const drive_t *drive, const drive_in_t *in)
 {
     obs_more_t more = {.codes = &in->more};
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    more.v_zero = neutral_signal(&drive->neutral, &drive->config.neutral, in->more.v_neutral);
+#endif
 #if PM_CARRIES(NEEDS_SECOND_SAMPLE)
     for (uint32_t n = 0; n < PM_SAMPLES; n++) {
         if (pm_sampled(&in->more, n)) {

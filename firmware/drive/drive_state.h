@@ -29,6 +29,9 @@ struct drive {
     modulator_t modulator;   /* begins with what is hidden of the currents */
     pm_abc_t i_abc;
     pm_ab_t i_ab;
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    neutral_t neutral;
+#endif
     bool hw_fault;
     bool carrier; /* injection is on */
     bool forced;  /* open loop: the observer is forced to the ramp angle */

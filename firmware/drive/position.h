@@ -39,6 +39,9 @@ typedef struct {
     pm_unit_t current_low; /* share of the bandwidth of current control while injection leads */
     pm_unit_t tied_share;  /* what a tied observer's disagreement counts */
     uint8_t traits;        /* of the low-speed source */
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    uint8_t traits_high; /* of the observer; without these channels none is ambiguous */
+#endif
     bool injects;          /* the low-speed source leads at low speed; else the observer at all speeds */
     bool corrects;         /* one of the optional stages is on */
 } position_config_t;

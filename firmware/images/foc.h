@@ -9,6 +9,9 @@
 #define PM_CHANNELS 0x0000U
 
 #define PM_WITHOUT_finite_set 1
+#define PM_WITHOUT_neutral 1
+#define PM_WITHOUT_third_integration 1
+#define PM_WITHOUT_third_sogi 1
 #define PM_WITHOUT_pwm_excitation 1
 
 #endif

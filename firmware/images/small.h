@@ -25,6 +25,7 @@
 #define PM_WITHOUT_second_harmonic 1
 #define PM_WITHOUT_pulse_choice 1
 #define PM_WITHOUT_load_current 1
+#define PM_WITHOUT_neutral 1
 #define PM_WITHOUT_back_emf 1
 #define PM_WITHOUT_extended_emf 1
 #define PM_WITHOUT_extended_emf_ab 1
@@ -35,6 +36,8 @@
 #define PM_WITHOUT_mras_current 1
 #define PM_WITHOUT_mras_voltage 1
 #define PM_WITHOUT_mras_simple 1
+#define PM_WITHOUT_third_integration 1
+#define PM_WITHOUT_third_sogi 1
 #define PM_WITHOUT_rotating_sine 1
 #define PM_WITHOUT_inform 1
 #define PM_WITHOUT_pwm_excitation 1

@@ -27,6 +27,10 @@ typedef struct {
 #if PM_CARRIES(NEEDS_SECOND_SAMPLE)
     pm_ab_t i_sample[PM_SAMPLES]; /* per-unit; where codes->sampled says so */
 #endif
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    pm_q_t
+        v_zero; /* mean of the terminals minus star point at k, behind its RC, per-unit (drive/neutral.h) */
+#endif
 } obs_more_t;
 #endif
 

@@ -9,6 +9,7 @@ enum {
     ADC1_PHASE_W = 12,
     ADC1_TEMPERATURE = 5,
     ADC1_DIAL = 11,
+    ADC1_NEUTRAL = 14,
     ADC1_REFERENCE = 18,
     ADC2_PHASE_V = 3,
     ADC2_V_BUS = 1,
@@ -61,6 +62,12 @@ void measure_start(void)
     ADC2.SMPR1 = reg_field(ADC_SMPR1_SMP1, ADC_SMP_6_5) | reg_field(ADC_SMPR1_SMP3, ADC_SMP_6_5);
     ADC1.JSQR = sequence_of(ADC1_PHASE_U, ADC1_PHASE_W);
     ADC2.JSQR = sequence_of(ADC2_PHASE_V, ADC2_V_BUS);
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    /* behind the currents, by the converter whose end starts the control interrupt */
+    ADC1.SMPR2 |= reg_field(ADC_SMPR2_SMP14, ADC_SMP_6_5);
+    ADC1.JSQR = sequence_of(ADC1_PHASE_U, ADC1_PHASE_W) + reg_field(ADC_JSQR_JL, 1U) +
+                reg_field(ADC_JSQR_JSQ3, ADC1_NEUTRAL);
+#endif
 }
 
 /* The internal reference at 3.3 V, by its value at 3.0. */
@@ -117,6 +124,9 @@ void hal_measure(hal_t *hal, drive_in_t *in)
     in->i_leg[1] = current_code(ADC2.JDR1);
     in->i_leg[2] = current_code(ADC1.JDR2);
     in->v_dc = code_of(ADC2.JDR2 * 16U);
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    in->more.v_neutral = code_of(ADC1.JDR3 * 16U);
+#endif
     in->hw_fault = false;
     const uint32_t breaks = TIM1.SR & BREAKS;
     if (breaks != 0U) {

@@ -8,10 +8,10 @@
 
 #include "hal/hal.h"
 
-/* As wired and programmed today: three leg currents and the DC-link voltage, both halves of a period alike.
- * Dividers of the terminals are on the board (PA4, PC4, PB11, switched on by PB5 low), not yet in the sequence of the
- * converters. PWM on one switch and commutation by COM events are within TIM1 and not yet programmed. */
-#define PORT_CHANNELS NEEDS_HELD
+/* As wired and programmed today: three leg currents and the DC-link voltage, both halves of a period alike. In programs
+ * that carry it the neutral, by an amplifier of the user's at PB11 in place of phase W's divider (docs/board.md).
+ * The other dividers of the terminals (PA4, PC4, switched on by PB5 low) are not in the sequence of the converters. PWM on one switch and commutation by COM events are within TIM1 and not yet programmed. */
+#define PORT_CHANNELS (NEEDS_NEUTRAL | NEEDS_HELD)
 
 #define PORT_CONSOLE_SIZE 128U /* powers of two */
 #define PORT_CAN_FRAMES   16U

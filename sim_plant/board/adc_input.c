@@ -16,7 +16,7 @@
 #define REFERENCE_S       4e-6
 #define CCR_VREFEN        0x00400000u
 
-typedef enum { LEG_U, LEG_V, LEG_W, LINK_VOLTAGE, TEMPERATURE, DIAL } source_t;
+typedef enum { LEG_U, LEG_V, LEG_W, LINK_VOLTAGE, TEMPERATURE, DIAL, NEUTRAL } source_t;
 
 static const struct {
     int converter, channel;
@@ -26,7 +26,7 @@ static const struct {
 } inputs[] = {
     {0, 3, LEG_U, PORT_A, 2},        {1, 3, LEG_V, PORT_A, 6},        {0, 12, LEG_W, PORT_B, 1},
     {1, 1, LINK_VOLTAGE, PORT_A, 0}, {0, 1, LINK_VOLTAGE, PORT_A, 0}, {0, 5, TEMPERATURE, PORT_B, 14},
-    {0, 11, DIAL, PORT_B, 12},
+    {0, 11, DIAL, PORT_B, 12},       {0, 14, NEUTRAL, PORT_B, 11},
 };
 
 static uint32_t share_code(double share)
@@ -74,6 +74,13 @@ static uint32_t current_code(const adc_converter_t *c, int leg, const plant_adc_
     return code > TOP_CODE ? TOP_CODE : code;
 }
 
+/* An amplifier at phase W's input of the dividers, which it replaces: the star point against the mean of the terminals,
+ * about the middle. The plant's channel sees the opposite; without one nothing is connected, and it rests. */
+static uint32_t neutral_code(const adc_converter_t *c, const plant_adc_t *seen)
+{
+    return share_code(0.5 - (seen->v_zero[0] / 65536.0 - 0.5) * per_supply(c));
+}
+
 uint32_t adc_input(const adc_converter_t *c, uint32_t channel, const plant_adc_t *seen)
 {
     if (c->which == 0 && channel == REFERENCE_CHANNEL) {
@@ -92,6 +99,8 @@ uint32_t adc_input(const adc_converter_t *c, uint32_t channel, const plant_adc_t
             return share_code(seen->v_dc / 65536.0 * per_supply(c));
         case TEMPERATURE:
             return temperature_code(&c->chip->wiring);
+        case NEUTRAL:
+            return neutral_code(c, seen);
         case DIAL:
             return share_code(c->chip->wiring.dial);
         case LEG_U:

@@ -12,6 +12,16 @@
 namespace bench
 {
 
+// Of the star point: third harmonic and L_s2 - M_s2.
+constexpr double kPsi3_Wb = 7e-3, kDL0_H = 2e-3;
+
+// v_0 with currents that stand in the rotor's frame (METHODS.md 0.2, E3).
+inline double star_point_V(double theta_rad, double omega_rad_s, Complex i_dq_A)
+{
+    const Complex flux = kPsi3_Wb - 0.5 * kDL0_H * i_dq_A;
+    return (kJ * 3.0 * omega_rad_s * flux * std::polar(1.0, 3 * theta_rad)).real();
+}
+
 struct ObserverCase {
     std::string name;
     observer_config_t config;
@@ -40,6 +50,9 @@ inline drive_params_t parameters(const Machine &linear, const Base &b)
     set(DRIVE_PARAM_L_dqh_rated, 0);
     set(DRIVE_PARAM_cross_half, 0);
     set(DRIVE_PARAM_psi_m, linear.psi_m_Wb);
+    set(DRIVE_PARAM_psi_3, kPsi3_Wb);
+    set(DRIVE_PARAM_third_dL_0, kDL0_H);
+    set(DRIVE_PARAM_neutral_filter, 0);
     return p;
 }
 

@@ -174,6 +174,13 @@ void derive_board_parameters(Setup &setup)
     derive(DRIVE_PARAM_i_full_scale, sensor.i_full_scale_A);
     derive(DRIVE_PARAM_v_full_scale, sensor.v_full_scale_V);
     derive(DRIVE_PARAM_t_settle, sensor.shunt == PLANT_LOW_SIDE ? sensor.settle_s : 0.0);
+    if (sensor.v_zero_full_scale_V > 0.0) {
+        derive(DRIVE_PARAM_neutral_full_scale, sensor.v_zero_full_scale_V);
+        derive(DRIVE_PARAM_neutral_filter, sensor.v_zero_filter_s);
+    } else if (sensor.v_leg_full_scale_V > 0.0) { // the difference of four channels
+        derive(DRIVE_PARAM_neutral_full_scale, sensor.v_leg_full_scale_V);
+        derive(DRIVE_PARAM_neutral_filter, sensor.filter_s);
+    }
     // rounding adds to the noise; codes have 16 bits at most
     const double lsb_A = std::ldexp(2.0 * sensor.i_full_scale_A, -(sensor.bits > 0 ? sensor.bits : 16));
     derive(DRIVE_PARAM_i_noise, lsb_A * std::sqrt(sensor.noise_lsb * sensor.noise_lsb + 1.0 / 12.0));

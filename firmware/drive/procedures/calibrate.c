@@ -16,6 +16,13 @@ static pm_procedure_t conclude(drive_t *drive)
             result = PM_FAILED_OFFSET;
         }
     }
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    drive->neutral.zero = pm_shl(drive->procedure.calibrate.neutral, PM_Q_BITS - 15 - CALIBRATE_BITS);
+    if (drive->neutral.zero != 0 &&
+        pm_abs(drive->neutral.zero - PM_ONE) > PM_ONE / 4) { /* 0: the board has none */
+        result = PM_FAILED_OFFSET;
+    }
+#endif
     return result;
 }
 
@@ -26,6 +33,9 @@ pm_procedure_t procedure_calibrate_step(drive_t *drive, const drive_in_t *in, dr
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
         self->sum[x] += in->i_leg[x];
     }
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    self->neutral += in->more.v_neutral;
+#endif
     self->count++;
     return self->count == CALIBRATE_PERIODS ? conclude(drive) : PM_RUNNING;
 }

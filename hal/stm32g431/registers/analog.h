@@ -21,6 +21,7 @@ typedef struct {
     uint32_t reserved_50[12];
     reg_t JDR1;
     reg_t JDR2;
+    reg_t JDR3;
 } adc_t;
 
 #define ADC_ISR_ADRDY    (1U << 0)
@@ -39,6 +40,7 @@ typedef struct {
 #define ADC_SMPR1_SMP5   (7U << 15)
 #define ADC_SMPR2_SMP11  (7U << 3)
 #define ADC_SMPR2_SMP12  (7U << 6)
+#define ADC_SMPR2_SMP14  (7U << 12)
 #define ADC_SMPR2_SMP18  (7U << 24)
 #define ADC_SQR1_SQ1     (0x1FU << 6)
 #define ADC_JSQR_JL      (3U << 0)
@@ -46,6 +48,7 @@ typedef struct {
 #define ADC_JSQR_JEXTEN  (3U << 7)
 #define ADC_JSQR_JSQ1    (0x1FU << 9)
 #define ADC_JSQR_JSQ2    (0x1FU << 15)
+#define ADC_JSQR_JSQ3    (0x1FU << 21)
 
 /* values of SMPx, in cycles of the converter's clock, of JEXTSEL and of JEXTEN */
 enum { ADC_SMP_6_5 = 1, ADC_SMP_247_5 = 6, ADC_JEXTSEL_TIM1_TRGO2 = 8, ADC_JEXTEN_RISING = 1 };

@@ -174,6 +174,24 @@ TEST_F(Adc, Dial)
     EXPECT_EQ(c.read(rig::adc1 + dr), 1024u);
 }
 
+// The star point against the mean of the terminals; the plant's channel sees the opposite.
+TEST_F(Adc, Neutral)
+{
+    plant_config_t config = rig::plant_config();
+    config.sensor.v_zero_full_scale_V = 5.0;
+    config.sensor.v_zero_offset_V = 1.0; // nothing turns
+    for (const bool connected : {true, false}) {
+        config.sensor.v_zero_full_scale_V = connected ? 5.0 : 0.0;
+        Chip chip(config);
+        chip.all();
+        chip.write(rig::adc1 + sqr1, 14u << 6);
+        chip.write(rig::adc1 + cr, 0x10000000 | 4);
+        chip.run(2000);
+        EXPECT_NEAR(chip.read(rig::adc1 + dr), connected ? 2048 - 2048 / 5 : 2048, 2.0);
+        EXPECT_EQ(chip.take_error(), "");
+    }
+}
+
 TEST_F(Adc, AStuckConverterNeverEnds)
 {
     c.all();

@@ -143,7 +143,7 @@ TEST_F(Port, AHeldLegFollowsACompareValueOutOfReach)
 
 TEST_F(Port, DeclaresWhatIsWired)
 {
-    EXPECT_EQ(hal_channels(hal), NEEDS_HELD | PM_BOOTSTRAP);
+    EXPECT_EQ(hal_channels(hal), NEEDS_NEUTRAL | NEEDS_HELD | PM_BOOTSTRAP);
 }
 
 TEST_F(Port, CurrentsAreTurned)
@@ -154,11 +154,13 @@ TEST_F(Port, CurrentsAreTurned)
         ADC2.JDR1 = 4095 - code;
         ADC1.JDR2 = 2048;
         ADC2.JDR2 = code;
+        ADC1.JDR3 = code;
         hal_measure(hal, &in);
         ASSERT_EQ(in.i_leg[0], 65535U - 16U * code);
         ASSERT_EQ(in.i_leg[1], 65535U - 16U * (4095U - code));
         ASSERT_EQ(in.i_leg[2], 0x7FFFU);
         ASSERT_EQ(in.v_dc, 16U * code);
+        ASSERT_EQ(in.more.v_neutral, 16U * code);
     }
 }
 
