@@ -62,7 +62,7 @@ static void choose(zero_t *self, const zero_config_t *config, uint32_t measured)
 /* From the told form to the measured one when they agree, and back when the latter is lost. */
 static void set_form(zero_t *self, const zero_config_t *config)
 {
-    const pm_q_t off = pm_abs(pm_lp1(&self->eps_mean, zero_eps(self), K_EPS));
+    const pm_q_t off = pm_abs(pm_lp1(&self->eps_mean, self->eps, K_EPS));
     if (config->form != (uint8_t)ZERO_BEGINS_TOLD || !config->told_first) {
         return;
     }
@@ -118,7 +118,7 @@ void zero_slow(zero_t *self, const zero_config_t *config, const obs_in_t *in)
 obs_out_t zero_last(const zero_t *self, const zero_config_t *config)
 {
     (void)config;
-    return (obs_out_t){.eps = zero_eps(self), .misfit = self->misfit};
+    return (obs_out_t){.eps = self->eps, .misfit = self->misfit};
 }
 
 #endif

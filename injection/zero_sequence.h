@@ -74,9 +74,10 @@ typedef struct {
 } zero_place_t;
 
 typedef struct {
-    pm_ab_t u;          /* Q26 */
-    int32_t y;          /* as pm_small() */
-    int32_t sum;        /* of p */
+    pm_ab_t u;   /* Q26 */
+    int32_t y;   /* as pm_small() */
+    int32_t sum; /* of p */
+    pm_q_t eps;
     int32_t gain;       /* 1 / (h P); 0 until the window holds nothing but answers */
     uint32_t at;        /* of the half carrier */
     int32_t sign;       /* of the present half */
@@ -146,11 +147,6 @@ static inline int32_t zero_amplitude(const zero_config_t *config, pm_unit_t r)
     return pm_mulh(config->v_h, r);
 }
 
-static inline pm_q_t zero_eps(const zero_t *self)
-{
-    return pm_small_gain(pm_shl(pm_sat(self->sum, 28), 3), self->gain);
-}
-
 /* Closes the period: d~, s~, eps and the fundamental current. */
 static inline void zero_close(zero_t *self, const zero_config_t *config, const injection_in_t *in,
                               zero_sample_t sample, injection_out_t *out)
@@ -172,7 +168,8 @@ static inline void zero_close(zero_t *self, const zero_config_t *config, const i
         self->at = 0;
         self->sign = -self->sign;
     }
-    out->eps = zero_eps(self);
+    self->eps = pm_small_gain(pm_shl(pm_sat(self->sum, 28), 3), self->gain);
+    out->eps = self->eps;
     out->i.d = i.d + past.d;
     out->i.q = i.q + past.q;
 }
