@@ -3,6 +3,7 @@
  *
  * Added (carrier.h): V_h r along chi = 90 degrees - 2 theta^, with r = cos 2 pi k / N, or +-1 for N = 2:
  *   v_0 = A r [sin 2 e - kappa sin(6 theta^ + theta_m + 4 e)],  e: position error
+ *   told form   d = x + A kappa r sin(6 theta^ + theta_m),  s = 2 A r [1 - 2 kappa cos(6 theta^ + theta_m)]
  * There the first part is none at e = 0 whatever the position is, at standstill too. The second has the told
  * kappa and theta_m (`told`), or is the current's negative sequence as the neutral sees it (`measured`).
  * Under load the lock moves by 1/2 atan(L_c0 / dL_0), which zero_L_c0 takes away (6.4.3, 6.6.3).
@@ -21,8 +22,26 @@ extern "C" {
 typedef zero_config_t zero_anti_rotating_config_t;
 typedef zero_t zero_anti_rotating_t;
 
-void zero_anti_rotating_step(zero_anti_rotating_t *self, const zero_anti_rotating_config_t *config,
-                             const injection_in_t *in, injection_out_t *out);
+#if PM_CARRIES(NEEDS_NEUTRAL)
+static inline void zero_anti_rotating_step(zero_anti_rotating_t *self,
+                                           const zero_anti_rotating_config_t *config,
+                                           const injection_in_t *in, injection_out_t *out)
+{
+    const pm_q_t x = zero_voltage(self, config, in);
+    const pm_unit_t next = zero_cosine(self, config);
+    zero_sample_t sample;
+    if (self->measured != 0U) {
+        sample = zero_measured(self, config, in, x);
+    } else {
+        const pm_unit_t r = zero_swing(self, next);
+        self->told.q += self->rate.q;
+        sample.d = x + pm_unit(self->told.q, r);
+        sample.s = pm_unit(self->s_told, r);
+    }
+    zero_close(self, config, in, sample, out);
+    out->carrier = excitation_of(carrier_anti_rotating(zero_amplitude(config, next), in->ahead));
+}
+#endif
 
 static inline void zero_anti_rotating_reset(zero_anti_rotating_t *self,
                                             const zero_anti_rotating_config_t *config, const obs_in_t *in)

@@ -23,7 +23,7 @@ void zero_pulsating_step(zero_pulsating_t *self, const zero_pulsating_config_t *
         sample.s = pm_shl(pm_mulh(pm_unit(self->s_told, r), sine_of_three(in->dir)), 3);
     }
     zero_close(self, config, in, sample, out);
-    out->carrier = (excitation_t){.v = carrier_along_d(zero_amplitude(config, next), in->ahead)};
+    out->carrier = excitation_of(carrier_along_d(zero_amplitude(config, next), in->ahead));
 }
 
 #endif

@@ -19,7 +19,7 @@ static zero_sample_t told(zero_t *self, const zero_config_t *config, const injec
     const pm_q_t sin = pm_shl(pm_mulh2(twice.sin, phi.cos, twice.cos, phi.sin), 2) * self->sign;
     self->told.d += self->rate.d;
     self->told.q += self->rate.q;
-    const pm_q_t known = pm_half(self->s_told) + self->told.d;
+    const pm_q_t known = self->a + self->told.d;
     const zero_sample_t sample = {x + pm_unit(known, cos) + pm_unit(self->told.q, sin),
                                   pm_unit(self->s_told, sin)};
     return sample;
@@ -33,7 +33,7 @@ void zero_rotating_step(zero_rotating_t *self, const zero_rotating_config_t *con
     const zero_sample_t sample =
         self->measured != 0U ? zero_measured(self, config, in, x) : told(self, config, in, x);
     zero_close(self, config, in, sample, out);
-    out->carrier = (excitation_t){.v = carrier_along(pm_mulh(config->v_h, PM_FRAC(0.125)), axis)};
+    out->carrier = excitation_of(carrier_along(pm_mulh(config->v_h, PM_FRAC(0.125)), axis));
 }
 
 #endif

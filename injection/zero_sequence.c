@@ -31,7 +31,14 @@ static void set_told(zero_t *self, const zero_config_t *config, const obs_in_t *
     self->told = told;
     self->rate.d = -pm_mul(turn, told.q);
     self->rate.q = pm_mul(turn, told.d);
-    self->s_told = 2 * a;
+    self->a = a;
+    pm_q_t second = 0;
+    if (config->anti_rotating != 0U) {
+        second = -4 * told.d;
+    } else if (config->omega_least != 0) {
+        second = 4 * a_kappa;
+    }
+    self->s_told = 2 * a + second;
 }
 
 void zero_reset(zero_t *self, const zero_config_t *config, const obs_in_t *in)
@@ -95,7 +102,7 @@ static void set_misfit(zero_t *self, const zero_config_t *config, const obs_in_t
     if (config->omega_least != 0) {
         self->misfit = pm_abs(in->omega) < config->omega_least ? PM_ONE : 0;
     } else if (self->measured != 0U) {
-        const pm_q_t rise = pm_shl(self->s_told, 2); /* A against that without load */
+        const pm_q_t rise = pm_shl(self->a, 3); /* against that without load */
         const pm_q_t share = pm_div(self->power, pm_mul(config->power_0, pm_mul(rise, rise)));
         self->misfit = pm_clamp(pm_sqrt(share) - PM_ONE, -PM_ONE, PM_ONE);
     }

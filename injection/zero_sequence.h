@@ -60,6 +60,7 @@ typedef struct {
     uint16_t warm;                   /* slow steps until the window holds nothing but answers */
     uint8_t form;                    /* zero_form_t */
     bool told_first;
+    uint32_t anti_rotating; /* 1: this carrier */
     /* the told form */
     saliency_config_t saliency; /* of I_p A is made, and theta_m */
     pm_q_t kappa_0, kappa_2;
@@ -84,6 +85,7 @@ typedef struct {
     pm_unit_t swing[2]; /* r of the voltages commanded one and two periods ago */
     pm_dq_t told;       /* A kappa e^{j (6 theta^ + theta_m)} */
     pm_dq_t rate;       /* its change in a period */
+    pm_q_t a;           /* A(i_q) */
     pm_q_t s_told;      /* amplitude of s, told form */
     uint32_t measured;  /* 1: the form is */
     int32_t power;      /* h P, Q24 */
@@ -103,10 +105,10 @@ typedef struct {
 /* x_k. */
 static inline pm_q_t zero_voltage(zero_t *self, const zero_config_t *config, const injection_in_t *in)
 {
-    const int32_t y = pm_small(in->more->v_zero);
+    const pm_q_t y = in->more->v_zero;
     const int32_t x = pm_mulh_sub(pm_mulh(y, config->v_now), self->y, config->v_past);
     self->y = y;
-    return pm_shl(pm_sat(x, 20), PM_Q_BITS - 20);
+    return pm_shl(pm_sat(x, 18), PM_Q_BITS - 18);
 }
 
 /* The measured form. */
@@ -116,8 +118,8 @@ static inline zero_sample_t zero_measured(zero_t *self, const zero_config_t *con
     const pm_half_dir_t twice = pm_dir_sum(in->dir, in->dir);
     const pm_ab_t u = {pm_mulh_sub(pm_mulh(in->i.alpha, twice.cos), in->i.beta, twice.sin),
                        pm_mulh_add(pm_mulh(in->i.alpha, twice.sin), in->i.beta, twice.cos)};
-    const int32_t re = pm_small(pm_shl(u.alpha - self->u.alpha, PM_Q_BITS - 26));
-    const int32_t im = pm_small(pm_shl(u.beta - self->u.beta, PM_Q_BITS - 26));
+    const int32_t re = pm_shl(pm_sat(u.alpha - self->u.alpha, 25), 6); /* as pm_small() of Q26 */
+    const int32_t im = pm_shl(pm_sat(u.beta - self->u.beta, 25), 6);
     const int32_t g_re = pm_mulh_sub(pm_mulh(re, config->c_re), im, config->c_im);
     const int32_t g_im = pm_mulh_add(pm_mulh(re, config->c_im), im, config->c_re);
     self->u = u;

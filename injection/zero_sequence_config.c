@@ -61,8 +61,8 @@ static void make_channel(maker_t *m, zero_config_t *c, pm_num_t unit)
     }
     const pm_num_t a = decay(x);
     const pm_num_t now = pm_num_div(m->base.v, pm_num_mul(unit, pm_num_sub(pm_num(1), a)));
-    c->v_now = fixed(m, now, SMALL_BITS, DRIVE_PARAM_zero_dL_0);
-    c->v_past = fixed(m, pm_num_mul(now, a), SMALL_BITS, DRIVE_PARAM_zero_dL_0);
+    c->v_now = fixed(m, now, 22, DRIVE_PARAM_zero_dL_0);
+    c->v_past = fixed(m, pm_num_mul(now, a), 22, DRIVE_PARAM_zero_dL_0);
 }
 
 /* c / T_s of a current per unit, in `unit`. */
@@ -122,6 +122,7 @@ void make_zero_sequence(maker_t *m, zero_config_t *c)
 void make_zero_anti_rotating(maker_t *m, zero_anti_rotating_config_t *c)
 {
     make_zero_sequence(m, c);
+    c->anti_rotating = 1U;
 }
 
 /* sin^2 3 theta in the mean, over 0.2 s. */
