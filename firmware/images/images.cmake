@@ -22,7 +22,7 @@ set(PM_IMAGE_neutral_METHODS active_flux pulsating_square synchronous_pi calibra
 set(PM_IMAGE_neutral_IN_FLASH)
 set(PM_IMAGE_neutral_FLASH 81920)
 set(PM_IMAGE_neutral_RAM 14336)
-set(PM_IMAGE_neutral_STACK 2176)
+set(PM_IMAGE_neutral_STACK 2304)
 set(PM_IMAGE_neutral_CCM 10240)
 set(PM_IMAGE_neutral_INTERRUPT_MEAN 440)
 set(PM_IMAGE_neutral_INTERRUPT_WORST 500)
