@@ -7,6 +7,8 @@
  *              the stator it turns with omega_h + omega; in the estimated frame all amplitudes are constant,
  *              so that a window of N samples nulls what it must at any speed.
  *   axis       V_h along an axis of the stator, whatever the estimate (axes.h).
+ *   anti-rotating  V_h along e^{j (90 degrees - 2 theta)}, an axis that turns back at twice the speed
+ *              (METHODS.md 6.4.1).
  * `ahead` is half of the direction of the estimated frame in the middle of the period in which the voltage
  * acts; amplitudes are Q30, below 2. Two products for the square wave, three for the pulsating one, six for the
  * rotating one. A carrier knows nothing of how its answer is read. Tests: tests/unit/injection. */
@@ -65,6 +67,15 @@ static inline pm_ab_t carrier_rotating(int32_t x, pm_dir_t phase, pm_half_dir_t 
 static inline pm_ab_t carrier_along(pm_q_t x, pm_dir_t axis)
 {
     const pm_ab_t v = {pm_unit(x, axis.cos), pm_unit(x, axis.sin)};
+    return v;
+}
+
+/* Voltage x (Q30) along the axis that turns back at twice the speed of the frame, as a signal. */
+static inline pm_ab_t carrier_anti_rotating(int32_t x, pm_half_dir_t ahead)
+{
+    const int32_t half_sin = pm_mulh(ahead.sin, ahead.cos); /* of twice the angle, Q28 */
+    const int32_t cos = pm_mulh_sub(pm_mulh(ahead.cos, ahead.cos), ahead.sin, ahead.sin);
+    const pm_ab_t v = {pm_shl(pm_mulh(x, half_sin), 3), pm_shl(pm_mulh(x, cos), 2)};
     return v;
 }
 

@@ -25,7 +25,8 @@ void injection_reset(injection_t *self, const injection_config_t *config, const 
 
 /* The one that injection_step() has compiled into its caller is not called here a second time. */
 #define OTHER_STEP(name)                                                                                     \
-    if (INJECTION_##name != INJECTION_INLINE) {                                                              \
+    if (INJECTION_##name != INJECTION_INLINE &&                                                              \
+        !(INJECTION_NEUTRAL && INJECTION_##name == INJECTION_zero_anti_rotating)) {                          \
         name##_step(&self->name, &config->name, in, out);                                                    \
     }
 

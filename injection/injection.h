@@ -36,6 +36,8 @@ typedef enum {
 } injection_id_t;
 
 #define INJECTION_INLINE INJECTION_pulsating_square /* the default costs no call */
+/* nor does one more in programs that carry the neutral */
+#define INJECTION_NEUTRAL (PM_CARRIES(NEEDS_NEUTRAL) && PM_HAS(zero_anti_rotating))
 
 typedef struct {
     injection_id_t id;
@@ -64,7 +66,7 @@ void make_injection(maker_t *m, injection_config_t *c);
 injection_limits_t injection_limits(const maker_t *m);
 bool injection_sees_saliency(const maker_t *m);
 
-/* injection_step() of all but INJECTION_INLINE. */
+/* injection_step() of all but those. */
 void injection_step_other(injection_t *self, const injection_config_t *config, const injection_in_t *in,
                           injection_out_t *out);
 
@@ -73,6 +75,10 @@ static inline void injection_step(injection_t *self, const injection_config_t *c
 {
     if (__builtin_expect(config->id == INJECTION_INLINE, 1) != 0) {
         pulsating_square_step(&self->pulsating_square, &config->pulsating_square, in, out);
+#if INJECTION_NEUTRAL
+    } else if (config->id == INJECTION_zero_anti_rotating) {
+        zero_anti_rotating_step(&self->zero_anti_rotating, &config->zero_anti_rotating, in, out);
+#endif
     } else {
         /* Only this path needs them in memory; copied by members, so that elsewhere they stay in registers. */
         const injection_in_t given = {{in->i.alpha, in->i.beta},

@@ -9,5 +9,8 @@
 #include "injection/rotating_sine.h"
 #include "injection/stationary_sine.h"
 #include "injection/stationary_square.h"
+#include "injection/zero_anti_rotating.h"
+#include "injection/zero_pulsating.h"
+#include "injection/zero_rotating.h"
 
 #endif

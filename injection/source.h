@@ -31,6 +31,23 @@ typedef struct {
 #endif
 } excitation_t;
 
+/* A voltage and nothing else. */
+static inline excitation_t excitation_of(pm_ab_t v)
+{
+    excitation_t e;
+    e.v = v;
+#if PM_CARRIES(NEEDS_HALVES)
+    e.split.alpha = 0;
+    e.split.beta = 0;
+#endif
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    for (uint32_t n = 0; n < PM_SAMPLES; n++) {
+        e.sample_at[n] = 0;
+    }
+#endif
+    return e;
+}
+
 typedef struct {
     pm_q_t eps; /* as obs_out_t */
     pm_dq_t i;  /* current at k in the present frame without the answer to the carrier */

@@ -279,7 +279,7 @@ enum {
     OD_PARAMETER_CROSS_COUPLING_COMP,
     OD_PARAMETER_INJECTION_BANDWIDTH,
     OD_PARAMETER_INJECTION,
-#if PM_HAS(rotating_sine)
+#if PM_HAS(rotating_sine) || PM_HAS(pulsating_sine) || PM_HAS(stationary_sine) || PM_HAS(stationary_square) || PM_HAS(three_phase_hf) || PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating)
     OD_PARAMETER_F_INJECTION,
     OD_PARAMETER_INJECTION_POST_COMP,
 #endif
@@ -304,6 +304,11 @@ enum {
 #endif
 #if PM_HAS(initial_pulses) || PM_HAS(dual_pulses) || PM_HAS(three_phase_hf)
     OD_PARAMETER_L_D_FALLS,
+#endif
+#if PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating)
+    OD_PARAMETER_ZERO_DL_0,
+    OD_PARAMETER_ZERO_L_C0,
+    OD_PARAMETER_ZERO_FORM,
 #endif
     OD_PARAMETER_I_TRIP,
     OD_PARAMETER_V_DC_MAX,

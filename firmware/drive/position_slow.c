@@ -11,6 +11,8 @@
 #define PER_MISFIT_LOST PM_Q(1.0 / 0.5)
 /* Noise of a single error signal: 3 ms. */
 #define K_NOISE PM_FRAC(0.3)
+/* The same of a source that is right in the mean over a sixth of a turn: 64 ms. */
+#define K_MEAN_NOISE PM_FRAC(1.0 / 64)
 /* The weight follows the speed through 5 ms, so that noise of the speed does not move it. */
 #define K_SPEED PM_FRAC(0.2)
 
@@ -142,9 +144,9 @@ pm_angle_t position_resolve_slip(position_t *self, const position_config_t *conf
     return turn;
 }
 
-static pm_q_t magnitude_after(pm_q_t *filter, pm_q_t x)
+static pm_q_t magnitude_after(pm_q_t *filter, pm_q_t x, pm_frac_t k)
 {
-    return pm_abs(pm_lp1(filter, x, K_NOISE));
+    return pm_abs(pm_lp1(filter, x, k));
 }
 
 /* Means of magnitudes: a source that has slipped shows errors of either sign, slower than the noise that is
@@ -155,9 +157,10 @@ static void set_quality(position_t *self, const position_config_t *config, const
     if (self->inject) {
         low = injection_last(&self->injection, &config->injection);
     }
-    const pm_q_t low_eps = magnitude_after(&self->injection_eps, low.eps);
+    const bool in_mean = (config->traits & (uint8_t)SOURCE_IN_MEAN) != 0U;
+    const pm_q_t low_eps = magnitude_after(&self->injection_eps, low.eps, in_mean ? K_MEAN_NOISE : K_NOISE);
     /* also while the observer is tied: an EMF that the position does not explain */
-    pm_q_t eps = magnitude_after(&self->observer_eps, seen->eps + mismatch_eps(&self->mismatch, i));
+    pm_q_t eps = magnitude_after(&self->observer_eps, seen->eps + mismatch_eps(&self->mismatch, i), K_NOISE);
     pm_q_t misfit = pm_abs(seen->misfit);
     if (self->weight == 0) {
         eps = pm_unit(eps, config->tied_share);

@@ -44,5 +44,8 @@
 #define PM_WITHOUT_pulsating_sine 1
 #define PM_WITHOUT_stationary_sine 1
 #define PM_WITHOUT_stationary_square 1
+#define PM_WITHOUT_zero_anti_rotating 1
+#define PM_WITHOUT_zero_rotating 1
+#define PM_WITHOUT_zero_pulsating 1
 
 #endif

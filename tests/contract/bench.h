@@ -116,6 +116,23 @@ constexpr Machine kSpm400 = {0.373, 3.385e-3, 3.385e-3, 2.09e5, 77.6e-3, 5};
 constexpr Machine kIpmLinear = {6.0, 43.0e-3, 75.0e-3, 0.0, 0.236, 3};
 constexpr Machine kSpmLinear = {0.373, 3.24e-3, 3.24e-3, 0.0, 77.6e-3, 5};
 
+// What the star point shows of a machine, METHODS.md 0.2 E3, and its channel.
+struct Neutral {
+    double dL_0_H, full_scale_V, filter_s;
+
+    double flux_Wb(Complex i_A, double theta_rad) const
+    {
+        return -0.5 * dL_0_H * (i_A * std::polar(1.0, 2 * theta_rad)).real();
+    }
+    // The RC after a time with a constant voltage.
+    double filtered(double v_V, double input_V, double time_s) const
+    {
+        return input_V + (v_V - input_V) * std::exp(-time_s / filter_s);
+    }
+};
+
+constexpr Neutral kNeutral = {2.0e-3, 10, 100e-6};
+
 struct Base {
     double v_V, i_A, omega_rad_s, period_s;
 

@@ -43,6 +43,20 @@ inline Names must_be_positive(const stationary_square_config_t &c)
             {"square i_n", c.stationary.i_n}};
 }
 
+inline Names must_be_positive(const zero_config_t &c) // of all three sources
+{
+    return {{"zero v_h", c.v_h},
+            {"zero v_now", c.v_now},
+            {"zero v_past", c.v_past},
+            {"zero c_re", c.c_re},
+            {"zero power_0", c.power_0},
+
+            {"zero half", static_cast<int32_t>(c.half)},
+            {"zero warm", c.warm},
+            {"zero turn6", c.turn6},
+            {"zero i_p_0", c.saliency.i_p_0}};
+}
+
 inline Names must_be_positive(const inform_config_t &c)
 {
     return {{"inform v_h", c.v_h}, {"inform gain_0", c.axes.saliency.gain_0}, {"inform lag", c.axes.lag}};

@@ -49,6 +49,7 @@ class Run
     Complex i_dq_A = 0;            // fundamental, kept by a steady voltage
     double loop_Hz = 0;            // of a position loop that moves `error`; 0: imposed
     Complex disturbance_V = 0;     // in the stator, that nobody knows of
+    double L_c0_H = 0;             // cross-coupling of the zero sequence
     bool sampled = true;           // samples that are asked for are taken
     std::vector<excitation_t> given;
 
@@ -77,7 +78,8 @@ class Run
         const double ahead = theta - error + 1.5 * omega * kBase.period_s;
         pm_measure_t codes = {};
         codes.sampled = sampled && given.size() > 1 && given[given.size() - 2].sample_at[0] != 0 ? 1 : 0;
-        const obs_more_t more = {&codes, {bench::ab(between_ / kBase.i_A), {0, 0}}, 0};
+        const obs_more_t more = {
+            &codes, {bench::ab(between_ / kBase.i_A), {0, 0}}, bench::fixed(v_zero_V_ / kBase.v_V, 28)};
         injection_in_t in = {};
         in.more = &more;
         in.i = now.i;
@@ -138,6 +140,7 @@ class Run
             if (2 * k == n) {
                 between_ = i_ * std::polar(1.0, theta);
             }
+            const double psi_0 = flux_zero();
             const Complex added = bench::complex(e.v) + (2 * k < n ? 1.0 : -1.0) * bench::complex(e.split);
             const Complex v =
                 steady + (added * kBase.v_V + disturbance_V) * std::polar(1.0, -theta - omega * t / 2);
@@ -145,7 +148,15 @@ class Run
             const Complex dpsi = v - R_ohm * i_ - kJ * omega * psi;
             i_ += t * Complex(dpsi.real() / m.L_d0_H, dpsi.imag() / m.L_q0_H);
             theta += omega * t;
+            v_zero_V_ = bench::kNeutral.filtered(v_zero_V_, (flux_zero() - psi_0) / t, t);
         }
+    }
+
+    // METHODS.md 0.2 E3, at the star point.
+    double flux_zero() const
+    {
+        const Complex u = i_ * std::polar(1.0, 3 * theta);
+        return bench::kNeutral.flux_Wb(i_ * std::polar(1.0, theta), theta) - 0.5 * L_c0_H * u.imag();
     }
 
     // The loop of drive/position.c at standstill: a double pole with damping 0.9.
@@ -160,6 +171,7 @@ class Run
     injection_t self_ = {};
     Complex i_ = 0, between_ = 0;
     double speed_ = 0;
+    double v_zero_V_ = 0;
 };
 
 } // namespace rig
