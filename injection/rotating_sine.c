@@ -15,6 +15,7 @@ void rotating_sine_reset(rotating_sine_t *self, const rotating_sine_config_t *co
     self->misfit = 0;
 }
 
+#if PM_HAS(rotating_sine)
 /* The current of both sequences where phi' is `phase`. */
 static pm_dq_t ahead_of(const rotating_sine_t *self, const rotating_sine_config_t *config, pm_dir_t phase)
 {
@@ -25,6 +26,7 @@ static pm_dq_t ahead_of(const rotating_sine_t *self, const rotating_sine_config_
     i.q = pm_unit(positive.q + negative.q, phase.cos) + pm_unit(positive.d - negative.d, phase.sin);
     return i;
 }
+#endif
 
 void rotating_sine_step(rotating_sine_t *self, const rotating_sine_config_t *config, const injection_in_t *in,
                         injection_out_t *out)
@@ -40,9 +42,11 @@ void rotating_sine_step(rotating_sine_t *self, const rotating_sine_config_t *con
     out->i = sine_mean(&self->sine, &config->sine);
     out->carrier =
         (excitation_t){.v = carrier_rotating(sine_amplitude(&config->sine), pm_dir(phi), in->ahead)};
+#if PM_HAS(rotating_sine)
     if (config->counted_in) {
         out->carrier.i = ahead_of(self, config, pm_dir(phi - config->sine.lag + config->sine.ahead));
     }
+#endif
 }
 
 /* p of the header. */

@@ -1,5 +1,5 @@
 /* Rotating sine injection, negative sequence demodulated, with what the inverter and the resistance do to it
- * taken from the positive sequence (METHODS.md 4.4.1, 5.6.3.1, 5.6.4.2, 5.7; rows 39, 60, 63 and 64).
+ * taken from the positive sequence (METHODS.md 4.4.1, 5.6.3.1, 5.6.4.2, 5.7; rows 39, 60 and 63).
  *
  * Added in the estimated frame (carrier.h), with phi, phi' and F of sine.h:
  *   v = V_h e^{j phi_k}

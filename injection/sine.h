@@ -5,7 +5,7 @@
  *   F    = V_h T_s / (2 sin(a / 2)):  flux amplitude at the samples, of a voltage in steps
  *   phi' = phi_k - 1.5 a - omega_h T_x - pi / 2:  phase of the current at k, of a voltage that was commanded 1.5
  *                                     periods ago; T_x, `injection_delay`: what amplifiers and filters add to that
- * A source that reads this phase errs by omega_h / 2 of the delay that it is not told (5.7, row 64); one that
+ * A source that reads this phase errs by omega_h / 2 of the delay that it is not told (METHODS.md 5.7, row 64); one that
  * measures the phase of its answer does not.
  * The window takes the current at the phase phi' over a period of the carrier (window.h). For so long after a
  * reset, and until the first answer, it holds other things too and is not to be read.
@@ -25,7 +25,7 @@ extern "C" {
 
 typedef struct {
     pm_q_t v_h;
-    pm_frac_t per_n; /* 1 / N */
+    pm_frac_t per_n;  /* 1 / N */
     pm_angle_t step;  /* a */
     pm_angle_t ahead; /* 1.5 a: from a sample to the middle of the period in which what it commands acts */
     pm_angle_t lag;   /* 1.5 a + a quarter of a turn, and what injection_delay makes */

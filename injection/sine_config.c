@@ -52,7 +52,8 @@ pm_num_t sine_answer(const maker_t *m, pm_num_t amplitude)
 /* injection_delay at omega_h, an angle. */
 static int32_t delayed(maker_t *m)
 {
-    const pm_num_t turns = pm_num_mul(si(m, DRIVE_PARAM_injection_delay), pm_num_div(sine_omega(m), PM_NUM_TWO_PI));
+    const pm_num_t turns =
+        pm_num_mul(si(m, DRIVE_PARAM_injection_delay), pm_num_div(sine_omega(m), PM_NUM_TWO_PI));
     return fixed(m, turns, 32, DRIVE_PARAM_injection_delay);
 }
 

@@ -209,7 +209,8 @@ TEST(Metrics, OrdersOfThePositionErrorAreByTheAngleOverWholeTurns)
         const double x = 2.3 * 2 * pi * k / 1000.0;
         const double theta = -(x + 0.3 * std::sin(x));
         s.rig.truth.theta_e_rad = theta;
-        s.rig.angle_error_rad = (5.0 + 3.0 * std::cos(2 * theta + 1.0) + 2.0 * std::cos(6 * theta)) * pi / 180.0;
+        s.rig.angle_error_rad =
+            (5.0 + 3.0 * std::cos(2 * theta + 1.0) + 2.0 * std::cos(6 * theta)) * pi / 180.0;
     };
     EXPECT_NEAR(gather("angle_error_2nd_deg", wave).number, 3.0, 0.03);
     EXPECT_NEAR(gather("angle_error_6th_deg", wave).number, 2.0, 0.03);
