@@ -15,7 +15,7 @@ void rotating_sine_reset(rotating_sine_t *self, const rotating_sine_config_t *co
     self->misfit = 0;
 }
 
-#if PM_HAS(rotating_sine)
+#if PM_HAS(counted_carrier)
 /* The current of both sequences where phi' is `phase`. */
 static pm_dq_t ahead_of(const rotating_sine_t *self, const rotating_sine_config_t *config, pm_dir_t phase)
 {
@@ -42,7 +42,7 @@ void rotating_sine_step(rotating_sine_t *self, const rotating_sine_config_t *con
     out->i = sine_mean(&self->sine, &config->sine);
     out->carrier =
         (excitation_t){.v = carrier_rotating(sine_amplitude(&config->sine), pm_dir(phi), in->ahead)};
-#if PM_HAS(rotating_sine)
+#if PM_HAS(counted_carrier)
     if (config->counted_in) {
         out->carrier.i = ahead_of(self, config, pm_dir(phi - config->sine.lag + config->sine.ahead));
     }

@@ -16,7 +16,7 @@
  * Of a nearly round machine, kappa < 0.1, the second amplifies every error of rho_0: p stays 3/4.
  *
  * Compensation of dead time before the carrier (5.6.4.1, row 62): by the fundamental current alone it does nothing
- * for the carrier, which moves the legs through their zone by itself; with `injection_pre_comp` it goes by the
+ * for the carrier, which moves the legs through their zone by itself; with `injection_pre_comp`, where the image has the option counted_carrier, it goes by the
  * current with the carrier, predicted from both sequences for the middle of the period in which the voltage acts,
  *   i = i_f + P e^{j phi'} + N e^{-j phi'},  phi' of k + 1.5;  P, N: the sequences, complex
  * Both corrections may be on. With this one alone rho' is rho_0.

@@ -23,7 +23,7 @@ typedef struct {
 /* What a carrier does to the period [k+1, k+2); what a source does not name is zero. */
 typedef struct {
     pm_ab_t v; /* added throughout, per-unit */
-#if PM_HAS(rotating_sine)
+#if PM_HAS(counted_carrier)
     pm_dq_t i; /* current of the carrier in the middle of that period, in the estimated frame, where the
                   compensation of dead time is to count it in */
 #endif

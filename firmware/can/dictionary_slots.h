@@ -298,8 +298,10 @@ enum {
 #if PM_HAS(initial_pulses) || PM_HAS(dual_pulses) || PM_HAS(three_phase_hf)
     OD_PARAMETER_L_D_FALLS,
 #endif
-#if PM_HAS(rotating_sine)
+#if PM_HAS(counted_carrier)
     OD_PARAMETER_INJECTION_PRE_COMP,
+#endif
+#if PM_HAS(rotating_sine)
     OD_PARAMETER_INJECTION_DELAY,
 #endif
     OD_PARAMETER_I_TRIP,

@@ -320,7 +320,7 @@ static inline void control(drive_t *drive, const position_out_t *frame, bool usu
     if (drive->carrier) {
         v_ab.alpha += frame->carrier.v.alpha;
         v_ab.beta += frame->carrier.v.beta;
-#if PM_HAS(rotating_sine)
+#if PM_HAS(counted_carrier)
         i.d += frame->carrier.i.d;
         i.q += frame->carrier.i.q;
 #endif
