@@ -31,6 +31,7 @@ package = types.ModuleType("pmdrive")  # its modules one by one: no bus is neede
 package.__path__ = [str(PACKAGE)]
 sys.modules["pmdrive"] = package
 names, tune = importlib.import_module("pmdrive.names"), importlib.import_module("pmdrive.tune")
+carrier = importlib.import_module("pmdrive.carrier")
 UsageError = importlib.import_module("pmdrive.errors").UsageError
 
 NEEDED = {
@@ -177,6 +178,20 @@ def saturation(x, told, L_d, L_q):
     return {name: (value, why) for name, value in L.items()}
 
 
+def from_board(x, told, board):
+    """Parameters that follow from inverter, link and sensor; what `drive:` tells of them stands."""
+    def of(section, key):
+        return float(x[section][key] if key in x.get(section, {}) else board[section][key][0])
+
+    follow = {
+        "f_pwm": of("inverter", "f_pwm_Hz"), "dead_time": of("inverter", "dead_time_s"), "v_dc_nominal": of("rated", "v_dc_V"),
+        "device_drop": of("inverter", "v_switch_V"), "i_full_scale": of("sensor", "i_full_scale_A"),
+        "v_full_scale": of("sensor", "v_full_scale_V"),
+        "i_noise": of("sensor", "noise_lsb") * 2 * of("sensor", "i_full_scale_A") / tune.STEPS,
+    }
+    return {name: float(told.get(name, value)) for name, value in follow.items()}
+
+
 def drive(x, board, tolerance):
     """`drive:` as {name: (value, why)}, what is told above what is chosen."""
     def of(section, key):
@@ -195,11 +210,7 @@ def drive(x, board, tolerance):
         "speed_max": (1.25 * of("rated", "speed_rated_rad_s"), tune.WHY["speed_max"]),
     }
     known = {name: told.get(name, value) for name, (value, _) in machine.items()}
-    known.update(
-        f_pwm=of("inverter", "f_pwm_Hz"), dead_time=of("inverter", "dead_time_s"), v_dc_nominal=of("rated", "v_dc_V"),
-        device_drop=of("inverter", "v_switch_V"), i_full_scale=of("sensor", "i_full_scale_A"),
-        v_full_scale=of("sensor", "v_full_scale_V"),
-        i_noise=of("sensor", "noise_lsb") * 2 * of("sensor", "i_full_scale_A") / tune.STEPS)
+    known.update(from_board(x, {}, board))
     out = dict(machine)
     for name, value in tune.limits(known).items():
         out[name] = value, tune.WHY[name]

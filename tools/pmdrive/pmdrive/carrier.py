@@ -5,8 +5,8 @@ The noise has a formula, noise_deg(). For the loop there is none: a window over 
 while it changes, at omega_h +- nu; the position loop turns the frame with that, and the fundamental current in a frame that
 trembles at omega_h looks like the answer to the carrier. This second loop grows with the square of i_f / I_n and of the bandwidth
 over f_h. So the loop is run, a sample a period, as the drive has it: position loop, window, current control, delay of 1.5 periods,
-cross-coupling by the parabolas of injection/saliency.h; on the machine by its fluxes, without inverter and converter, at a speed
-that is held. Holds.run() begins 5 degrees off and ends within 2 degrees of a position or does not.
+cross-coupling by the parabolas of injection/saliency.h, speed control; on the machine by its fluxes and its inertia, without converter,
+and without the inverter unless it is asked for. Holds.run() begins 5 degrees off and ends within 2 degrees of a position or does not.
 """
 import cmath
 import math
@@ -16,6 +16,7 @@ NAMES = {SQUARE: "pulsating_square", ROTATING: "rotating_sine", PULSATING: "puls
 ZETA = 0.9
 GAIN_RISE = 2.5
 KICK = math.radians(5)
+STAR = [cmath.exp(2j * math.pi * x / 3) for x in range(3)]
 LOST = math.radians(2)   # that a held position swings by at the end at most
 OFF = math.radians(15)   # and is away at most
 SETTLE_S, SEEN_S = 1.0, 0.2
@@ -47,6 +48,15 @@ def parabola(half, full, rated):
     return (4 * half - full) / rated, 2 * (full - 2 * half) / rated ** 2
 
 
+def lost_V(d):
+    """Of a leg, by dead time and drops."""
+    return d["dead_time"] * d["f_pwm"] * d["v_dc_nominal"] + d["device_drop"]
+
+
+def _leg(i, x):
+    return (i * STAR[x].conjugate()).real
+
+
 class Known:
     """What the drive makes of its parameters, as injection/saliency_config.c does."""
 
@@ -54,6 +64,7 @@ class Known:
         zero, rated = (d["L_d"], d["L_q"], 0.0), (d["L_dh_rated"], d["L_qh_rated"], d["L_dqh_rated"])
         F, i = flux_of(d), d["i_rated"]
         slope = slope_sequence if d["injection"] == ROTATING else slope_across
+        self.i_p = F / 2 * (1 / d["L_d"] + 1 / d["L_q"])
         self.F, self.slope_0 = F, slope(zero, F)
         slope_r = slope(rated, F)
         self.sees = self.slope_0 > 0 and slope_r > 0
@@ -95,9 +106,31 @@ class Holds:
     """d: the drive's parameters in SI; current: (psi_d, psi_q) -> (i_d, i_q); flux: (i_d, i_q) -> (psi_d, psi_q); R, of the
     machine; omega: electrical speed."""
 
-    def __init__(self, d, current, flux, R, omega, gain=1.0):
+    def __init__(self, d, current, flux, R, omega, gain=1.0, inverter=False):
         self.d, self.current, self.flux, self.R, self.omega, self.gain = d, current, flux, R, omega, gain
         self.known = Known(d)
+        self.lost_V = lost_V(d) if inverter else 0.0
+        self.corner_A = d["leg_capacitance"] * d["v_dc_nominal"] / d["dead_time"] if inverter and d["dead_time"] else 0.0
+
+    def taken(self, i_s, i_f):
+        """What dead time and leg capacitance take of the voltage, beyond the compensation by the fundamental current."""
+        return self.lost_V * 2 / 3 * sum((self.part(_leg(i_s, x)) - self.part(_leg(i_f, x))) * STAR[x] for x in range(3))
+
+    def turned(self, positive, i_f):
+        """Of a rotating sine, at 1 kHz: the phase of the answer by resistance, positive sequence and cross-coupling."""
+        d, k = self.d, self.known
+        kappa = (d["L_q"] - d["L_d"]) / (d["L_q"] + d["L_d"])
+        rho = d["R_s"] / 2 * (1 / d["L_d"] + 1 / d["L_q"]) * periods(d) / (2 * math.pi * d["f_pwm"])
+        if d.get("injection_post_comp", 1) and positive:
+            beyond = max(-0.5, min(0.5, cmath.phase(positive) - rho * (1 + kappa ** 2)))
+            load = abs(i_f) ** 2 / (abs(i_f) ** 2 + k.i_p ** 2)
+            rho += (0.75 + ((1 / (2 * kappa) - 0.75) * load if kappa >= 0.1 else 0.0)) * beyond
+        return cmath.exp(2j * (rho - k.of(k.turn, i_f.imag)))
+
+    def part(self, i):
+        size, corner = abs(i), self.corner_A
+        share = size / (2 * corner) if size < corner else 1 - corner / (2 * size) if size else 0.0
+        return math.copysign(share, i)
 
     def share(self):
         """Of the bandwidth of current control while the source leads."""
@@ -106,7 +139,7 @@ class Holds:
         return min(1.0, most / self.d["current_bandwidth"])
 
     def run(self, i_q):
-        """(holds, mean error, rad) at the current i_q and its i_d for most torque."""
+        """(holds, mean, largest error, rad) at the current i_q and its i_d for most torque, which a load of that torque asks for."""
         d, k = self.d, self.known
         T, N, R = 1 / d["f_pwm"], periods(d), d["R_s"]
         h = d["psi_m"] / (2 * (d["L_q"] - d["L_d"])) if d["L_q"] > 1.01 * d["L_d"] else math.inf
@@ -131,7 +164,7 @@ class Holds:
         v_acting = (R * i_ref + 1j * self.omega * psi) * rotor
         a = 2 * math.pi / N
         turn_of = [cmath.exp(1j * (n * a - 1.5 * a - math.pi / 2)) for n in range(N)]
-        negative = positive = 0j
+        turn = self.turned(0j, i_ref)
         cosine = sine = 0j
         errors = []
         for n in range(round(SETTLE_S / T)):
@@ -142,7 +175,7 @@ class Holds:
             i_hat = i_s / frame
             error = math.remainder(theta - theta_hat, 2 * math.pi)
             if abs(error) > 1.0:
-                return False, error
+                return False, error, abs(error)
             if d["injection"] == SQUARE:
                 delta = (i_s - past) / frame / 2
                 sign = 1.0 if n % 2 else -1.0  # of two periods ago, and of the next
@@ -168,8 +201,8 @@ class Holds:
                     carrier = d["v_injection"] * math.cos(at * a)
                 else:
                     negative, positive = c + 1j * s, c - 1j * s
-                    rho = R / 2 * (1 / d["L_d"] + 1 / d["L_q"]) / (a / T)
-                    turn = cmath.exp(2j * (rho - k.of(k.turn, i_f.imag)))
+                    if n % slow == 0:
+                        turn = self.turned(positive, i_f)
                     eps = (negative * turn).imag * k.gain(i_f.imag)
                     carrier = d["v_injection"] * cmath.exp(1j * at * a)
                 at = (at + 1) % N
@@ -189,7 +222,8 @@ class Holds:
                 sum_s += k_s * 2 * math.pi * d["speed_bandwidth"] / 4000 * e_s
                 i_q_ref = k_s * e_s + sum_s
                 i_ref = complex(h - math.hypot(h, i_q_ref) if h < math.inf else 0.0, i_q_ref)
-            psi_s += T * (v_acting - self.R * i_s)
+            lost = self.taken(i_s, i_f * frame) if self.lost_V else 0.0
+            psi_s += T * (v_acting - self.R * i_s - lost)
             v_acting = (v + carrier) * ahead
             theta += omega * T
             theta_hat += w * T
@@ -197,4 +231,14 @@ class Holds:
                 errors.append(error)
         mean = sum(errors) / len(errors)
         swing = max(abs(e - mean) for e in errors)
-        return swing < LOST and abs(mean) < OFF, mean
+        return swing < LOST and abs(mean) < OFF, mean, max(map(abs, errors))
+
+    def boundary(self, most, way=1, step=0.05):
+        """The current up to which it holds, the field turning with omega and the load against it: A; `most` where it holds there."""
+        low, high = 0.0, most
+        if self.run(way * most)[0]:
+            return most
+        while high - low > step:
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self.run(way * middle)[0] else (low, middle)
+        return low
