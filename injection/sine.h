@@ -10,6 +10,14 @@
  * The window takes the current at the phase phi' over a period of the carrier (window.h). For so long after a
  * reset, and until the first answer, it holds other things too and is not to be read.
  *
+ * Where it holds (METHODS.md 5.8; rows 65 to 67; predicted by tools/pmdrive/pmdrive/carrier.py, measured in
+ * docs/results/safe_area.md; tools/tune.py chooses V_h, f_h and loops by it):
+ *   noise  sigma = (I_qu / 2 I_n) sqrt(c 2/3 (sigma_n^2 + 1/12) w_n (zeta + 1 / (4 zeta)) / f_pwm)   rad
+ *          I_qu: step of the converter; sigma_n: noise in steps; c: 2 along d, 1 rotating
+ *   load   up to where the second loop through the window is stable: a fundamental current that changes passes the
+ *          window at f_h, the position loop turns the frame with it, and i_f in a frame that trembles at f_h is read
+ *          as an answer; its gain goes with (i_f / I_n)^2 (w_n / omega_h)^2
+ *
  * The samples in it are (N - 1) / 2 periods old, and so is the mean of the current: current control is slowed
  * while the source leads, to a phase of 0.4 rad, and the position loop may have 0.3 rad. */
 #ifndef INJECTION_SINE_H

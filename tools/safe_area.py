@@ -24,6 +24,7 @@ import tune  # noqa: E402
 carrier = tune.carrier
 ROOT = Path(__file__).resolve().parent.parent
 WITHIN = 0.15  # of the current: METHODS.md 5.8.2
+LIGHT = 0.15   # of rated current: what the speed control asks for either way on its way to the load
 SPEED = 0.05   # of rated, that of the campaign's scenario
 LOOPS_HZ = (6, 7, 8.5, 10, 12, 14, 17, 20, 25, 32, 40)
 
@@ -67,7 +68,8 @@ def judge(rows):
         i_q = current_of(machine, row["drawn.load"] * float(rated["torque_rated_Nm"]) + friction)
         way = int(row["drawn.direction"])
         run = holds(machine, {})(way)
-        inside = run.run(way * i_q)[0] and run.run(way * i_q * (1 + WITHIN))[0]
+        either = all(holds(machine, {})(sign).run(sign * LIGHT * float(rated["i_rated_A"]))[0] for sign in (1, -1))
+        inside = either and run.run(way * i_q)[0] and run.run(way * i_q * (1 + WITHIN))[0]
         outside = not run.run(way * i_q)[0] and not run.run(way * i_q * (1 - WITHIN))[0]
         place = "in" if inside else "out" if outside else "near"
         found[row["group"]].append((row["drawn.loop_Hz"], i_q, way, row["class"] == "ok", place, machine))

@@ -15,6 +15,9 @@ my_motor.yaml, all that it must have:
 What else a machine file may have is kept; inverter, sensors and link that are not told are those of a board of the motor's
 class. What `drive:` of the file says stands above what is chosen here. The rules are those of `pmdrive tune`. Saturation is
 taken from c_A_Wb5 of `electrical:`, or from L_q_rated of `drive:`. L_q may be below L_d.
+
+`injection: 4` or `1` in `drive:` asks for a sine along d or a rotating one: its amplitude, frequency and loops are then chosen by the
+position error that is predicted for each of twelve carriers without load and at rated current (METHODS.md 5.8.3, row 67).
 """
 import argparse
 import importlib
@@ -218,8 +221,32 @@ def drive(x, board, tolerance):
     out["offset_max"] = 0.03 * known["i_full_scale"], "3 % of the converter's range"
     out.update((name, (value, tune.WHY[name])) for name, value in tune.values(known, tolerance=tolerance).items())
     out["flying_start"] = 1.0, "a rotor that wind or its load turns is caught"
+    if told.get("injection") in (carrier.ROTATING, carrier.PULSATING):
+        out.update(sine(x, {**{name: value for name, (value, _) in out.items()}, **known, **told}))
     out.update((name, (value, "told")) for name, value in told.items())
     return {name: stored(name, *reason) for name, reason in out.items()}
+
+
+def sine(x, d):
+    """Carrier and loops of sine injection, by the errors that are predicted for twelve carriers (pmdrive/carrier.py)."""
+    d = {**d, "injection": int(d["injection"])}
+    omega = 0.05 * float(x["rated"]["speed_rated_rad_s"]) * d["pole_pairs"]
+
+    def make(parameters, way, inverter):
+        return carrier.Holds(parameters, lambda a, b: current(x, a, b)[0], lambda a, b: flux(x, a, b)[0],
+                             float(x["electrical"]["R_s_ohm"]), way * omega, inverter=inverter)
+
+    loop, errors, pick = carrier.grid(make, d, tune.largest_carrier(d))
+    if pick is None:
+        raise UsageError(f"no carrier of {carrier.NAMES[d['injection']]} holds rated current of this motor",
+                         "the square wave, injection: 0, has no window that a load could upset")
+    why = (f"least flux of the carrier of 12 that hold {carrier.MARGIN:g} times rated current within {carrier.ERROR_DEG:g} degrees: "
+           f"{errors[pick]:.1f} predicted")
+    behind = tune.LAG * (2 * math.pi * loop) ** 2 / d["pole_pairs"]
+    return {"v_injection": (pick[0], why), "f_injection": (pick[1], why),
+            "injection_bandwidth": (loop, "the fastest of 10 and 7 Hz that a carrier holds rated current with"),
+            "speed_bandwidth": (min(d["speed_bandwidth"], loop / carrier.SLOWER), "a quarter of the position's loop"),
+            "acceleration": (min(d["acceleration"], behind), "the position's loop follows 0.12 rad behind")}
 
 
 def stored(name, value, why):

@@ -48,6 +48,23 @@ def parabola(half, full, rated):
     return (4 * half - full) / rated, 2 * (full - 2 * half) / rated ** 2
 
 
+def i_d_of(d, i_q):
+    """For most torque per ampere, as the drive has it."""
+    if d["L_q"] <= 1.01 * d["L_d"]:
+        return 0.0
+    h = d["psi_m"] / (2 * (d["L_q"] - d["L_d"]))
+    return h - math.hypot(h, i_q)
+
+
+def rated_i_q(d):
+    """That part of rated current."""
+    low, high = 0.0, d["i_rated"]
+    for _ in range(30):
+        i_q = 0.5 * (low + high)
+        low, high = (i_q, high) if math.hypot(i_d_of(d, i_q), i_q) < d["i_rated"] else (low, i_q)
+    return low
+
+
 def lost_V(d):
     """Of a leg, by dead time and drops."""
     return d["dead_time"] * d["f_pwm"] * d["v_dc_nominal"] + d["device_drop"]
@@ -114,7 +131,7 @@ class Holds:
 
     def taken(self, i_s, i_f):
         """What dead time and leg capacitance take of the voltage, beyond the compensation by the fundamental current."""
-        return self.lost_V * 2 / 3 * sum((self.part(_leg(i_s, x)) - self.part(_leg(i_f, x))) * STAR[x] for x in range(3))
+        return self.lost_V * 2 / 3 * sum((self.part(_leg(i_s, x)) - self.told(_leg(i_f, x))) * STAR[x] for x in range(3))
 
     def turned(self, positive, i_f):
         """Of a rotating sine, at 1 kHz: the phase of the answer by resistance, positive sequence and cross-coupling."""
@@ -126,6 +143,12 @@ class Holds:
             load = abs(i_f) ** 2 / (abs(i_f) ** 2 + k.i_p ** 2)
             rho += (0.75 + ((1 / (2 * kappa) - 0.75) * load if kappa >= 0.1 else 0.0)) * beyond
         return cmath.exp(2j * (rho - k.of(k.turn, i_f.imag)))
+
+    def told(self, i):
+        """As the drive compensates; of a rotating sine within a zone of three times I_p."""
+        if self.d["injection"] != ROTATING:
+            return self.part(i)
+        return max(-1.0, min(1.0, i / (3 * self.known.i_p)))
 
     def part(self, i):
         size, corner = abs(i), self.corner_A
@@ -142,8 +165,7 @@ class Holds:
         """(holds, mean, largest error, rad) at the current i_q and its i_d for most torque, which a load of that torque asks for."""
         d, k = self.d, self.known
         T, N, R = 1 / d["f_pwm"], periods(d), d["R_s"]
-        h = d["psi_m"] / (2 * (d["L_q"] - d["L_d"])) if d["L_q"] > 1.01 * d["L_d"] else math.inf
-        i_ref = complex(h - math.hypot(h, i_q) if h < math.inf else 0.0, i_q)
+        i_ref = complex(i_d_of(d, i_q), i_q)
         w_c = 2 * math.pi * d["current_bandwidth"] * self.share()
         w_n = 2 * math.pi * d["injection_bandwidth"]
         kp, ki = 2 * ZETA * w_n, w_n ** 2 * T
@@ -221,7 +243,7 @@ class Holds:
                 e_s = omega_ref - omega_hat
                 sum_s += k_s * 2 * math.pi * d["speed_bandwidth"] / 4000 * e_s
                 i_q_ref = k_s * e_s + sum_s
-                i_ref = complex(h - math.hypot(h, i_q_ref) if h < math.inf else 0.0, i_q_ref)
+                i_ref = complex(i_d_of(d, i_q_ref), i_q_ref)
             lost = self.taken(i_s, i_f * frame) if self.lost_V else 0.0
             psi_s += T * (v_acting - self.R * i_s - lost)
             v_acting = (v + carrier) * ahead
@@ -242,3 +264,43 @@ class Holds:
             middle = 0.5 * (low + high)
             low, high = (middle, high) if self.run(way * middle)[0] else (low, middle)
         return low
+
+
+SHARES = (1 / 4, 1 / 2, 3 / 4)        # of the largest carrier that the link leaves room for
+PERIODS = (8, 10, 20, 30)             # N
+LOOPS_HZ = (10.0, 7.0)
+SLOWER = 4.0                          # speed control than the position
+ERROR_DEG = 3.0                       # largest error that is accepted: METHODS.md 5.8.3
+MARGIN = 1.15                         # of the current
+
+
+def error_deg(make, d, rated):
+    """Largest error without load and at rated current, either way, and three deviations of its noise; infinite where it does not
+    hold with 15 % more current. make: parameters, way, whether with the inverter -> Holds."""
+    worst = 0.0
+    for way in (1, -1):
+        if not make(d, way, False).run(way * MARGIN * rated)[0]:
+            return math.inf
+        for i_q in (0.05 * rated, rated):
+            held, _, largest = make(d, way, True).run(way * i_q)
+            if not held:
+                return math.inf
+            worst = max(worst, largest)
+    return math.degrees(worst) + 3 * noise_deg(d, d["i_noise"] / (2 * d["i_full_scale"] / 4096))
+
+
+def grid(make, d, top):
+    """Row 67: {(V, Hz): error} of twelve carriers, and for the fastest loop that any of them suits the one that takes the least flux
+    and so the least current: (loop, map, (V, Hz) or None)."""
+    found = {}
+    for loop in LOOPS_HZ:
+        found = {}
+        for share in SHARES:
+            for N in PERIODS:
+                v, f = float(f"{share * top:.3g}"), d["f_pwm"] / N
+                found[v, f] = error_deg(make, {**d, "v_injection": v, "f_injection": f, "injection_bandwidth": loop,
+                                               "speed_bandwidth": loop / SLOWER}, rated_i_q(d))
+        good = [(v / f, (v, f)) for (v, f), error in found.items() if error <= ERROR_DEG]
+        if good:
+            return loop, found, min(good)[1]
+    return LOOPS_HZ[-1], found, None
