@@ -42,5 +42,6 @@
 #define PM_WITHOUT_pulsating_sine 1
 #define PM_WITHOUT_stationary_sine 1
 #define PM_WITHOUT_stationary_square 1
+#define PM_WITHOUT_random_square 1
 
 #endif

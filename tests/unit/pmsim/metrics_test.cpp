@@ -230,6 +230,15 @@ TEST(Metrics, FundamentalOfTheVoltageIsWithoutItsHarmonics)
     EXPECT_NEAR(gather("voltage_fundamental_rel", turning).number, 100.0 / (300.0 / std::sqrt(3.0)), exact);
 }
 
+// A sine of 0.2 A at 1 kHz beside a smaller one and a direct current.
+TEST(Metrics, LoudestBandIsTheRmsOfItsSine)
+{
+    const auto sines = [](Sample &s, int k) {
+        s.rig.truth.i_d_A = 3.0 + 0.2 * std::sin(2 * pi * k / 10.0) + 0.1 * std::sin(2 * pi * k / 4.0);
+    };
+    EXPECT_NEAR(gather("i_d_loudest_band_A", sines).number, 0.2 / std::sqrt(2.0), 0.01);
+}
+
 TEST(Metrics, AngleOfTheVoltageIsComparedWithTheCommandOfTwoSamplesBefore)
 {
     const auto turned = [](double error_deg) {
