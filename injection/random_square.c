@@ -3,7 +3,8 @@
 #include "firmware/math/filter.h"
 #include "injection/carrier.h"
 
-#define TAPS 0x04C11DB7U
+#define TAPS  0x04C11DB7U
+#define FIRST 0x9E3779B9U /* any with many bits of either kind */
 /* Of the answer, cycle by cycle: eight of them. */
 #define K_MEAN PM_FRAC(0.125)
 
@@ -11,7 +12,7 @@ void random_square_reset(random_square_t *self, const random_square_config_t *co
 {
     *self = (random_square_t){.i = in->i,
                               .i_dq = in->i_dq,
-                              .bits = 1,
+                              .bits = FIRST,
                               .gain = config->saliency.gain_0,
                               .h = {.d = config->h_d, .q = 0},
                               .mean = {.d = config->h_d, .q = 0}};
