@@ -74,6 +74,7 @@ TEST(RandomSquare, CyclesHaveNoVoltSecondsAndBeginEitherWay)
     EXPECT_LE(longest, 20);
 }
 
+// What resistance leaves of a cycle, R T_s / L_d of 81 mA, adds up at random over L_d / R: 2.4 mA rms, four deviations.
 TEST(RandomSquare, FundamentalCurrentIsWithoutTheCarrier)
 {
     rig::Run run(config());
@@ -82,7 +83,7 @@ TEST(RandomSquare, FundamentalCurrentIsWithoutTheCarrier)
     run.i_dq_A = {0.5, 3};
     run.after(400);
     for (int k = 0; k < 20; ++k) {
-        EXPECT_LT(std::abs(run.step().i_A - Complex(0.5, 3) * std::polar(1.0, 0.1)), 5e-3);
+        EXPECT_LT(std::abs(run.step().i_A - Complex(0.5, 3) * std::polar(1.0, 0.1)), 10e-3);
     }
 }
 
