@@ -132,7 +132,8 @@ def table(head, body):
 
 def page(found, drawn, most):
     text = [HEAD, "## Runs against the prediction\n\n"
-            f"Inside: predicted to hold with {100 * WITHIN:.0f} % more current; outside: predicted to be lost with {100 * WITHIN:.0f} % less.\n"]
+            f"Inside: predicted to hold with {100 * WITHIN:.0f} % more current, and {100 * LIGHT:.0f} % of rated current either way, which the speed "
+            f"control asks for at the start; outside: predicted to be lost with {100 * WITHIN:.0f} % less.\n"]
     body = []
     for group, runs in found.items():
         part = {place: [r[3] for r in runs if r[4] == place] for place in ("in", "near", "out")}
@@ -149,7 +150,7 @@ def page(found, drawn, most):
                 cells.append("-")
                 continue
             one = [at[way, gain][f] for gain in (1.0, 2.0) for way in (1, -1)]
-            word = [f"> {most:g}" if x >= most else f"{x:.1f}" for x in one]
+            word = [f"> {most:.1f}" if x >= most else f"{x:.1f}" for x in one]
             cells.append(f"{word[0]}, {word[1]} ({word[2]}, {word[3]})")
         body.append([group, *cells])
     text.append(table(["source", *(f"{f} Hz" for f in loops)], body))
