@@ -304,6 +304,9 @@ enum {
 #if PM_HAS(rotating_sine)
     OD_PARAMETER_INJECTION_DELAY,
 #endif
+#if PM_HAS(carrier_rest)
+    OD_PARAMETER_INJECTION_REST,
+#endif
     OD_PARAMETER_I_TRIP,
     OD_PARAMETER_V_DC_MAX,
     OD_PARAMETER_V_DC_MIN,

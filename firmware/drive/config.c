@@ -240,6 +240,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     m.i_d_rated = i_d_rated(&m, &config->mtpa);
     make_field_weakening(&m, &config->field_weakening);
     make_position(&m, &config->position, config->injection);
+    PM_IN_IMAGE(carrier_rest, make_rest(&m, &config->rest);)
     if (config->start != (uint8_t)SEQUENCE_align) {
         make_start(&m, config);
     }

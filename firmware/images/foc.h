@@ -10,6 +10,7 @@
 
 #define PM_WITHOUT_finite_set 1
 #define PM_WITHOUT_counted_carrier 1
+#define PM_WITHOUT_carrier_rest 1
 #define PM_WITHOUT_pwm_excitation 1
 #define PM_WITHOUT_random_square 1
 
