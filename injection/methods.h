@@ -6,6 +6,7 @@
 #include "injection/pulsating_sine.h"
 #include "injection/pulsating_square.h"
 #include "injection/pwm_excitation.h"
+#include "injection/random_square.h"
 #include "injection/rotating_sine.h"
 #include "injection/stationary_sine.h"
 #include "injection/stationary_square.h"

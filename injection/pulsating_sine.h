@@ -1,5 +1,5 @@
-/* Pulsating sine injection in the estimated frame (METHODS.md 4.3.1, row 37) with indirect cross-coupling
- * compensation (5.2.2.2, row 51).
+/* Pulsating sine injection in the estimated frame (METHODS.md 4.3.1, 5.6.3.2; rows 37 and 61) with indirect
+ * cross-coupling compensation (5.2.2.2, row 51).
  *
  * Added along d of the estimated frame (carrier.h), with phi, phi' and F of sine.h:
  *   v_d = V_h cos phi_k

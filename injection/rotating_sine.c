@@ -15,6 +15,19 @@ void rotating_sine_reset(rotating_sine_t *self, const rotating_sine_config_t *co
     self->misfit = 0;
 }
 
+#if PM_HAS(counted_carrier)
+/* The current of both sequences where phi' is `phase`. */
+static pm_dq_t ahead_of(const rotating_sine_t *self, const rotating_sine_config_t *config, pm_dir_t phase)
+{
+    const pm_dq_t positive = window_positive(&self->sine.window, config->sine.per_n);
+    const pm_dq_t negative = self->negative;
+    pm_dq_t i;
+    i.d = pm_unit(positive.d + negative.d, phase.cos) - pm_unit(positive.q - negative.q, phase.sin);
+    i.q = pm_unit(positive.q + negative.q, phase.cos) + pm_unit(positive.d - negative.d, phase.sin);
+    return i;
+}
+#endif
+
 void rotating_sine_step(rotating_sine_t *self, const rotating_sine_config_t *config, const injection_in_t *in,
                         injection_out_t *out)
 {
@@ -29,6 +42,11 @@ void rotating_sine_step(rotating_sine_t *self, const rotating_sine_config_t *con
     out->i = sine_mean(&self->sine, &config->sine);
     out->carrier =
         (excitation_t){.v = carrier_rotating(sine_amplitude(&config->sine), pm_dir(phi), in->ahead)};
+#if PM_HAS(counted_carrier)
+    if (config->counted_in) {
+        out->carrier.i = ahead_of(self, config, pm_dir(phi - config->sine.lag + config->sine.ahead));
+    }
+#endif
 }
 
 /* p of the header. */

@@ -1,5 +1,5 @@
 /* Rotating sine injection, negative sequence demodulated, with what the inverter and the resistance do to it
- * taken from the positive sequence (METHODS.md 4.4.1, 5.6.4.2, 5.7; row 39).
+ * taken from the positive sequence (METHODS.md 4.4.1, 5.6.3.1, 5.6.4.2, 5.7; rows 39, 60 and 63).
  *
  * Added in the estimated frame (carrier.h), with phi, phi' and F of sine.h:
  *   v = V_h e^{j phi_k}
@@ -15,10 +15,16 @@
  * Without load all phases are governed by the carrier and p = 3/4; under load one phase at a time crosses zero.
  * Of a nearly round machine, kappa < 0.1, the second amplifies every error of rho_0: p stays 3/4.
  *
+ * Compensation of dead time before the carrier (5.6.4.1, row 62): by the fundamental current alone it does nothing
+ * for the carrier, which moves the legs through their zone by itself; with `injection_pre_comp`, where the image has the option counted_carrier, it goes by the
+ * current with the carrier, predicted from both sequences for the middle of the period in which the voltage acts,
+ *   i = i_f + P e^{j phi'} + N e^{-j phi'},  phi' of k + 1.5;  P, N: the sequences, complex
+ * Both corrections may be on. With this one alone rho' is rho_0.
+ *
  * eps is exact for small e and 1/2 sin 2e beyond. misfit: the positive sequence against I_p(i_q), relative. The
  * bandwidths that sine.h allows must also suit the machine: with those of the
  * scenario, 7 Hz for the position and 2 Hz for the speed, a compressor of 2e-4 kg m2 loses its position under a
- * load of 0.3 s rise. Each period 120 instructions; rho' at 1 kHz.
+ * load of 0.3 s rise. Each period 120 instructions, 60 more to count the carrier in; rho' at 1 kHz.
  * State 400 bytes. Functions as injection.h says. Tests: tests/unit/injection/rotating_sine_test.cpp,
  * tests/scenario/rotating_sine.yaml. */
 #ifndef INJECTION_ROTATING_SINE_H
@@ -38,6 +44,7 @@ typedef struct {
     pm_q_t rho_m0;          /* rho_0 (1 + kappa^2) */
     bool with_load;         /* p depends on the load */
     bool positive_sequence; /* rho' from rho_m; else rho_0 alone */
+    bool counted_in;        /* the compensation of dead time is told the current of the carrier */
 } rotating_sine_config_t;
 
 typedef struct {

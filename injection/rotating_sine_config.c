@@ -18,13 +18,16 @@ static pm_num_t seen_share(const maker_t *m)
     return pm_num_add(pm_num(1), square(kappa));
 }
 
-/* Below I_p the carrier governs the signs of the currents, and a compensation there disturbs both sequences. */
+/* Below I_p the carrier governs the signs of the currents, and a compensation by the fundamental disturbs both
+ * sequences there. */
 injection_limits_t rotating_sine_limits(const maker_t *m)
 {
     const inductances_t L = inductances_at_zero(m);
     const pm_num_t per_L = pm_num_add(pm_num_div(pm_num(1), L.L_d), pm_num_div(pm_num(1), L.L_q));
     injection_limits_t limits = sine_limits(m);
-    limits.comp_zone = mul3(pm_num_ratio(3, 2), sine_flux(m), per_L); /* three times I_p */
+    if (m->params->injection_pre_comp == 0) {
+        limits.comp_zone = mul3(pm_num_ratio(3, 2), sine_flux(m), per_L); /* three times I_p */
+    }
     return limits;
 }
 
@@ -44,6 +47,7 @@ void make_rotating_sine(maker_t *m, rotating_sine_config_t *c)
     c->rho_m0 = fixed(m, pm_num_mul(rho(m), seen_share(m)), Q_BITS, DRIVE_PARAM_R_s);
     c->with_load = load_counts(m);
     c->positive_sequence = m->params->injection_post_comp != 0;
+    c->counted_in = m->params->injection_pre_comp != 0;
 }
 
 pm_num_t rotating_sine_answer(const maker_t *m)

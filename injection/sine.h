@@ -3,9 +3,20 @@
  *
  *   f_h  = f_pwm / N,  a = 2 pi / N,  phi_k = k a: phase of the voltage for [k+1, k+2)
  *   F    = V_h T_s / (2 sin(a / 2)):  flux amplitude at the samples, of a voltage in steps
- *   phi' = phi_k - 1.5 a - pi / 2:    phase of the current at k, of a voltage that was commanded 1.5 periods ago
+ *   phi' = phi_k - 1.5 a - omega_h T_x - pi / 2:  phase of the current at k, of a voltage that was commanded 1.5
+ *                                     periods ago; T_x, `injection_delay`: what amplifiers and filters add to that
+ * A source that reads this phase errs by omega_h / 2 of the delay that it is not told (METHODS.md 5.7, row 64); one that
+ * measures the phase of its answer does not.
  * The window takes the current at the phase phi' over a period of the carrier (window.h). For so long after a
  * reset, and until the first answer, it holds other things too and is not to be read.
+ *
+ * Where it holds (METHODS.md 5.8; rows 65 to 67; predicted by tools/pmdrive/pmdrive/carrier.py, measured in
+ * docs/results/safe_area.md; tools/tune.py chooses V_h, f_h and loops by it):
+ *   noise  sigma = (I_qu / 2 I_n) sqrt(c 2/3 (sigma_n^2 + 1/12) w_n (zeta + 1 / (4 zeta)) / f_pwm)   rad
+ *          I_qu: step of the converter; sigma_n: noise in steps; c: 2 along d, 1 rotating
+ *   load   up to where the second loop through the window is stable: a fundamental current that changes passes the
+ *          window at f_h, the position loop turns the frame with it, and i_f in a frame that trembles at f_h is read
+ *          as an answer; its gain goes with (i_f / I_n)^2 (w_n / omega_h)^2
  *
  * The samples in it are (N - 1) / 2 periods old, and so is the mean of the current: current control is slowed
  * while the source leads, to a phase of 0.4 rad, and the position loop may have 0.3 rad. */
@@ -22,9 +33,10 @@ extern "C" {
 
 typedef struct {
     pm_q_t v_h;
-    pm_frac_t per_n; /* 1 / N */
-    pm_angle_t step; /* a */
-    pm_angle_t lag;  /* 1.5 a + a quarter of a turn */
+    pm_frac_t per_n;  /* 1 / N */
+    pm_angle_t step;  /* a */
+    pm_angle_t ahead; /* 1.5 a: from a sample to the middle of the period in which what it commands acts */
+    pm_angle_t lag;   /* 1.5 a + a quarter of a turn, and what injection_delay makes */
     uint16_t n;
 } sine_config_t;
 

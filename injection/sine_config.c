@@ -49,6 +49,14 @@ pm_num_t sine_answer(const maker_t *m, pm_num_t amplitude)
     return pm_num_mul(amplitude, pm_num_sqrt(pm_num_ratio(periods(m), 2)));
 }
 
+/* injection_delay at omega_h, an angle. */
+static int32_t delayed(maker_t *m)
+{
+    const pm_num_t turns =
+        pm_num_mul(si(m, DRIVE_PARAM_injection_delay), pm_num_div(sine_omega(m), PM_NUM_TWO_PI));
+    return fixed(m, turns, 32, DRIVE_PARAM_injection_delay);
+}
+
 void make_sine(maker_t *m, sine_config_t *c)
 {
     const int32_t n = periods(m);
@@ -60,5 +68,6 @@ void make_sine(maker_t *m, sine_config_t *c)
     c->n = (uint16_t)n;
     c->per_n = fixed(m, pm_num_ratio(1, n), FRAC_BITS, DRIVE_PARAM_f_injection);
     c->step = UINT32_MAX / (uint32_t)n;
-    c->lag = 3U * (c->step / 2U) + PM_TURN(0.25);
+    c->ahead = 3U * (c->step / 2U);
+    c->lag = c->ahead + PM_TURN(0.25) + (pm_angle_t)delayed(m);
 }

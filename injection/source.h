@@ -3,6 +3,7 @@
 #define INJECTION_SOURCE_H
 
 #include "firmware/math/estimate.h"
+#include "firmware/math/image.h"
 #include "firmware/params/types.h"
 
 #ifdef __cplusplus
@@ -22,6 +23,10 @@ typedef struct {
 /* What a carrier does to the period [k+1, k+2); what a source does not name is zero. */
 typedef struct {
     pm_ab_t v; /* added throughout, per-unit */
+#if PM_HAS(counted_carrier)
+    pm_dq_t i; /* current of the carrier in the middle of that period, in the estimated frame, where the
+                  compensation of dead time is to count it in */
+#endif
 #if PM_CARRIES(NEEDS_HALVES)
     pm_ab_t split; /* added in the first half, up to the all-high zero vector, and taken away in the second:
                       the mean voltage is what it is without */

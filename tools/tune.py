@@ -15,6 +15,9 @@ my_motor.yaml, all that it must have:
 What else a machine file may have is kept; inverter, sensors and link that are not told are those of a board of the motor's
 class. What `drive:` of the file says stands above what is chosen here. The rules are those of `pmdrive tune`. Saturation is
 taken from c_A_Wb5 of `electrical:`, or from L_q_rated of `drive:`. L_q may be below L_d.
+
+`injection: 4` or `1` in `drive:` asks for a sine along d or a rotating one: its amplitude, frequency and loops are then chosen by the
+position error that is predicted for each of twelve carriers without load and at rated current (METHODS.md 5.8.3, row 67).
 """
 import argparse
 import importlib
@@ -31,6 +34,7 @@ package = types.ModuleType("pmdrive")  # its modules one by one: no bus is neede
 package.__path__ = [str(PACKAGE)]
 sys.modules["pmdrive"] = package
 names, tune = importlib.import_module("pmdrive.names"), importlib.import_module("pmdrive.tune")
+carrier = importlib.import_module("pmdrive.carrier")
 UsageError = importlib.import_module("pmdrive.errors").UsageError
 
 NEEDED = {
@@ -177,6 +181,20 @@ def saturation(x, told, L_d, L_q):
     return {name: (value, why) for name, value in L.items()}
 
 
+def from_board(x, told, board):
+    """Parameters that follow from inverter, link and sensor; what `drive:` tells of them stands."""
+    def of(section, key):
+        return float(x[section][key] if key in x.get(section, {}) else board[section][key][0])
+
+    follow = {
+        "f_pwm": of("inverter", "f_pwm_Hz"), "dead_time": of("inverter", "dead_time_s"), "v_dc_nominal": of("rated", "v_dc_V"),
+        "device_drop": of("inverter", "v_switch_V"), "i_full_scale": of("sensor", "i_full_scale_A"),
+        "v_full_scale": of("sensor", "v_full_scale_V"),
+        "i_noise": of("sensor", "noise_lsb") * 2 * of("sensor", "i_full_scale_A") / tune.STEPS,
+    }
+    return {name: float(told.get(name, value)) for name, value in follow.items()}
+
+
 def drive(x, board, tolerance):
     """`drive:` as {name: (value, why)}, what is told above what is chosen."""
     def of(section, key):
@@ -195,11 +213,7 @@ def drive(x, board, tolerance):
         "speed_max": (1.25 * of("rated", "speed_rated_rad_s"), tune.WHY["speed_max"]),
     }
     known = {name: told.get(name, value) for name, (value, _) in machine.items()}
-    known.update(
-        f_pwm=of("inverter", "f_pwm_Hz"), dead_time=of("inverter", "dead_time_s"), v_dc_nominal=of("rated", "v_dc_V"),
-        device_drop=of("inverter", "v_switch_V"), i_full_scale=of("sensor", "i_full_scale_A"),
-        v_full_scale=of("sensor", "v_full_scale_V"),
-        i_noise=of("sensor", "noise_lsb") * 2 * of("sensor", "i_full_scale_A") / tune.STEPS)
+    known.update(from_board(x, {}, board))
     out = dict(machine)
     for name, value in tune.limits(known).items():
         out[name] = value, tune.WHY[name]
@@ -207,8 +221,32 @@ def drive(x, board, tolerance):
     out["offset_max"] = 0.03 * known["i_full_scale"], "3 % of the converter's range"
     out.update((name, (value, tune.WHY[name])) for name, value in tune.values(known, tolerance=tolerance).items())
     out["flying_start"] = 1.0, "a rotor that wind or its load turns is caught"
+    if told.get("injection") in (carrier.ROTATING, carrier.PULSATING):
+        out.update(sine(x, {**{name: value for name, (value, _) in out.items()}, **known, **told}))
     out.update((name, (value, "told")) for name, value in told.items())
     return {name: stored(name, *reason) for name, reason in out.items()}
+
+
+def sine(x, d):
+    """Carrier and loops of sine injection, by the errors that are predicted for twelve carriers (pmdrive/carrier.py)."""
+    d = {**d, "injection": int(d["injection"])}
+    omega = 0.05 * float(x["rated"]["speed_rated_rad_s"]) * d["pole_pairs"]
+
+    def make(parameters, way, inverter):
+        return carrier.Holds(parameters, lambda a, b: current(x, a, b)[0], lambda a, b: flux(x, a, b)[0],
+                             float(x["electrical"]["R_s_ohm"]), way * omega, inverter=inverter)
+
+    loop, errors, pick = carrier.grid(make, d, tune.largest_carrier(d))
+    if pick is None:
+        raise UsageError(f"no carrier of {carrier.NAMES[d['injection']]} holds rated current of this motor",
+                         "the square wave, injection: 0, has no window that a load could upset")
+    why = (f"least flux of the carrier of 12 that hold {carrier.MARGIN:g} times rated current within {carrier.ERROR_DEG:g} degrees: "
+           f"{errors[pick]:.1f} predicted")
+    behind = tune.LAG * (2 * math.pi * loop) ** 2 / d["pole_pairs"]
+    return {"v_injection": (pick[0], why), "f_injection": (pick[1], why),
+            "injection_bandwidth": (loop, "the fastest of 10 and 7 Hz that a carrier holds rated current with"),
+            "speed_bandwidth": (min(d["speed_bandwidth"], loop / carrier.SLOWER), "a quarter of the position's loop"),
+            "acceleration": (min(d["acceleration"], behind), "the position's loop follows 0.12 rad behind")}
 
 
 def stored(name, value, why):

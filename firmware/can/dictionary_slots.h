@@ -310,6 +310,15 @@ enum {
     OD_PARAMETER_ZERO_L_C0,
     OD_PARAMETER_ZERO_FORM,
 #endif
+#if PM_HAS(counted_carrier)
+    OD_PARAMETER_INJECTION_PRE_COMP,
+#endif
+#if PM_HAS(rotating_sine) || PM_HAS(pulsating_sine) || PM_HAS(stationary_sine) || PM_HAS(stationary_square) || PM_HAS(three_phase_hf) || PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating)
+    OD_PARAMETER_INJECTION_DELAY,
+#endif
+#if PM_HAS(carrier_rest)
+    OD_PARAMETER_INJECTION_REST,
+#endif
     OD_PARAMETER_I_TRIP,
     OD_PARAMETER_V_DC_MAX,
     OD_PARAMETER_V_DC_MIN,

@@ -245,6 +245,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
 #if PM_CARRIES(NEEDS_NEUTRAL)
     make_neutral(&m, &config->neutral);
 #endif
+    PM_IN_IMAGE(carrier_rest, make_rest(&m, &config->rest);)
     if (config->start != (uint8_t)SEQUENCE_align) {
         make_start(&m, config);
     }

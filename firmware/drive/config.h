@@ -15,6 +15,7 @@
 #include "firmware/drive/position.h"
 #include "firmware/drive/procedures/flying_start.h"
 #include "firmware/drive/procedures/sequence.h"
+#include "firmware/drive/rest.h"
 #include "firmware/math/image.h"
 #include "firmware/math/num.h"
 #include "firmware/params/types.h"
@@ -74,6 +75,7 @@ typedef struct {
     pulses_config_t pulses;
     PM_IN_IMAGE(boundary_detection, boundary_detection_config_t boundary_detection;)
     PM_IN_IMAGE(dc_link_pulses, dc_link_pulses_config_t dc_link_pulses;)
+    PM_IN_IMAGE(carrier_rest, rest_config_t rest;)
     PM_IN_IMAGE(flying_start, flying_start_config_t flying_start;)
 #if SEQUENCE_HAS_POLARITY
     polarity_config_t polarity;

@@ -319,13 +319,18 @@ static inline void control(drive_t *drive, const position_out_t *frame, bool usu
         return;
     }
 #endif
+    pm_dq_t i = frame->i;
     if (drive->carrier) {
         v_ab.alpha += frame->carrier.v.alpha;
         v_ab.beta += frame->carrier.v.beta;
+#if PM_HAS(counted_carrier)
+        i.d += frame->carrier.i.d;
+        i.q += frame->carrier.i.q;
+#endif
     }
     modulator_out_t m;
-    modulator_step(&drive->modulator, &c->modulator, v_ab, v_dc,
-                   pm_park_inverse_quarter(frame->i, frame->ahead), &m);
+    modulator_step(&drive->modulator, &c->modulator, v_ab, v_dc, pm_park_inverse_quarter(i, frame->ahead),
+                   &m);
     drive->v_next = m.v;
     write_out(&m, out);
     if (drive->carrier) {

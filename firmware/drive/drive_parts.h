@@ -71,6 +71,9 @@ void reference_take(drive_t *drive);   /* command to per-unit */
 void reference_vector(drive_t *drive); /* speed or torque -> i_ref */
 void reference_reset(drive_t *drive, pm_q_t i_q);
 
+/* rest.c: at 1 kHz, while the vector is controlled: the carrier goes off and on again. */
+void rest_slow(drive_t *drive);
+
 /* open_loop.c: align, open-loop start, current mode, hand-over to the observer and back. */
 void open_loop_start(drive_t *drive);
 void open_loop_hold(drive_t *drive);   /* the vector stays, but for a rotor that swings */

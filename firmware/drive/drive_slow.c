@@ -254,6 +254,11 @@ static void run(drive_t *drive)
         return;
     }
     reference_vector(drive);
+#if PM_HAS(carrier_rest)
+    if (drive->config.rest.after_ms != 0U) {
+        rest_slow(drive);
+    }
+#endif
     /* without injection nothing shows the position at low speed */
     if (!drive_injects(drive) && pm_abs(drive->speed.reference) < c->omega_low &&
         pm_abs(drive->position.pll.omega) < c->omega_low) {

@@ -86,6 +86,9 @@ struct drive {
     int32_t temperature_dC;
     pm_q_t heat;        /* of the windings: the current's square, through the low-pass of t_winding */
     pm_q_t bridge_heat; /* the same of the bridge, t_bridge */
+#if PM_HAS(carrier_rest)
+    rest_t rest;
+#endif
     open_phase_t open_phase;
     fault_short_t fault_short;
 

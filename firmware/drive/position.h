@@ -52,6 +52,9 @@ typedef struct {
     pm_q_t weight;         /* 0: injection, 1: observer */
     bool carrier;          /* may be injected; else the observer leads at all speeds */
     bool inject;           /* carrier on */
+#if PM_HAS(carrier_rest)
+    bool rests; /* standstill without carrier: the position stays as it is */
+#endif
     observer_t observer;
     injection_t injection; /* while `inject` */
 
@@ -135,6 +138,12 @@ pm_angle_t position_resolve_slip(position_t *self, const position_config_t *conf
 
 /* The position turns by `turn`, speed as it is; both sources start anew from there. */
 void position_turn(position_t *self, const position_config_t *config, pm_angle_t turn, pm_ab_t i);
+
+#if PM_HAS(carrier_rest)
+/* No carrier, and the position stays what it is at speed zero, until `rests` is taken back before a
+ * position_slow(). */
+void position_rest(position_t *self);
+#endif
 
 /* config_position.c; injection: a low-speed source leads at low speed. */
 void make_position(maker_t *m, position_config_t *c, bool injection);

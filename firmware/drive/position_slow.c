@@ -177,8 +177,25 @@ static void set_quality(position_t *self, const position_config_t *config, const
     self->quality = pm_max(0, PM_ONE - worst);
 }
 
+#if PM_HAS(carrier_rest)
+void position_rest(position_t *self)
+{
+    self->rests = true;
+    self->inject = false;
+    self->pll.omega = 0;
+    self->gains.kp_turn = 0;
+    self->gains.ki = 0;
+}
+#endif
+
 void position_slow(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq)
 {
+#if PM_HAS(carrier_rest)
+    if (self->rests) {
+        observer_tie(&self->observer, &config->observer);
+        return;
+    }
+#endif
     const obs_in_t in = {.dir = pm_dir(self->pll.theta), .omega = self->pll.omega, .i = i, .i_dq = i_dq};
     const obs_out_t seen = observer_last(&self->observer, &config->observer);
     set_weight(self, config, &in);

@@ -9,6 +9,8 @@
 #define PM_CHANNELS 0x0000U
 
 #define PM_WITHOUT_finite_set 1
+#define PM_WITHOUT_counted_carrier 1
+#define PM_WITHOUT_carrier_rest 1
 #define PM_WITHOUT_neutral 1
 #define PM_WITHOUT_third_integration 1
 #define PM_WITHOUT_third_sogi 1
@@ -16,5 +18,6 @@
 #define PM_WITHOUT_zero_anti_rotating 1
 #define PM_WITHOUT_zero_rotating 1
 #define PM_WITHOUT_zero_pulsating 1
+#define PM_WITHOUT_random_square 1
 
 #endif

@@ -23,6 +23,8 @@
 #define PM_WITHOUT_mismatch 1
 #define PM_WITHOUT_second_harmonic 1
 #define PM_WITHOUT_pulse_choice 1
+#define PM_WITHOUT_counted_carrier 1
+#define PM_WITHOUT_carrier_rest 1
 #define PM_WITHOUT_load_current 1
 #define PM_WITHOUT_back_emf 1
 #define PM_WITHOUT_extended_emf 1
@@ -40,5 +42,6 @@
 #define PM_WITHOUT_pulsating_sine 1
 #define PM_WITHOUT_stationary_sine 1
 #define PM_WITHOUT_stationary_square 1
+#define PM_WITHOUT_random_square 1
 
 #endif

@@ -24,6 +24,8 @@
 #define PM_WITHOUT_mismatch 1
 #define PM_WITHOUT_second_harmonic 1
 #define PM_WITHOUT_pulse_choice 1
+#define PM_WITHOUT_counted_carrier 1
+#define PM_WITHOUT_carrier_rest 1
 #define PM_WITHOUT_load_current 1
 #define PM_WITHOUT_neutral 1
 #define PM_WITHOUT_back_emf 1
@@ -47,5 +49,6 @@
 #define PM_WITHOUT_zero_anti_rotating 1
 #define PM_WITHOUT_zero_rotating 1
 #define PM_WITHOUT_zero_pulsating 1
+#define PM_WITHOUT_random_square 1
 
 #endif

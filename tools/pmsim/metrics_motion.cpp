@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <limits>
 
 namespace pmsim
@@ -10,7 +11,7 @@ namespace
 {
 
 const double nan = std::numeric_limits<double>::quiet_NaN();
-const double to_deg = 57.29577951308232;
+const double to_deg = 57.29577951308232, pi = 3.141592653589793;
 
 // From the start of the window to a fraction of rated speed in the commanded direction.
 class TimeToSpeed : public Metric
@@ -93,6 +94,40 @@ class Travel : public Metric
 
   private:
     double pole_pairs_, start_ = nan, farthest_ = 0.0;
+};
+
+// Amplitude of the position error at `order` times the electrical angle: by the angle, so that the speed may vary, over
+// the whole electrical turns that the window has.
+template <int order> class AngleErrorOrder : public Metric
+{
+  public:
+    AngleErrorOrder(const Expectation &, const Setup &)
+    {
+    }
+
+    void add(const Sample &s) override
+    {
+        const double theta = s.rig.truth.theta_e_rad;
+        if (has_position(s) && !std::isnan(before_)) {
+            const double way = theta - before_;
+            turned_ += way;
+            sum_ += s.rig.angle_error_rad * to_deg * way * std::polar(1.0, -order * (theta - 0.5 * way));
+            if (std::fabs(turned_) >= (turns_ + 1.0) * 2.0 * pi) {
+                turns_ += 1.0;
+                whole_ = sum_;
+            }
+        }
+        before_ = theta;
+    }
+
+    MetricValue value() const override
+    {
+        return {turns_ > 0.0 ? std::abs(whole_) / (turns_ * pi) : nan, ""};
+    }
+
+  private:
+    std::complex<double> sum_ = 0.0, whole_ = 0.0;
+    double before_ = nan, turned_ = 0.0, turns_ = 0.0;
 };
 
 // Position error at an instant that may come more than once.
@@ -195,6 +230,20 @@ std::vector<SpecialMetric> motion_metrics()
           false,
           {}},
          make_special<PulsesAngleError>},
+        {{"angle_error_2nd_deg",
+          "deg",
+          "amplitude of the position error at twice the electrical angle, over whole turns",
+          false,
+          false,
+          {}},
+         make_special<AngleErrorOrder<2>>},
+        {{"angle_error_6th_deg",
+          "deg",
+          "amplitude of the position error at six times the electrical angle, over whole turns",
+          false,
+          false,
+          {}},
+         make_special<AngleErrorOrder<6>>},
     };
 }
 

@@ -202,6 +202,21 @@ TEST(Metrics, CurrentsAndTorque)
     EXPECT_NEAR(gather("torque_span_Nm", constant).number, 1.0, exact);
 }
 
+// Speed that varies within a turn, 2.3 turns back and 0.3 of them not counted.
+TEST(Metrics, OrdersOfThePositionErrorAreByTheAngleOverWholeTurns)
+{
+    const auto wave = [](Sample &s, int k) {
+        const double x = 2.3 * 2 * pi * k / 1000.0;
+        const double theta = -(x + 0.3 * std::sin(x));
+        s.rig.truth.theta_e_rad = theta;
+        s.rig.angle_error_rad =
+            (5.0 + 3.0 * std::cos(2 * theta + 1.0) + 2.0 * std::cos(6 * theta)) * pi / 180.0;
+    };
+    EXPECT_NEAR(gather("angle_error_2nd_deg", wave).number, 3.0, 0.03);
+    EXPECT_NEAR(gather("angle_error_6th_deg", wave).number, 2.0, 0.03);
+    EXPECT_TRUE(std::isnan(gather("angle_error_6th_deg", [](Sample &, int) {}).number));
+}
+
 // 20 periods in a turn: fundamental of 100 V of 300 V, a fifth harmonic that turns the other way.
 TEST(Metrics, FundamentalOfTheVoltageIsWithoutItsHarmonics)
 {
@@ -213,6 +228,15 @@ TEST(Metrics, FundamentalOfTheVoltageIsWithoutItsHarmonics)
         s.rig.truth.v_mean_beta_V = 100.0 * std::sin(theta + 1.2) - 10.0 * std::sin(5 * theta);
     };
     EXPECT_NEAR(gather("voltage_fundamental_rel", turning).number, 100.0 / (300.0 / std::sqrt(3.0)), exact);
+}
+
+// A sine of 0.2 A at 1 kHz beside a smaller one and a direct current.
+TEST(Metrics, LoudestBandIsTheRmsOfItsSine)
+{
+    const auto sines = [](Sample &s, int k) {
+        s.rig.truth.i_d_A = 3.0 + 0.2 * std::sin(2 * pi * k / 10.0) + 0.1 * std::sin(2 * pi * k / 4.0);
+    };
+    EXPECT_NEAR(gather("i_d_loudest_band_A", sines).number, 0.2 / std::sqrt(2.0), 0.01);
 }
 
 TEST(Metrics, AngleOfTheVoltageIsComparedWithTheCommandOfTwoSamplesBefore)

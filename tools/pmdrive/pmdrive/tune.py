@@ -57,11 +57,16 @@ def _lost(x):
     return x["device_drop"] + x["dead_time"] * x["f_pwm"] * x["v_dc_nominal"]
 
 
+def largest_carrier(x):
+    """That the drive accepts, 0.6 of the linear range, with a margin, V."""
+    return 0.57 * x["v_dc_nominal"] / math.sqrt(3)
+
+
 def _injection(x, tolerance):
     """Seven steps of the converter as an answer 45 degrees off, and fourteen times what a leg loses, which at light load
     comes and goes with the carrier; as far as the link leaves room. And whether it may lead."""
     step, dL = 2 * x["i_full_scale"] / STEPS, x["L_q"] - x["L_d"]
-    top = 0.57 * x["v_dc_nominal"] / math.sqrt(3)
+    top = largest_carrier(x)
     if dL <= max(SALIENT, 2 * tolerance / (1 + tolerance)) * x["L_q"]:  # both may be off, either way
         return 0.2 * top, False
     v = max(7 * step * 2 * x["L_d"] * x["L_q"] * x["f_pwm"] / dL, 14 * _lost(x))

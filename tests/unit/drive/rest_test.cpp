@@ -1,0 +1,108 @@
+// The carrier at standstill: firmware/drive/rest.h, without a motor.
+#include <gtest/gtest.h>
+
+#include "firmware/drive/drive_parts.h"
+#include "firmware/drive/rest.h"
+#include "tests/unit/drive/direct.h"
+
+namespace
+{
+
+constexpr int kAfter_ms = 20;
+
+// Injection leads, at standstill, nothing wanted.
+struct Resting : direct::Drive {
+    explicit Resting(int32_t rest_ms = kAfter_ms) : Drive(params(rest_ms))
+    {
+        step();
+        d.command.enable = true;
+        d.command.mode = DRIVE_MODE_SPEED;
+        command.enable = true;
+        command.mode = DRIVE_MODE_SPEED;
+        d.state = DRIVE_RUNNING;
+        d.stage = STAGE_VECTOR;
+        d.i_abc = {0, 0, 0};
+        position_reset(&d.position, &d.config.position, 0, {0, 0}, true);
+    }
+
+    static drive_params_t params(int32_t rest_ms)
+    {
+        drive_params_t p = direct::params(1);
+        p.injection_rest = rest_ms;
+        return p;
+    }
+
+    // Milliseconds until the carrier is as wanted.
+    int until(bool carrier, int most)
+    {
+        for (int ms = 0; ms < most; ++ms) {
+            if (d.carrier == carrier) {
+                return ms;
+            }
+            drive_slow(&d, &slow);
+        }
+        return most;
+    }
+};
+
+TEST(Rest, TheCarrierGoesOffAfterItsTime)
+{
+    Resting x;
+    drive_slow(&x.d, &x.slow);
+    ASSERT_TRUE(x.d.carrier);
+    EXPECT_NEAR(x.until(false, 100), kAfter_ms, 2);
+    EXPECT_EQ(x.d.i_ref.q, 0);
+    EXPECT_EQ(x.d.position.gains.ki, 0);
+    EXPECT_EQ(x.d.position.gains.kp_turn, 0);
+}
+
+TEST(Rest, ItStaysOnWithoutTheParameter)
+{
+    Resting x(0);
+    drive_slow(&x.d, &x.slow);
+    EXPECT_EQ(x.until(false, 200), 200);
+}
+
+TEST(Rest, ACommandBringsItBackWithinFiveMilliseconds)
+{
+    Resting x;
+    drive_slow(&x.d, &x.slow);
+    ASSERT_LT(x.until(false, 100), 100);
+    x.command.speed_mrad_s = 5000;
+    drive_command(&x.d, &x.command);
+    EXPECT_LE(x.until(true, 100), 5);
+    EXPECT_NE(x.d.position.gains.ki, 0);
+    EXPECT_EQ(x.until(false, 300), 300);
+}
+
+TEST(Rest, AnEmfBringsItBack)
+{
+    Resting x;
+    drive_slow(&x.d, &x.slow);
+    ASSERT_LT(x.until(false, 100), 100);
+    x.d.voltage.v.q = pm_widen(2 * x.d.config.rest.emf); // seen through 10 ms: ln 2 of them
+    EXPECT_LE(x.until(true, REST_LOOK_MS), 15);
+}
+
+TEST(Rest, ItLooksNowAndThen)
+{
+    Resting x;
+    drive_slow(&x.d, &x.slow);
+    ASSERT_LT(x.until(false, 100), 100);
+    for (int n = 0; n < 3; ++n) {
+        EXPECT_NEAR(x.until(true, 200), REST_LOOK_MS, 3) << n;
+        EXPECT_NEAR(x.until(false, 200), REST_AWAKE_MS, 3) << n;
+    }
+}
+
+TEST(Rest, ACurrentThatIsNeededKeepsItOn)
+{
+    Resting x;
+    for (int ms = 0; ms < 200; ++ms) {
+        drive_slow(&x.d, &x.slow);
+        x.d.speed.pi.integral = pm_widen(2 * x.d.config.rest.i_q); // what the load needs
+    }
+    EXPECT_TRUE(x.d.carrier);
+}
+
+} // namespace
