@@ -4,7 +4,7 @@
 usage: tools/gen_images.py [--check]
 
 A manifest names the channels that an image carries beside currents and DC-link voltage (firmware/math/measure.h), and the
-methods that it has, or `all`: those for which these channels are enough. Methods are the rows PM_METHOD(name, ...) of the lists (*.def)
+methods that it has, or `all`: those for which these channels are enough, but for those that it names as `without`. Methods are the rows PM_METHOD(name, ...) of the lists (*.def)
 of the firmware: a row more is known here without another word. The generated files are committed, so that building needs
 no PyYAML; --check writes nothing and fails when one of them is not what the manifests say.
 """
@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 FOLDER = "firmware/images"
 CMAKE = f"{FOLDER}/images.cmake"
 NAMES = f"{FOLDER}/images.def"
-KEYS = ("help", "board", "program", "channels", "methods", "trace_numbers", "in_flash", "budgets")
+KEYS = ("help", "board", "program", "channels", "methods", "without", "trace_numbers", "in_flash", "budgets")
 WORD = re.compile(r"[A-Za-z]\w*")
 # key of `budgets` -> its own keys
 BUDGETS = {"flash": (), "ram": (), "stack": (), "ccm": (), "interrupt": ("mean", "worst"),
@@ -77,7 +77,10 @@ def _methods(table, root, channels):
     needs = methods.needs(root)
     missing = {name: [need for need in needs.get(name, []) if need not in channels] for name in methods.known(root)}
     if getattr(table.node("methods"), "value", None) == "all":
-        return [name for name, lacks in missing.items() if not lacks]
+        without = [name for _, name in _named(table, "without", "method", missing)] if "without" in table.nodes else []
+        return [name for name, lacks in missing.items() if not lacks and name not in without]
+    if "without" in table.nodes:
+        raise table.error("`without` is for images with all methods", "without")
     wanted = _named(table, "methods", "method", missing)
     for place, name in wanted:
         if missing[name]:
