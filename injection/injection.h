@@ -22,6 +22,7 @@
 #define INJECTION_INJECTION_H
 
 #include "firmware/math/image.h"
+#include "injection/injection_stages.h"
 #include "injection/methods.h"
 
 #ifdef __cplusplus
@@ -39,19 +40,38 @@ typedef enum {
 
 typedef struct {
     injection_id_t id;
+    bool inlined;   /* INJECTION_INLINE without stages; only in images with those */
     pm_q_t reserve; /* voltage amplitude that control leaves to the carrier */
     union {
 #define PM_METHOD(name, help, traits, needs) PM_IN_IMAGE(name, name##_config_t name;)
 #include "injection/injections.def"
 #undef PM_METHOD
     };
+#if PM_HAS(injection_stages)
+    injection_stages_config_t stages;
+#endif
 } injection_config_t;
 
-typedef union {
+typedef struct {
+    union {
 #define PM_METHOD(name, help, traits, needs) PM_IN_IMAGE(name, name##_t name;)
 #include "injection/injections.def"
 #undef PM_METHOD
+    };
+#if PM_HAS(injection_stages)
+    injection_stages_t stages;
+#endif
 } injection_t;
+
+/* Compiled into the caller: the default, with nothing about it. */
+static inline bool injection_is_inline(const injection_config_t *config)
+{
+#if PM_HAS(injection_stages)
+    return config->inlined;
+#else
+    return config->id == INJECTION_INLINE;
+#endif
+}
 
 uint32_t injection_traits(injection_id_t id); /* SOURCE_... */
 void injection_reset(injection_t *self, const injection_config_t *config, const obs_in_t *in);
@@ -64,14 +84,14 @@ void make_injection(maker_t *m, injection_config_t *c);
 injection_limits_t injection_limits(const maker_t *m);
 bool injection_sees_saliency(const maker_t *m);
 
-/* injection_step() of all but INJECTION_INLINE. */
+/* injection_step() of all but INJECTION_INLINE, and with stages. */
 void injection_step_other(injection_t *self, const injection_config_t *config, const injection_in_t *in,
                           injection_out_t *out);
 
 static inline void injection_step(injection_t *self, const injection_config_t *config,
                                   const injection_in_t *in, injection_out_t *out)
 {
-    if (__builtin_expect(config->id == INJECTION_INLINE, 1) != 0) {
+    if (__builtin_expect(injection_is_inline(config), 1) != 0) {
         pulsating_square_step(&self->pulsating_square, &config->pulsating_square, in, out);
     } else {
         /* Only this path needs them in memory; copied by members, so that elsewhere they stay in registers. */

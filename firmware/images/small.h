@@ -26,6 +26,7 @@
 #define PM_WITHOUT_second_harmonic 1
 #define PM_WITHOUT_pulse_choice 1
 #define PM_WITHOUT_load_current 1
+#define PM_WITHOUT_injection_stages 1
 #define PM_WITHOUT_back_emf 1
 #define PM_WITHOUT_extended_emf 1
 #define PM_WITHOUT_extended_emf_ab 1

@@ -86,6 +86,7 @@ void rig_destroy(rig_t *rig);
 plant_t *rig_plant(rig_t *rig);
 void rig_command(rig_t *rig, const rig_command_t *command);
 bool rig_clear_fault(rig_t *rig);
+bool rig_turn_estimate(rig_t *rig, double theta_e_rad); /* the drive's position; false: out of reach */
 void rig_set_temperature(rig_t *rig, double temperature_degC);
 void rig_set_hw_fault(rig_t *rig, bool held);
 void rig_set_break(rig_t *rig, double i_break_A); /* over-current comparators; 0: none */
