@@ -12,6 +12,9 @@
 
 void injection_reset(injection_t *self, const injection_config_t *config, const obs_in_t *in)
 {
+#if PM_HAS(injection_stages)
+    injection_stages_reset(&self->stages, &config->stages);
+#endif
     switch (config->id) {
 #define PM_METHOD(name, help, traits, needs)                                                                 \
     PM_IN_IMAGE(name, case INJECTION_##name : name##_reset(&self->name, &config->name, in); break;)
@@ -23,15 +26,15 @@ void injection_reset(injection_t *self, const injection_config_t *config, const 
     }
 }
 
-/* The one that injection_step() has compiled into its caller is not called here a second time. */
+/* The one that injection_step() has compiled into its caller is not called here a second time but with stages. */
 #define OTHER_STEP(name)                                                                                     \
-    if (INJECTION_##name != INJECTION_INLINE &&                                                              \
+    if ((INJECTION_##name != INJECTION_INLINE || PM_HAS(injection_stages) != 0) &&                           \
         !(INJECTION_NEUTRAL && INJECTION_##name == INJECTION_zero_anti_rotating)) {                          \
         name##_step(&self->name, &config->name, in, out);                                                    \
     }
 
-PM_APART void injection_step_other(injection_t *self, const injection_config_t *config,
-                                   const injection_in_t *in, injection_out_t *out)
+static inline void step_of(injection_t *self, const injection_config_t *config, const injection_in_t *in,
+                           injection_out_t *out)
 {
     switch (config->id) {
 #define PM_METHOD(name, help, traits, needs)                                                                 \
@@ -45,8 +48,30 @@ PM_APART void injection_step_other(injection_t *self, const injection_config_t *
     }
 }
 
+PM_APART void injection_step_other(injection_t *self, const injection_config_t *config,
+                                   const injection_in_t *in, injection_out_t *out)
+{
+#if PM_HAS(injection_stages)
+    if (!config->stages.on) {
+        step_of(self, config, in, out);
+        return;
+    }
+    injection_in_t turned;
+    injection_stages_before(&self->stages, &config->stages, in, &turned);
+    step_of(self, config, &turned, out);
+    injection_stages_after(&self->stages, &config->stages, in, out);
+#else
+    step_of(self, config, in, out);
+#endif
+}
+
 void injection_slow(injection_t *self, const injection_config_t *config, const obs_in_t *in)
 {
+#if PM_HAS(injection_stages)
+    if (config->stages.on) {
+        injection_stages_slow(&self->stages, &config->stages, in, injection_last(self, config).vector.d);
+    }
+#endif
     switch (config->id) {
 #define PM_METHOD(name, help, traits, needs)                                                                 \
     PM_IN_IMAGE(name, case INJECTION_##name : name##_slow(&self->name, &config->name, in); break;)

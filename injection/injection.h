@@ -22,6 +22,7 @@
 #define INJECTION_INJECTION_H
 
 #include "firmware/math/image.h"
+#include "injection/injection_stages.h"
 #include "injection/methods.h"
 
 #ifdef __cplusplus
@@ -36,24 +37,44 @@ typedef enum {
 } injection_id_t;
 
 #define INJECTION_INLINE INJECTION_pulsating_square /* the default costs no call */
-/* nor does one more in programs that carry the neutral */
-#define INJECTION_NEUTRAL (PM_CARRIES(NEEDS_NEUTRAL) && PM_HAS(zero_anti_rotating))
+/* nor does one more in programs that carry the neutral, unless stages stand before and behind it */
+#define INJECTION_NEUTRAL                                                                                    \
+    (PM_CARRIES(NEEDS_NEUTRAL) && PM_HAS(zero_anti_rotating) && !PM_HAS(injection_stages))
 
 typedef struct {
     injection_id_t id;
+    bool inlined;   /* INJECTION_INLINE without stages; only in images with those */
     pm_q_t reserve; /* voltage amplitude that control leaves to the carrier */
     union {
 #define PM_METHOD(name, help, traits, needs) PM_IN_IMAGE(name, name##_config_t name;)
 #include "injection/injections.def"
 #undef PM_METHOD
     };
+#if PM_HAS(injection_stages)
+    injection_stages_config_t stages;
+#endif
 } injection_config_t;
 
-typedef union {
+typedef struct {
+    union {
 #define PM_METHOD(name, help, traits, needs) PM_IN_IMAGE(name, name##_t name;)
 #include "injection/injections.def"
 #undef PM_METHOD
+    };
+#if PM_HAS(injection_stages)
+    injection_stages_t stages;
+#endif
 } injection_t;
+
+/* Compiled into the caller: the default, with nothing about it. */
+static inline bool injection_is_inline(const injection_config_t *config)
+{
+#if PM_HAS(injection_stages)
+    return config->inlined;
+#else
+    return config->id == INJECTION_INLINE;
+#endif
+}
 
 uint32_t injection_traits(injection_id_t id); /* SOURCE_... */
 void injection_reset(injection_t *self, const injection_config_t *config, const obs_in_t *in);
@@ -66,14 +87,14 @@ void make_injection(maker_t *m, injection_config_t *c);
 injection_limits_t injection_limits(const maker_t *m);
 bool injection_sees_saliency(const maker_t *m);
 
-/* injection_step() of all but those. */
+/* injection_step() of all but those, and with stages of these too. */
 void injection_step_other(injection_t *self, const injection_config_t *config, const injection_in_t *in,
                           injection_out_t *out);
 
 static inline void injection_step(injection_t *self, const injection_config_t *config,
                                   const injection_in_t *in, injection_out_t *out)
 {
-    if (__builtin_expect(config->id == INJECTION_INLINE, 1) != 0) {
+    if (__builtin_expect(injection_is_inline(config), 1) != 0) {
         pulsating_square_step(&self->pulsating_square, &config->pulsating_square, in, out);
 #if INJECTION_NEUTRAL
     } else if (config->id == INJECTION_zero_anti_rotating) {

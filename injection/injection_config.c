@@ -1,6 +1,7 @@
 #include "firmware/math/image.h"
 #include "injection/injection.h"
 #include "injection/saliency_config.h"
+#include "injection/sine.h"
 
 /* Carrier and control share the voltage vector: at most 0.6 of v_dc / sqrt(3) may go to the carrier. */
 static void check_carrier(maker_t *m)
@@ -38,6 +39,12 @@ void make_injection(maker_t *m, injection_config_t *c)
         refuse(m, DRIVE_PARAM_injection, "is not in this image");
         break;
     }
+#if PM_HAS(injection_stages)
+    const bool square = c->id == INJECTION_pulsating_square;
+    const bool sine = c->id == INJECTION_pulsating_sine;
+    make_injection_stages(m, &c->stages, square || sine, sine ? sine_flux(m) : flux_of_period(m));
+    c->inlined = c->id == INJECTION_INLINE && !c->stages.on;
+#endif
 }
 
 injection_limits_t injection_limits(const maker_t *m)

@@ -1,4 +1,4 @@
-/* The saliency of the machine as an injected carrier sees it, against the load (METHODS.md 4.2.2, 5.2; rows 36 and
+/* The saliency of the machine as an injected carrier sees it, against the load (METHODS.md 4.2.2, 5.2; rows 36, 49 and
  * 51). One model for all sources; its figures come from the incremental inductances at no load and at
  * rated current and are renewed at 1 kHz.
  *
@@ -10,6 +10,8 @@
  *   theta_m / 2            = i_q (shift_1 + shift_2 |i_q|)
  *   gain                   = gain_0 + gain_2 i_q^2   rad per current of the source's error signal
  *   I_p                    = i_p_0 + i_p_2 i_q^2
+ * lambda is the indirect compensation, in the error signal of a carrier along d; the shift is the direct one, a frame of
+ * its own for such a carrier (injection_stages.h). A source that reads sequences turns them by theta_m, which is either.
  * All pass through the values at i_q = 0 and i_rated, lambda and theta_m also through those at half of it. The
  * gain rises to 2.5 times that without load at most: beyond, it would only amplify noise. Range: |i_q| < 8,
  * |lambda| <= 1. Tests: tests/unit/injection, tests/unit/drive/config_test.cpp. */

@@ -1,5 +1,6 @@
 #include "injection/saliency_config.h"
 
+#include "firmware/math/image.h"
 #include "firmware/math/trig.h"
 
 /* The gain follows the saliency as it saturates, but no further than this: it would only amplify noise. */
@@ -146,9 +147,21 @@ static void make_gain_sequence(maker_t *m, saliency_config_t *c, pm_num_t flux)
     make_gain(m, c, slope_sequence(&zero, flux), slope_sequence(&rated, flux));
 }
 
+/* Directly compensated, the source reads across the axis of its own saliency. */
 void make_saliency_across(maker_t *m, saliency_config_t *c, pm_num_t flux)
 {
     *c = (saliency_config_t){0};
+#if PM_HAS(injection_stages)
+    if (m->params->cross_coupling_comp == 2) {
+        make_gain_sequence(m, c, flux);
+        make_shift(m, c);
+        return;
+    }
+#else
+    if (m->params->cross_coupling_comp == 2) {
+        refuse(m, DRIVE_PARAM_cross_coupling_comp, "2 is not in this image");
+    }
+#endif
     make_gain_across(m, c, flux);
     if (m->params->cross_coupling_comp != 0) {
         make_lambda(m, c);

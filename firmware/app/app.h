@@ -84,9 +84,10 @@ struct app {
     bool next_lost;              /* a set that waited to be taken was overwritten by one that was refused */
     volatile bool next_ready;
     bool stored, refused, restart, batch;
-    drive_param_id_t refused_param; /* that the last check named */
-    uint16_t dropped;               /* stored pairs that this version does not know */
-    uint8_t routines;               /* what to identify: COMMISSIONING_... */
+    drive_param_id_t refused_param;               /* that the last check named */
+    uint16_t dropped;                             /* stored pairs that this version does not know */
+    uint8_t routines;                             /* what to identify: COMMISSIONING_... */
+    PM_IN_IMAGE(saliency_map, uint8_t map_point;) /* shown of the saliency map */
 
     /* bus */
     node_t node;

@@ -3,7 +3,7 @@
 
 #include "firmware/app/app_parts.h"
 
-typedef enum { IN_OHM, IN_VOLT, IN_HENRY, IN_WEBER, IN_INERTIA, IN_VISCOUS, IN_TORQUE } base_t;
+typedef enum { IN_OHM, IN_VOLT, IN_HENRY, IN_WEBER, IN_INERTIA, IN_VISCOUS, IN_TORQUE, IN_AMPERE } base_t;
 
 typedef struct {
     uint16_t slot;
@@ -47,6 +47,8 @@ static pm_num_t base_of(const drive_config_t *config, base_t base)
     }
     case IN_VISCOUS:
         return pm_num_mul(b->torque, per_speed);
+    case IN_AMPERE:
+        return b->i;
     case IN_TORQUE:
     default:
         return b->torque;
@@ -73,8 +75,78 @@ static int32_t in_row(const app_t *app, const result_row_t *row)
     return app_in_units(x, base_of(&app->drive.config, (base_t)row->base), row->exponent);
 }
 
+#if PM_HAS(saliency_map)
+static int32_t of_map(const app_t *app, pm_q_t x, base_t base, uint8_t exponent)
+{
+    return app_in_units(x, base_of(&app->drive.config, base), exponent);
+}
+
+/* What has been measured with the rotor locked goes before what was estimated with it free. */
+static bool measured_value(const app_t *app, uint16_t slot, int32_t *value)
+{
+    const saliency_map_result_t *map = &app->drive.saliency_map;
+    switch (slot) {
+    case OD_LIVE_IDENTIFICATION_L_DH_RATED:
+        *value = of_map(app, map->rated.L_d, IN_HENRY, 9);
+        return true;
+    case OD_LIVE_IDENTIFICATION_L_QH_RATED:
+        *value = of_map(app, map->rated.L_q, IN_HENRY, 9);
+        return true;
+    case OD_LIVE_IDENTIFICATION_L_DQH_RATED:
+        *value = of_map(app, map->rated.L_dq, IN_HENRY, 9);
+        return true;
+    case OD_LIVE_IDENTIFICATION_CROSS_HALF: {
+        const pm_num_t part = pm_num_ratio(map->half.L_dq, map->half.L_q);
+        (void)pm_num_to_fixed(pm_num_mul(part, pm_num(1000000)), 0, value);
+        return true;
+    }
+    default:
+        return false;
+    }
+}
+
+static bool map_value(const app_t *app, uint16_t slot, int32_t *value)
+{
+    const saliency_map_result_t *map = &app->drive.saliency_map;
+    const saliency_point_t *point = &map->point[0][app->map_point];
+    switch (slot) {
+    case OD_LIVE_IDENTIFICATION_MAP_POINT:
+        *value = app->map_point;
+        return true;
+    case OD_LIVE_IDENTIFICATION_MAP_L_DH:
+        *value = of_map(app, point->L_d, IN_HENRY, 9);
+        return true;
+    case OD_LIVE_IDENTIFICATION_MAP_L_QH:
+        *value = of_map(app, point->L_q, IN_HENRY, 9);
+        return true;
+    case OD_LIVE_IDENTIFICATION_MAP_L_DQH:
+        *value = of_map(app, point->L_dq, IN_HENRY, 9);
+        return true;
+    case OD_LIVE_IDENTIFICATION_CIRCLE_CENTRE:
+        *value = of_map(app, map->centre, IN_AMPERE, 6);
+        return true;
+    case OD_LIVE_IDENTIFICATION_CIRCLE_RADIUS:
+        *value = of_map(app, map->radius, IN_AMPERE, 6);
+        return true;
+    default:
+        return map->i != 0 && measured_value(app, slot, value);
+    }
+}
+#else
+static bool map_value(const app_t *app, uint16_t slot, int32_t *value)
+{
+    (void)app;
+    (void)slot;
+    (void)value;
+    return false;
+}
+#endif
+
 bool app_identify_value(const app_t *app, uint16_t slot, int32_t *value)
 {
+    if (map_value(app, slot, value)) {
+        return true;
+    }
     const commissioning_report_t *report = &app->drive.commissioning_report;
     const commissioning_result_t *r = &report->result;
     for (uint32_t n = 0; n < sizeof results / sizeof results[0]; n++) {
@@ -114,7 +186,14 @@ bool app_identify_value(const app_t *app, uint16_t slot, int32_t *value)
 
 bool app_identify_put(app_t *app, uint16_t slot, int32_t value)
 {
-    if (slot != (uint16_t)OD_LIVE_IDENTIFICATION_COMMAND) {
+    const bool map = value == (int32_t)COMMISSIONING_SALIENCY;
+#if PM_HAS(saliency_map)
+    if (slot == (uint16_t)OD_LIVE_IDENTIFICATION_MAP_POINT) {
+        app->map_point = (uint8_t)value;
+        return true;
+    }
+#endif
+    if (slot != (uint16_t)OD_LIVE_IDENTIFICATION_COMMAND || (map && PM_HAS(saliency_map) == 0)) {
         return false;
     }
     commissioning_report_t *report =

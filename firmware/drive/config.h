@@ -14,6 +14,7 @@
 #include "firmware/drive/neutral.h"
 #include "firmware/drive/position.h"
 #include "firmware/drive/procedures/flying_start.h"
+#include "firmware/drive/procedures/saliency_map.h"
 #include "firmware/drive/procedures/sequence.h"
 #include "firmware/drive/rest.h"
 #include "firmware/math/image.h"
@@ -77,6 +78,7 @@ typedef struct {
     PM_IN_IMAGE(dc_link_pulses, dc_link_pulses_config_t dc_link_pulses;)
     PM_IN_IMAGE(carrier_rest, rest_config_t rest;)
     PM_IN_IMAGE(flying_start, flying_start_config_t flying_start;)
+    PM_IN_IMAGE(saliency_map, saliency_map_config_t saliency_map;)
 #if SEQUENCE_HAS_POLARITY
     polarity_config_t polarity;
     dual_pulses_config_t dual_pulses;

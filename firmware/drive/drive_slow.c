@@ -35,8 +35,14 @@ PM_RARE static void begin_step(drive_t *drive)
     drive->lost_ms = 0;
     drive->sum_ms = 0;
     const sequence_step_t *step = sequence_step((sequence_id_t)self->id, self->step);
-    procedure_begin(
-        drive, (procedure_id_t)sequence_procedure(step, drive->config.find, config_pole(&drive->config)));
+    procedure_id_t id =
+        (procedure_id_t)sequence_procedure(step, drive->config.find, config_pole(&drive->config));
+#if PM_HAS(saliency_map)
+    if (id == PROCEDURE_identify && drive->command.routines == (uint8_t)COMMISSIONING_SALIENCY) {
+        id = PROCEDURE_saliency_map;
+    }
+#endif
+    procedure_begin(drive, id);
 }
 
 static void begin_sequence(drive_t *drive)

@@ -97,6 +97,7 @@ struct drive {
     drive_command_t command;
     drive_fault_record_t record;
     commissioning_report_t commissioning_report;
+    PM_IN_IMAGE(saliency_map, saliency_map_result_t saliency_map;)
     sequence_t sequence;
     procedure_beside_t beside;
 };

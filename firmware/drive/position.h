@@ -1,5 +1,5 @@
-/* The position of the rotor: injection at low speed, an observer above, one loop (METHODS.md 4.5.1 and 5.9,
- * rows 44 and 69; the loop: observers/loop.h).
+/* The position of the rotor: injection at low speed, an observer above, one loop (METHODS.md 4.5.1, 4.5.3 and
+ * 5.9, rows 44, 46 and 69; the loop: observers/loop.h).
  *
  *   eps = eps_injection + weight (eps_observer - eps_injection)
  * weight rises from 0 at omega_low to 1 at omega_high; the carrier is on below omega_high and off above

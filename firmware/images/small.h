@@ -20,6 +20,7 @@
 #define PM_WITHOUT_dual_pulses 1
 #define PM_WITHOUT_three_phase_hf 1
 #define PM_WITHOUT_flying_start 1
+#define PM_WITHOUT_saliency_map 1
 #define PM_WITHOUT_stored_eds 1
 #define PM_WITHOUT_mismatch 1
 #define PM_WITHOUT_second_harmonic 1
@@ -28,6 +29,7 @@
 #define PM_WITHOUT_carrier_rest 1
 #define PM_WITHOUT_load_current 1
 #define PM_WITHOUT_neutral 1
+#define PM_WITHOUT_injection_stages 1
 #define PM_WITHOUT_back_emf 1
 #define PM_WITHOUT_extended_emf 1
 #define PM_WITHOUT_extended_emf_ab 1

@@ -15,6 +15,7 @@ typedef enum {
     PM_FAILED_UNEVEN,      /* the phases do not share the current as they must */
     PM_FAILED_IMPLAUSIBLE, /* a result that no machine has */
     PM_FAILED_NOT_TURNING, /* the rotor did not follow */
+    PM_FAILED_TURNED,      /* the rotor was to stand still */
     PM_PROCEDURE_COUNT,
 } pm_procedure_t;
 

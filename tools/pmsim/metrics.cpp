@@ -199,6 +199,8 @@ static const std::vector<SpecialMetric> &special_metrics()
 {
     static const std::vector<SpecialMetric> table = [] {
         std::vector<SpecialMetric> list = motion_metrics();
+        const std::vector<SpecialMetric> angle = angle_metrics();
+        list.insert(list.end(), angle.begin(), angle.end());
         const std::vector<SpecialMetric> drive = drive_metrics();
         list.insert(list.end(), drive.begin(), drive.end());
         const std::vector<SpecialMetric> identify = identify_metrics();

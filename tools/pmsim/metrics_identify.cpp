@@ -1,10 +1,13 @@
 // What the drive has identified against the plant's own data.
 #include "tools/pmsim/metrics_special.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
 
+#include "firmware/params/parameters.h"
+#include "tools/pmsim/drive_parameters.h"
 #include "tools/pmsim/names.h"
 
 namespace pmsim
@@ -66,15 +69,19 @@ class Point
     double psi_d_, psi_q_, dd_ = 0, qq_ = 0, dq_ = 0;
 };
 
-// At rated current and the i_d of most torque per ampere by the inductances at zero current.
-Point rated_point(const Setup &setup)
+// With the i_d of most torque per ampere by the inductances at zero current.
+Point on_trajectory(const Setup &setup, double i_A)
 {
     const plant_machine_t &m = setup.plant.machine;
     const Point zero(m, 0, 0);
-    const double i_A = setup.rated.i_rated_A;
     const double dL_H = zero.L_qh() - zero.L_dh();
     const double h_A = dL_H > 0.05 * zero.L_qh() ? m.psi_m_Wb / (2 * dL_H) : 0;
     return {m, h_A > 0 ? h_A - std::hypot(h_A, i_A) : 0, i_A};
+}
+
+Point rated_point(const Setup &setup)
+{
+    return on_trajectory(setup, setup.rated.i_rated_A);
 }
 
 class Identified : public Metric
@@ -101,6 +108,50 @@ class Identified : public Metric
     }
 
   private:
+    // The inductance along an axis relative to itself, the cross one to L_qh: the largest of the three.
+    static double largest(const rig_saliency_t &found, const Point &truth)
+    {
+        if (found.L_qh_H == 0) {
+            return std::numeric_limits<double>::quiet_NaN();
+        }
+        return std::max({std::abs(found.L_dh_H / truth.L_dh() - 1), std::abs(found.L_qh_H / truth.L_qh() - 1),
+                         std::abs(found.L_dqh_H - truth.L_dqh()) / truth.L_qh()});
+    }
+
+    // Of all points; flat: were they all as without current.
+    double map_error(bool flat) const
+    {
+        double most = 0;
+        for (int row = 0; row < RIG_MAP_SIDE; ++row) {
+            for (int column = 0; column < RIG_MAP_SIDE; ++column) {
+                const double quarter_A = last_.map_current_A / 4;
+                const Point truth(setup_.plant.machine, (column - 2) * quarter_A, row * quarter_A);
+                const double error = largest(flat ? last_.map[0][2] : last_.map[row][column], truth);
+                most = std::isnan(most) || error <= most ? most : error;
+            }
+        }
+        return most;
+    }
+
+    // I_p and I_n of a carrier of f_pwm / 20, whose flux the samples see as V_h T_s / (2 sin(pi / 20)).
+    double circle_error() const
+    {
+        const Point zero(setup_.plant.machine, 0, 0);
+        const double v_V = parameter_si(*setup_.params, DRIVE_PARAM_v_injection);
+        const double flux_Wb = v_V / setup_.plant.inverter.f_pwm_Hz / (2 * std::sin(M_PI / 20));
+        const double centre_A = flux_Wb * (1 / zero.L_dh() + 1 / zero.L_qh()) / 2;
+        const double radius_A = flux_Wb * (1 / zero.L_dh() - 1 / zero.L_qh()) / 2;
+        return std::max(std::abs(relative(last_.circle_centre_A, centre_A)),
+                        std::abs(relative(last_.circle_radius_A, radius_A)));
+    }
+
+    double table_error() const
+    {
+        const double i_A = last_.map_current_A;
+        return std::max(largest(last_.half, on_trajectory(setup_, i_A / 2)),
+                        largest(last_.rated, on_trajectory(setup_, i_A)));
+    }
+
     static double relative(double found, double truth)
     {
         return found == 0 ? std::numeric_limits<double>::quiet_NaN() : found / truth - 1;
@@ -141,6 +192,18 @@ class Identified : public Metric
                                   inverter.v_diode_V * 2 * gap;
             return relative(last_.lost_V, lost_V);
         }
+        if (kind_ == "identify_map_error_rel") {
+            return map_error(false);
+        }
+        if (kind_ == "identify_map_flat_error_rel") {
+            return map_error(true);
+        }
+        if (kind_ == "identify_circle_error_rel") {
+            return circle_error();
+        }
+        if (kind_ == "identify_table_error_rel") {
+            return table_error();
+        }
         if (kind_ == "identify_leg_capacitance_F") {
             return last_.move_A * inverter.dead_time_s / setup_.plant.dclink.v_source_V;
         }
@@ -179,6 +242,12 @@ std::vector<SpecialMetric> identify_metrics()
         number("identify_L_qh_rated_error_rel",
                "incremental L_q at rated current, estimated against the plant's"),
         number("identify_L_dq_error_rel", "error of the cross inductance at rated current, of L_q"),
+        number("identify_map_error_rel", "largest error of the saliency map's inductances; L_dqh: of L_qh"),
+        number("identify_map_flat_error_rel", "the same, were all of the map as without current"),
+        number("identify_circle_error_rel",
+               "larger error of centre and radius of the saliency circle without current"),
+        number("identify_table_error_rel",
+               "largest error of the inductances at half and all of the map's current, drive's i_d"),
         number("identify_psi_m_error_rel", "magnet flux found against the plant's"),
         number("identify_J_error_rel", "inertia found against the plant's"),
         number("identify_friction_error_rel", "error of the friction at rated speed, of rated torque"),

@@ -18,6 +18,7 @@ template <class T> std::unique_ptr<Metric> make_special(const Expectation &expec
 }
 
 bool has_position(const Sample &sample);
+std::vector<SpecialMetric> angle_metrics();    // metrics_angle.cpp
 std::vector<SpecialMetric> motion_metrics();   // metrics_motion.cpp
 std::vector<SpecialMetric> drive_metrics();    // metrics_drive.cpp
 std::vector<SpecialMetric> identify_metrics(); // metrics_identify.cpp

@@ -17,8 +17,8 @@ const double nan = std::numeric_limits<double>::quiet_NaN();
 // In the order of pm_procedure_t.
 std::vector<std::string> refusal_names()
 {
-    return {"none",   "done",       "timeout", "saliency",    "polarity",
-            "offset", "no_current", "uneven",  "implausible", "not_turning"};
+    return {"none",       "done",   "timeout",     "saliency",    "polarity", "offset",
+            "no_current", "uneven", "implausible", "not_turning", "turned"};
 }
 
 // When the drive begins to run.

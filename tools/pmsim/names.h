@@ -17,7 +17,7 @@ inline const std::vector<std::string> &state_names()
 
 inline const std::vector<std::string> &mode_names()
 {
-    static const std::vector<std::string> names = {"speed", "torque", "current", "identify"};
+    static const std::vector<std::string> names = {"speed", "torque", "current", "identify", "saliency"};
     return names;
 }
 
@@ -42,8 +42,8 @@ inline const std::vector<std::string> &identify_state_names()
 
 inline const std::vector<std::string> &identify_reason_names()
 {
-    static const std::vector<std::string> names = {"NONE",        "NO_CURRENT",  "UNEVEN",
-                                                   "IMPLAUSIBLE", "NOT_TURNING", "ABORTED"};
+    static const std::vector<std::string> names = {"NONE",        "NO_CURRENT", "UNEVEN", "IMPLAUSIBLE",
+                                                   "NOT_TURNING", "ABORTED",    "ROUND",  "TURNED"};
     return names;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 namespace pmsim
 {
@@ -114,6 +115,9 @@ void Profile::start_switches(const Event &event)
     }
     if (event.rotor_slip_rad) {
         plant_turn_rotor(plant, *event.rotor_slip_rad);
+    }
+    if (event.estimate_turn_rad && !rig_turn_estimate(rig_, *event.estimate_turn_rad)) {
+        throw std::runtime_error("estimate_turn_deg: the drive has no estimate that can be turned");
     }
     if (event.clear_fault) {
         rig_clear_fault(rig_);

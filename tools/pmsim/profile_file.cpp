@@ -56,6 +56,7 @@ std::vector<std::string> event_keys()
                                      "hw_fault",
                                      "sensor_offset_A",
                                      "rotor_slip_deg",
+                                     "estimate_turn_deg",
                                      "free_speed",
                                      "clear_fault",
                                      "sensor_gain_error",
@@ -198,6 +199,9 @@ Event read_event(const Value &value, const Setup &setup)
     event.sensor_gain_error = read_legs_of(map, "sensor_gain_error", setup);
     if (const auto slip = map.find("rotor_slip_deg")) {
         event.rotor_slip_rad = slip->number(-360, 360) * two_pi / 360.0;
+    }
+    if (const auto turn = map.find("estimate_turn_deg")) {
+        event.estimate_turn_rad = turn->number(-360, 360) * two_pi / 360.0;
     }
     if (const auto fault = map.find("leg_fault")) {
         event.leg_fault = read_leg_fault(*fault, setup);

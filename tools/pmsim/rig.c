@@ -1,5 +1,6 @@
 #include "tools/pmsim/rig.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -80,6 +81,16 @@ void rig_command(rig_t *rig, const rig_command_t *command)
     rig->command = rig_drive_command(command);
     rig->given |= RECORD_COMMAND;
     drive_command(&rig->loop.app.drive, &rig->command);
+}
+
+bool rig_turn_estimate(rig_t *rig, double theta_e_rad)
+{
+    drive_t *drive = &rig->loop.app.drive;
+    if (drive->stage < STAGE_OPEN_LOOP) {
+        return false;
+    }
+    drive->position.pll.theta += (pm_angle_t)(int64_t)llround(theta_e_rad / 6.283185307179586 * 4294967296.0);
+    return true;
 }
 
 bool rig_clear_fault(rig_t *rig)

@@ -17,7 +17,14 @@
 
 /* In the order of drive_state_t and drive_mode_t; rig.c checks it. */
 enum { RIG_OFF, RIG_CALIBRATING, RIG_FINDING, RIG_RUNNING, RIG_STOPPING, RIG_FAULT, RIG_STATES };
-enum { RIG_SPEED, RIG_TORQUE, RIG_CURRENT, RIG_IDENTIFY, RIG_MODES };
+enum {
+    RIG_SPEED,
+    RIG_TORQUE,
+    RIG_CURRENT,
+    RIG_IDENTIFY,
+    RIG_SALIENCY,
+    RIG_MODES
+}; /* the last: identify, its map */
 
 typedef struct {
     bool enable;
@@ -27,6 +34,13 @@ typedef struct {
     double current_A;
 } rig_command_t;
 
+/* Incremental inductances at a point of currents. */
+typedef struct {
+    double L_dh_H, L_qh_H, L_dqh_H;
+} rig_saliency_t;
+
+#define RIG_MAP_SIDE 5
+
 /* What the drive has found out about its machine; 0: nothing yet. */
 typedef struct {
     int state, reason; /* COMMISSIONING_... */
@@ -34,6 +48,9 @@ typedef struct {
     double L_d_H, L_q_H, L_q_rated_H, L_qh_rated_H, L_dq_rated_H;
     double psi_m_Wb;
     double J_kgm2, viscous_Nms, coulomb_Nm;
+    rig_saliency_t map[RIG_MAP_SIDE][RIG_MAP_SIDE]; /* [i_q][i_d], procedures/saliency_map.h */
+    rig_saliency_t half, rated;                     /* with the drive's i_d */
+    double map_current_A, circle_centre_A, circle_radius_A;
 } rig_identified_t;
 
 typedef struct {
@@ -69,6 +86,7 @@ void rig_destroy(rig_t *rig);
 plant_t *rig_plant(rig_t *rig);
 void rig_command(rig_t *rig, const rig_command_t *command);
 bool rig_clear_fault(rig_t *rig);
+bool rig_turn_estimate(rig_t *rig, double theta_e_rad); /* the drive's position; false: out of reach */
 void rig_set_temperature(rig_t *rig, double temperature_degC);
 void rig_set_hw_fault(rig_t *rig, bool held);
 void rig_set_break(rig_t *rig, double i_break_A); /* over-current comparators; 0: none */

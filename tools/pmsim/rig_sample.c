@@ -43,9 +43,11 @@ int32_t rig_whole(double value)
 
 drive_command_t rig_drive_command(const rig_command_t *command)
 {
+    const bool map = command->mode == RIG_SALIENCY;
     return (drive_command_t){
         .enable = command->enable,
-        .mode = (drive_mode_t)command->mode,
+        .mode = map ? DRIVE_MODE_IDENTIFY : (drive_mode_t)command->mode,
+        .routines = map ? (uint8_t)COMMISSIONING_SALIENCY : 0U,
         .speed_mrad_s = rig_whole(1e3 * command->speed_rad_s),
         .torque_uNm = rig_whole(1e6 * command->torque_Nm),
         .current_mA = rig_whole(1e3 * command->current_A),
@@ -63,6 +65,28 @@ static drive_fault_t fault_now(rig_scale_t *scale, const drive_t *drive)
     }
     return record->period != scale->fault_seen ? record->fault : DRIVE_FAULT_NONE;
 }
+
+#if PM_HAS(saliency_map)
+static rig_saliency_t saliency(double L_H, const saliency_point_t *point)
+{
+    return (rig_saliency_t){L_H * point->L_d, L_H * point->L_q, L_H * point->L_dq};
+}
+
+static void add_map(const rig_scale_t *scale, const saliency_map_result_t *map, rig_identified_t *found)
+{
+    const double L_H = scale->psi_Wb / scale->i_A / PM_ONE;
+    for (int row = 0; row < RIG_MAP_SIDE; ++row) {
+        for (int column = 0; column < RIG_MAP_SIDE; ++column) {
+            found->map[row][column] = saliency(L_H, &map->point[row][column]);
+        }
+    }
+    found->half = saliency(L_H, &map->half);
+    found->rated = saliency(L_H, &map->rated);
+    found->map_current_A = scale->i_A * map->i;
+    found->circle_centre_A = scale->i_A * map->centre;
+    found->circle_radius_A = scale->i_A * map->radius;
+}
+#endif
 
 static rig_identified_t identified(const rig_scale_t *scale, const commissioning_report_t *report)
 {
@@ -113,6 +137,7 @@ void rig_fill_sample(rig_scale_t *scale, const drive_t *drive, const drive_out_t
     sample->refusal = (int)status->refusal.reason;
     sample->driven = out->legs != PM_LEGS_OFF;
     sample->identified = identified(scale, &drive->commissioning_report);
+    PM_IN_IMAGE(saliency_map, add_map(scale, &drive->saliency_map, &sample->identified);)
 }
 
 void rig_record_legs(const drive_in_t *in, const drive_out_t *out, record_period_t *record)

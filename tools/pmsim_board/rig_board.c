@@ -216,6 +216,14 @@ void rig_command(rig_t *rig, const rig_command_t *command)
 
 /* The drive refuses while enable is set. The profile would take the reset and the enable anew, one after the
  * other: a master that keeps to the drive's rule does not ask. */
+/* It is in the board's memory. */
+bool rig_turn_estimate(rig_t *rig, double theta_e_rad)
+{
+    (void)rig;
+    (void)theta_e_rad;
+    return false;
+}
+
 bool rig_clear_fault(rig_t *rig)
 {
     if (rig->sent.enable) {

@@ -52,14 +52,14 @@ static inline void write_leg(int32_t share, int32_t parts, int32_t *rest, uint16
     drive_write_leg(compare, (int32_t)(wanted / PART));
 }
 
-static inline void write_legs(drive_t *drive, pm_abc_t u, drive_out_t *out)
+/* rest: of the counts, one for each leg. */
+void commissioning_write_legs(drive_t *drive, int32_t rest[3], pm_abc_t u, drive_out_t *out)
 {
-    identify_t *self = &drive->procedure.identify;
     const int32_t per_volt = pm_per_volt(drive->status.v_dc);
     const int32_t parts = pm_shl(drive->config.modulator.counts, 39 - 31); /* PART, and a share in Q31 */
-    write_leg(pm_mulh_add(PM_SHARE_HALF, u.a, per_volt), parts, &self->rest[0], out->compare[0]);
-    write_leg(pm_mulh_add(PM_SHARE_HALF, u.b, per_volt), parts, &self->rest[1], out->compare[1]);
-    write_leg(pm_mulh_add(PM_SHARE_HALF, u.c, per_volt), parts, &self->rest[2], out->compare[2]);
+    write_leg(pm_mulh_add(PM_SHARE_HALF, u.a, per_volt), parts, &rest[0], out->compare[0]);
+    write_leg(pm_mulh_add(PM_SHARE_HALF, u.b, per_volt), parts, &rest[1], out->compare[1]);
+    write_leg(pm_mulh_add(PM_SHARE_HALF, u.c, per_volt), parts, &rest[2], out->compare[2]);
     out->legs = PM_LEGS_PWM;
     out->trip = 0;
 }
@@ -154,6 +154,6 @@ PM_APART pm_procedure_t procedure_identify_step(drive_t *drive, const drive_in_t
     }
     drive->status.theta = drive->theta_open;
     drive->v_next = self->v;
-    write_legs(drive, u, out);
+    commissioning_write_legs(drive, self->rest, u, out);
     return PM_RUNNING; /* its slow part knows the end */
 }

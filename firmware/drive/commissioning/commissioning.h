@@ -28,6 +28,7 @@ enum {
     COMMISSIONING_FLUX = 4,
     COMMISSIONING_MECHANICS = 8,
     COMMISSIONING_ALL = 15,
+    COMMISSIONING_SALIENCY = 16, /* alone, with the rotor locked: procedures/saliency_map.h */
 };
 
 typedef enum {
@@ -44,6 +45,8 @@ typedef enum {
     COMMISSIONING_IMPLAUSIBLE, /* a result that no machine has */
     COMMISSIONING_NOT_TURNING, /* the rotor did not follow the vector: locked, or the current is too small */
     COMMISSIONING_ABORTED,     /* enable was withdrawn, or a fault occurred */
+    COMMISSIONING_ROUND,       /* no saliency, so no axis */
+    COMMISSIONING_TURNED,      /* the rotor must be locked for this */
 } commissioning_reason_t;
 
 /* Per-unit of the drive's bases; 0: not measured yet. */

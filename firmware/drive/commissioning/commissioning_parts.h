@@ -15,6 +15,7 @@ enum { KIND_VOLTAGE, KIND_CURRENT, KIND_SQUARE }; /* the first to begin with */
 void commissioning_start_current(drive_t *drive); /* current control in the frame of theta_open */
 void commissioning_set_gains(drive_t *drive);     /* by R and L_d */
 void commissioning_clear_sums(identify_t *self);
+void commissioning_write_legs(drive_t *drive, int32_t rest[3], pm_abc_t u, drive_out_t *out);
 pm_q_t commissioning_mean(const identify_t *self, uint32_t n); /* of sum n over the samples */
 
 /* square.c: one period of the square wave. Sums, s the sign of the voltage, w = v_d - R i_d - lost:
@@ -44,6 +45,7 @@ phase_result_t levels_slow(drive_t *drive);
 /* inductance.c */
 void inductance_enter(drive_t *drive, bool on_q, bool rated);
 phase_result_t inductance_slow(drive_t *drive, bool on_q, bool rated);
+pm_q_t commissioning_best_i_d(const drive_t *drive, pm_q_t i_q); /* of most torque per ampere */
 
 /* rotation.c */
 void rotation_enter(drive_t *drive);

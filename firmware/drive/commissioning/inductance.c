@@ -27,7 +27,7 @@
 /* The i_d of most torque per ampere, but large enough that the sign of its leg's current is certain; none
  * without saliency:
  *   i_d = h - sqrt(h^2 + i^2),   h = psi_m / (2 (L_q - L_d)) */
-static pm_q_t best_i_d(const drive_t *drive, pm_q_t i_q)
+pm_q_t commissioning_best_i_d(const drive_t *drive, pm_q_t i_q)
 {
     const commissioning_result_t *r = &drive->commissioning_report.result;
     const pm_q_t dL = r->L_q - r->L_d;
@@ -54,7 +54,7 @@ void inductance_enter(drive_t *drive, bool on_q, bool rated)
 {
     identify_t *self = &drive->procedure.identify;
     const pm_q_t i = rated ? commissioning_current(drive) : pm_mul(commissioning_current(drive), SHARE_SMALL);
-    const pm_q_t bias = rated ? -best_i_d(drive, i) : 0;
+    const pm_q_t bias = rated ? -commissioning_best_i_d(drive, i) : 0;
     const uint32_t settled = bias != 0 ? BIASED_SETTLE_CYCLES : SETTLE_CYCLES;
     self->of.square = (square_t){
         .half = SHORTEST,

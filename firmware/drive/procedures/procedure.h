@@ -32,6 +32,7 @@
 #include "firmware/drive/procedures/d_current.h"
 #include "firmware/drive/procedures/flying_start.h"
 #include "firmware/drive/procedures/lock.h"
+#include "firmware/drive/procedures/saliency_map.h"
 #include "firmware/drive/procedures/secondary_current.h"
 #include "firmware/math/pll.h"
 #include "firmware/math/procedure.h"
@@ -58,7 +59,7 @@ typedef enum {
 /* Where the state of a row belongs. */
 #define PROCEDURE_IN_PLACE_BARE(name)  name##_t name;
 #define PROCEDURE_IN_PLACE_LEGS(name)  name##_t name;
-#define PROCEDURE_IN_PLACE_ALONE(name) name##_t name;
+#define PROCEDURE_IN_PLACE_ALONE(name) PM_IN_IMAGE(name, name##_t name;)
 #define PROCEDURE_IN_PLACE_CONTROL(name)
 #define PROCEDURE_BESIDE_BARE(name)
 #define PROCEDURE_BESIDE_LEGS(name)

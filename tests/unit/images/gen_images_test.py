@@ -71,6 +71,13 @@ class Images(unittest.TestCase):
             left_out = [line for line in text.splitlines() if "WITHOUT" in line]
             self.assertEqual(left_out, [f"#define PM_WITHOUT_{name} 1" for name in absent])
 
+    def test_all_methods_but_some(self):
+        self.put("firmware/images/few.yaml", MANIFEST.replace("[first, third]", "all\nwithout: [second]"))
+        self.assertEqual([line for line in gen_images.files(self.root)["firmware/images/few.h"].splitlines() if "WITHOUT" in line],
+                         ["#define PM_WITHOUT_second 1"])
+        self.assertIn("unknown method `fifth`", self.refused("[first, third]", "all\nwithout: [fifth]"))
+        self.assertIn("`without` is for images with all methods", self.refused("[first, third]", "[first, third]\nwithout: [second]"))
+
     def test_method_without_its_channel_is_refused(self):
         self.put("injection/needy.def", NEEDY)
         self.assertEqual(self.refused("[first, third]", "[first, fifth]"),

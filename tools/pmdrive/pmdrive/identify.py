@@ -16,11 +16,13 @@ from .errors import NotDone, UsageError
 from .motion import Motion
 
 ROUTINES = {"resistance": 1, "inductance": 2, "flux": 4, "mechanics": 8}
+ALONE = {"saliency": 16}  # with the rotor locked
 RESULTS = {
     "resistance": ("R_s", "dead_voltage", "leg_capacitance"),
     "inductance": ("L_d", "L_q", "L_q_rated", "L_dh_rated", "L_qh_rated", "L_dqh_rated", "cross_half"),
     "flux": ("psi_m",),
     "mechanics": ("J", "friction", "coulomb"),
+    "saliency": ("L_d", "L_q", "L_dh_rated", "L_qh_rated", "L_dqh_rated", "cross_half"),
 }
 DONE, FAILED = 2, 3
 WHAT_TO_DO = {
@@ -29,6 +31,8 @@ WHAT_TO_DO = {
     3: "check the current sensors' scale, i_full_scale and v_full_scale",
     4: "free the shaft, take its load off, or allow more current: --current",
     5: "it was stopped, or a fault came: `pmdrive faults`",
+    6: "a round machine has no saliency to map",
+    7: "lock the shaft",
 }
 ROUND = 0.03      # less saliency than that is none,
 SATURATED = 0.02  # and then less saturation
@@ -38,16 +42,18 @@ LONGEST_S = 60.0
 def routines(words=None):
     """Sum for identification.command of names, or of a text with commas; None: all."""
     words = list(ROUTINES) if words is None else words.split(",") if isinstance(words, str) else list(words)
-    unknown = [word for word in words if word not in ROUTINES]
+    unknown = [word for word in words if word not in {**ROUTINES, **ALONE}]
     if unknown or not words:
-        raise UsageError(f"`{', '.join(unknown)}` is no routine", f"one or several of {', '.join(ROUTINES)}")
+        raise UsageError(f"`{', '.join(unknown)}` is no routine", f"one or several of {', '.join(ROUTINES)}; or {', '.join(ALONE)}")
+    if len(words) > 1 and any(word in ALONE for word in words):
+        raise UsageError("the rotor is locked for `saliency`, and must not be for the others", "run it alone")
     return words
 
 
 def run(drive, only=None, current=0, speed=0, progress=None):
     """{routine: {name: integer}} of what has been found. Current in mA, 0: rated; speed in mrad/s, 0: 30 % of speed_max."""
     wanted = routines(only)
-    drive.write("identification.command", sum(ROUTINES[word] for word in wanted))
+    drive.write("identification.command", sum({**ROUTINES, **ALONE}[word] for word in wanted))
     with Motion(drive, "identify", speed=speed, current=current) as motion:
         try:
             _wait(drive, motion, progress)
@@ -103,6 +109,8 @@ def parameters(drive, found):
     if "inductance" in found:
         _inductances(x)
         wanted.update((name, x[name]) for name in RESULTS["inductance"])
+    if "saliency" in found:
+        wanted.update((name, x[name]) for name in RESULTS["saliency"])
     wanted.update((name, x[name]) for name in ("psi_m", "J") if name in x)
     return raw_values(wanted)
 
