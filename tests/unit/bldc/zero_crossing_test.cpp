@@ -24,7 +24,7 @@ double degrees(double counts)
     return 60.0 * counts / kT60;
 }
 
-constexpr zero_expected_t kExpected = {0, kT60, 0};
+constexpr zero_expected_t kExpected = {0, kT60, 0, 0};
 
 struct Sample {
     zero_sample_t measured;
