@@ -94,7 +94,8 @@ uint32_t drive_says(const od_entry_t &entry, int64_t value)
     drive_config_t config = {};
     drive_param_set(&wanted, drive_param_id_t(entry.slot), int32_t(value));
     const Bench board;
-    return drive_configure(&config, &wanted, hal_channels(&board.loop.hal)).ok ? uint32_t(DONE) : uint32_t(INCOMPATIBLE);
+    return drive_configure(&config, &wanted, hal_channels(&board.loop.hal)).ok ? uint32_t(DONE)
+                                                                               : uint32_t(INCOMPATIBLE);
 }
 
 bool is_pdo(const od_entry_t &entry)
