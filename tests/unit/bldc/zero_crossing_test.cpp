@@ -273,6 +273,31 @@ TEST(ZeroCrossing, ThresholdMovesIt)
     EXPECT_NEAR(b.find(-29000, e), moved, 2 * kShape_counts);
 }
 
+// A rotor at rest: what is left is noise, which crosses in each second sample.
+TEST(ZeroCrossing, NoiseIsNoCrossingWhereAnEmfIsAskedFor)
+{
+    for (const bool asked : {true, false}) {
+        Bench b;
+        zero_expected_t e = kExpected;
+        e.seen = asked ? b.config.swing / 8 : 0;
+        b.open();
+        bool found = false;
+        for (int k = 1; k < 20 && !found; ++k) {
+            found = b.step(b.terminal(-30000 + 2000 * k, kV_dc / 2 + (k % 2 == 0 ? 0.05 : -0.05)), e);
+        }
+        EXPECT_EQ(found, !asked);
+        EXPECT_EQ(b.self.ahead, !asked);
+    }
+}
+
+TEST(ZeroCrossing, AnEmfIsSeenWhereOneIsAskedFor)
+{
+    Bench b;
+    zero_expected_t e = kExpected;
+    e.seen = b.config.swing / 8;
+    EXPECT_NEAR(b.find(-29000, e), 0, kShape_counts);
+}
+
 TEST(ZeroCrossing, InstantsWrap)
 {
     Bench b;
