@@ -245,6 +245,57 @@ TEST(Commissioning, ValuesNotIdentifiedComeFromTheParameters)
     EXPECT_EQ(x.result().J, 0);
 }
 
+// Results of an earlier run are what a later one builds on: the parameters stay wrong.
+TEST(Commissioning, ValuesFoundBeforeAreKept)
+{
+    Bench x(ideal());
+    x.command(true);
+    x.run_s(15);
+    ASSERT_EQ(x.report().state, COMMISSIONING_DONE);
+    x.command(false);
+    x.step();
+    for (const uint8_t routine : {COMMISSIONING_INDUCTANCE, COMMISSIONING_FLUX}) {
+        x.command(true, routine);
+        x.run_s(12);
+        ASSERT_EQ(x.report().state, COMMISSIONING_DONE);
+        EXPECT_NEAR(real(x.result().L_q) * kHenry, 76.9e-3, 76.9e-3 * 5e-3);
+        EXPECT_NEAR(real(x.result().psi_m) * kWb, 0.236, 0.236 * 0.02);
+        EXPECT_NEAR(real(x.result().R) * kOhm, 6.0, 6.0 * 1e-3);
+        x.command(false);
+        x.step();
+    }
+}
+
+// Without saliency no i_d helps the torque: the wave at the test current has none, and there is nothing to tell cross
+// coupling from.
+TEST(Commissioning, InductancesOfARoundMachine)
+{
+    plant_config_t c = ideal();
+    c.machine.L_q0_H = c.machine.L_d0_H;
+    Bench x(c);
+    x.command(true, COMMISSIONING_RESISTANCE | COMMISSIONING_INDUCTANCE);
+    x.run_s(8);
+    ASSERT_EQ(x.report().state, COMMISSIONING_DONE);
+    EXPECT_NEAR(real(x.result().L_d) * kHenry, 46.3e-3, 46.3e-3 * 5e-3);
+    EXPECT_NEAR(real(x.result().L_q) * kHenry, 46.3e-3, 46.3e-3 * 5e-3);
+    EXPECT_NEAR(real(x.result().L_q_rated) * kHenry, 46.3e-3, 46.3e-3 * 2e-2);
+    EXPECT_EQ(x.result().L_dq_rated, 0);
+}
+
+// A wave that drives no current at all the voltage there is: the motor is not connected.
+TEST(Commissioning, InductanceNeedsAMotor)
+{
+    Bench x(ideal());
+    for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
+        plant_set_leg_fault(x.plant(), leg, PLANT_WIRE_OPEN);
+    }
+    x.command(true, COMMISSIONING_INDUCTANCE);
+    x.run_s(8);
+    EXPECT_EQ(x.report().state, COMMISSIONING_FAILED);
+    EXPECT_EQ(x.report().reason, COMMISSIONING_NO_CURRENT);
+    EXPECT_EQ(x.result().L_d, 0);
+}
+
 TEST(Commissioning, CurrentStaysBelowTheLimit)
 {
     plant_config_t c = plants::ipm_1000();
