@@ -19,6 +19,22 @@ void commutation_reset(commutation_t *self, uint32_t sector, uint32_t at, uint32
     self->sector = (uint8_t)sector;
 }
 
+void commutation_start(commutation_t *self, uint32_t sector, uint32_t now, uint32_t t_30, uint8_t crossings)
+{
+    const uint32_t t_60 = (uint32_t)pm_frac((int32_t)(2U * t_30), PM_FRAC(0.41421356));
+    commutation_reset(self, sector, now + t_30 - t_60 / 2U, t_60);
+    self->young = crossings;
+}
+
+/* The last interval alone. */
+static void forget(commutation_t *self, uint32_t interval)
+{
+    self->sum = SECTORS * interval;
+    for (uint32_t s = 0; s < SECTORS; s++) {
+        self->interval[s] = interval;
+    }
+}
+
 static void take(commutation_t *self, uint32_t interval)
 {
     const uint32_t sector = sector_next(self->crossed);
@@ -27,6 +43,9 @@ static void take(commutation_t *self, uint32_t interval)
     self->crossing += interval;
     self->ahead = self->crossing;
     self->crossed = (uint8_t)sector;
+    if (self->young != 0U) {
+        forget(self, interval);
+    }
 }
 
 static void strike(commutation_t *self)
@@ -47,6 +66,9 @@ void commutation_crossed(commutation_t *self, uint32_t at)
         self->whole = self->whole < SECTORS ? (uint8_t)(self->whole + 1U) : (uint8_t)SECTORS;
     }
     take(self, (uint32_t)(t_60 + pm_clamp(off, -far, far)));
+    if (self->young != 0U && self->whole != 0U) {
+        self->young--;
+    }
 }
 
 void commutation_missed(commutation_t *self)
@@ -62,7 +84,8 @@ uint32_t commutation_due(const commutation_t *self, const commutation_config_t *
     const uint32_t sectors = sector_distance(self->crossed, self->sector);
     uint32_t from = self->crossing + sectors * t_60;
     if (sectors == 1U && (int32_t)(self->ahead - from) > 0) {
-        from = (int32_t)(self->ahead - from) > (int32_t)t_60 ? from + t_60 : self->ahead;
+        const uint32_t most = self->young != 0U ? 4U * t_60 : t_60;
+        from = (int32_t)(self->ahead - from) > (int32_t)most ? from + most : self->ahead;
     }
     return from + (uint32_t)pm_frac((int32_t)self->sum, config->half) - config->delay;
 }

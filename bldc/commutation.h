@@ -9,6 +9,13 @@
  *   t_c >= t + (1/2 - advance) t_60 - delay
  * for up to one t_60, which is how a rotor is followed that a load step slows down.
  *
+ * A rotor that speeds up from rest with constant torque takes t_30 for the first 30 degrees and passes 60 n degrees at
+ * t_30 root(2 n). commutation_start() is for one that stands in the middle of a sector, where it would cross:
+ *   first commutation  t_30                  crossing before it as if at  0.586 t_30
+ *   first crossing     1.414 t_30            t_60                         0.828 t_30
+ * Until `young` crossings in succession have been where they belong, t_60 is the last interval alone, which is a quarter too
+ * long, and a rotor that is slower than expected is waited for for up to four of them.
+ *
  * A crossing is expected t_60 behind the last one. One that is off by more than t_60 / 2 is taken as that far off: a false one
  * does not move the commutation further, and a step of the speed is followed within a few sectors. Synchronism is
  * lost after `strikes` of these or of sectors without a crossing in succession (COMMUTATION_LOST): the caller opens the
@@ -47,10 +54,14 @@ typedef struct {
     uint8_t sector;             /* commanded last */
     uint8_t strikes;
     uint8_t whole; /* crossings in succession that were taken as they were, up to SECTORS */
+    uint8_t young; /* those that a start still has to see */
 } commutation_t;
 
 /* As if there had been a crossing in `sector`, at `at`, and t_60 between all before. */
 void commutation_reset(commutation_t *self, uint32_t sector, uint32_t at, uint32_t t_60);
+
+/* The rotor stands in the middle of `sector` at `now`. */
+void commutation_start(commutation_t *self, uint32_t sector, uint32_t now, uint32_t t_30, uint8_t crossings);
 
 /* The crossing in the sector behind the last one. */
 void commutation_crossed(commutation_t *self, uint32_t at);

@@ -22,6 +22,7 @@
 #define BLDC_FREEWHEELING_H
 
 #include "bldc/patterns.h"
+#include "firmware/params/types.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -44,6 +45,8 @@ pm_q_t freewheeling_angle(const freewheeling_config_t *config, const freewheelin
 
 /* i of which theta_f is the angle, 0 ... 1 rad; saturates. */
 pm_q_t freewheeling_current(const freewheeling_config_t *config, const freewheeling_in_t *in, pm_q_t angle);
+
+void make_freewheeling(maker_t *m, freewheeling_config_t *c);
 
 #ifdef __cplusplus
 }

@@ -4,6 +4,9 @@
 
 #define SIXTH PM_TURN(1.0 / 6)
 
+/* In a sector: with fewer one ahead of the crossing may be near to it, and the EMF is far above its noise. */
+#define SAMPLES 8U
+
 /* What is expected of the next sector. */
 static void follow(six_step_t *self)
 {
@@ -17,20 +20,21 @@ static void open(six_step_t *self, uint32_t sector, uint32_t since)
     self->expected.threshold = thresholds_at(&self->thresholds, sector, self->reverse);
 }
 
-void six_step_reset(six_step_t *self, const six_step_config_t *config, pm_angle_t theta, pm_q_t omega,
-                    uint32_t now)
+void six_step_slow(six_step_t *self, const six_step_config_t *config)
 {
-    self->reverse = omega < 0;
+    const uint32_t t_60 = self->expected.t_60;
+    const bool sure = self->commutation.young == 0U && t_60 < 2U * SAMPLES * config->pattern.half_period;
+    self->expected.seen = sure ? 0 : zero_crossing_swing(&config->crossing, t_60) / 8;
+}
+
+/* In the middle of `sector`, whose crossing is known. */
+static void begin(six_step_t *self, const six_step_config_t *config, uint32_t sector, uint32_t now)
+{
     self->lost = false;
     self->learn = false;
-    /* Sectors from one crossing to the next: the rotor is in the latter half of `sector` or in the first of the next. */
-    const pm_angle_t from = (self->reverse ? 0U - theta : theta) - SIXTH;
-    const uint32_t sector = (uint32_t)pm_min((int32_t)(from / SIXTH), (int32_t)SECTORS - 1);
-    const int32_t turn = pm_div((pm_q_t)config->commutation.turn_base, pm_max(pm_abs(omega), 1));
-    const uint32_t since = (uint32_t)pm_mulh((int32_t)(from - sector * SIXTH), turn);
-    commutation_reset(&self->commutation, sector, now - since, (uint32_t)pm_frac(turn, PM_FRAC(1.0 / 6)));
     follow(self);
-    open(self, sector, now - since);
+    six_step_slow(self, config);
+    open(self, sector, now);
     self->crossing.found = true;
     self->commutated = now;
     self->legs = pattern_states(&config->pattern, sector, self->reverse);
@@ -39,11 +43,34 @@ void six_step_reset(six_step_t *self, const six_step_config_t *config, pm_angle_
     self->plan[1] = none;
 }
 
-static void found(six_step_t *self)
+void six_step_reset(six_step_t *self, const six_step_config_t *config, pm_angle_t theta, pm_q_t omega,
+                    uint32_t now)
+{
+    self->reverse = omega < 0;
+    /* Sectors from one crossing to the next: the rotor is in the latter half of `sector` or in the first of the next. */
+    const pm_angle_t from = (self->reverse ? 0U - theta : theta) - SIXTH;
+    const uint32_t sector = (uint32_t)pm_min((int32_t)(from / SIXTH), (int32_t)SECTORS - 1);
+    const int32_t turn = pm_div((pm_q_t)config->commutation.turn_base, pm_max(pm_abs(omega), 1));
+    const uint32_t since = (uint32_t)pm_mulh((int32_t)(from - sector * SIXTH), turn);
+    commutation_reset(&self->commutation, sector, now - since, (uint32_t)pm_frac(turn, PM_FRAC(1.0 / 6)));
+    begin(self, config, sector, now);
+}
+
+void six_step_start(six_step_t *self, const six_step_config_t *config, pm_angle_t theta, bool reverse,
+                    uint32_t t_30, uint32_t now)
+{
+    self->reverse = reverse;
+    const pm_angle_t from = (reverse ? 0U - theta : theta) - SIXTH / 2U;
+    const uint32_t sector = (uint32_t)pm_min((int32_t)(from / SIXTH), (int32_t)SECTORS - 1);
+    commutation_start(&self->commutation, sector, now, t_30, START_CROSSINGS);
+    begin(self, config, sector, now);
+}
+
+static void found(six_step_t *self, uint32_t legs)
 {
     commutation_crossed(&self->commutation, self->crossing.at);
     follow(self);
-    self->learn = self->commutation.whole == SECTORS;
+    self->learn = self->commutation.whole == SECTORS && legs == ZERO_LEGS_APART;
 }
 
 /* In a period that has no crossing to look for. */
@@ -76,7 +103,7 @@ static void look(six_step_t *self, const six_step_config_t *config, const six_st
     }
     const zero_instant_t when = {start + plan->sample_at, (zero_legs_t)plan->legs};
     if (zero_crossing_step(&self->crossing, &config->crossing, &in->sample, when, &self->expected)) {
-        found(self);
+        found(self, plan->legs);
     } else if (self->crossing.ahead) {
         commutation_ahead(&self->commutation, self->crossing.at);
     } else {

@@ -9,7 +9,8 @@
  * Instants are counts from the start of the period. `now` is the count at t_k; it goes on by 2 N a period and wraps.
  *
  * Start: six_step_reset() with the angle and speed of a rotor that turns, from a drive with field orientation, an open
- * loop or a rotor that was caught; 20 degrees and 10 % of the speed may be missing. After COMMUTATION_LOST
+ * loop or a rotor that was caught; 20 degrees and 10 % of the speed may be missing. Or six_step_start() with a rotor that an
+ * align has left at rest, which is turned by its crossings from the first one on. After COMMUTATION_LOST
  * (commutation.h) `lost` is set and all legs are off from the next call on, until the next reset.
  *
  * six_step_step(), instructions on Cortex-M4 with five periods in a sector:
@@ -24,6 +25,7 @@
 #include "bldc/patterns.h"
 #include "bldc/thresholds.h"
 #include "bldc/zero_crossing.h"
+#include "firmware/params/types.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -75,8 +77,34 @@ typedef struct {
 void six_step_reset(six_step_t *self, const six_step_config_t *config, pm_angle_t theta, pm_q_t omega,
                     uint32_t now);
 
+/* Legs that conduct at the start of the period that begins now, before the call for it. */
+static inline sector_t six_step_legs(const six_step_t *self)
+{
+    return sector_legs(self->plan[1].sector, self->reverse);
+}
+
+/* Of these, the current of the one that stays across the last commutation: that of both but for the freewheeling. */
+static inline pm_q_t six_step_current(const six_step_t *self, const pm_q_t i[PM_LEGS])
+{
+    const sector_t legs = six_step_legs(self);
+    return sector_rising(self->plan[1].sector) ? i[legs.high] : -i[legs.low];
+}
+
+/* The rotor stands at theta, in the middle of a sector, and will turn forwards or back by 30 degrees in t_30 counts
+ * (commutation.h): it is in charge of the crossings from the first one on, and has started when commutation.young is
+ * 0, START_CROSSINGS in succession where they belong. */
+#define START_CROSSINGS 6U
+void six_step_start(six_step_t *self, const six_step_config_t *config, pm_angle_t theta, bool reverse,
+                    uint32_t t_30, uint32_t now);
+
 void six_step_step(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in,
                    six_step_out_t *out);
+
+/* At 1 kHz: what a sector must show of its swing, an eighth, for its crossing to be one. Without the call a rotor that has
+ * stopped may pass for one that turns. */
+void six_step_slow(six_step_t *self, const six_step_config_t *config);
+
+void make_six_step(maker_t *m, six_step_config_t *c);
 
 #ifdef __cplusplus
 }

@@ -74,14 +74,19 @@ bool zero_crossing_step(zero_crossing_t *self, const zero_crossing_config_t *con
     }
     const bool rising = self->rising;
     const pm_q_t v = in->v[self->leg];
-    const bool low = v <= config->rail, high = v >= in->v_dc - config->rail;
+    const pm_q_t within = when.legs == ZERO_LEGS_HIGH ? -config->rail : config->rail;
+    const bool low = v <= config->rail, high = v >= in->v_dc - within;
     const bool past = rising ? high : low;
     const bool cut = rising ? low : high;
     if ((past && !self->ahead) || (cut && when.legs == ZERO_LEGS_APART)) {
         return false; /* freewheeling, of a braking current at the other rail */
     }
     const pm_q_t difference = against_reference(config, in, when.legs, v);
-    const pm_q_t y = (rising ? difference : -difference) - expected->threshold;
+    const pm_q_t threshold = when.legs == ZERO_LEGS_APART ? expected->threshold : 0;
+    const pm_q_t y = (rising ? difference : -difference) - threshold;
+    if (!self->ahead && pm_abs(y) < expected->seen) {
+        return false;
+    }
     if (y < 0 || cut) {
         self->at = when.at;
         self->y = y;

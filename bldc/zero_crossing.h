@@ -16,6 +16,8 @@
  *   t_z = t - y t_60 / swing,     swing = f e'(0) pi / 3:  what the difference rises by in 60 degrees, t_60 their time
  * which holds for the late crossing, when the first sample behind the freewheeling is already past it, and for a
  * sample that the rails have cut.
+ * A sample nearer than `seen` tells neither side until another of its sector was further off: a rotor
+ * that stands has no EMF, only noise, which crosses.
  *
  * Freewheeling: until the current of the leg that has gone is zero its diode holds the terminal at the rail beyond the
  * crossing (the upper one in even sectors). Samples within `rail` of that rail are passed over until one shows that the
@@ -24,8 +26,9 @@
  * Behind it the terminal swings to its EMF with the capacitance of the leg. So a sample that is past the crossing without
  * one ahead of it counts where the crossing is due by then, or where the next one says the same; not further past
  * than 5/8 of the swing, where no rotor in this sector can be.
- * Where the reference of an off-time sample is that same rail (upward crossing with upper diodes, downward with lower ones)
- * freewheeling and past look alike, and a late crossing is missed.
+ * With both legs high the upper diode holds it above v_dc, and `rail` counts from there upwards: EMFs of either sign are
+ * seen, as far as the channel's full scale leaves room. With both low that is beyond a channel which begins at zero: there
+ * freewheeling and past look alike at a downward crossing, and a late one is missed.
  *
  * A RC filter of the terminals must settle within the on time and does not delay (METHODS-ADDENDUM.md, E20); what a
  * comparator delays is taken off by the commutation.
@@ -70,9 +73,11 @@ typedef struct {
 } zero_instant_t;
 
 typedef struct {
-    pm_q_t threshold; /* what y is at the crossing; thresholds.h */
+    pm_q_t threshold; /* what y is at the crossing in the on time; thresholds.h */
     uint32_t t_60;    /* counts */
     uint32_t at;      /* instant of the crossing, from those before */
+    pm_q_t
+        seen; /* nearer to the threshold a sample tells nothing until another was further off; 0: it does */
 } zero_expected_t;
 
 typedef struct {

@@ -10,6 +10,7 @@
 #include "firmware/control/mtpa.h"
 #include "firmware/control/regulator.h"
 #include "firmware/control/speed_control.h"
+#include "firmware/drive/block.h"
 #include "firmware/drive/fault_short.h"
 #include "firmware/drive/neutral.h"
 #include "firmware/drive/position.h"
@@ -86,6 +87,7 @@ typedef struct {
 #endif
     open_loop_config_t open_loop;
     fault_short_config_t fault_short;
+    PM_IN_IMAGE(six_step, block_config_t block;)
     pm_num_t pole_pairs;
     uint32_t slow_divider; /* periods per drive_slow(): the nearest to 1 ms */
     bool injection;        /* injection leads at low speed; else open-loop start */

@@ -345,6 +345,13 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
     drive->period++;
     measure(drive, in, i_trip_and_bits.second);
     if (drive->stage < STAGE_OPEN_LOOP || in->hw_fault || !protection_passed(drive, i_trip_and_bits.first)) {
+#if PM_HAS(six_step)
+        if (drive->stage == STAGE_SIX_STEP && !in->hw_fault &&
+            protection_passed(drive, i_trip_and_bits.first)) {
+            block_step(drive, in, out);
+            return;
+        }
+#endif
         without_control(drive, in, out);
     } else {
         PM_IF_MEASURED(const obs_more_t more = measure_more(drive, in);)

@@ -69,10 +69,34 @@ void fault_short_slow(drive_t *drive); /* 1 kHz: ends it */
 void reference_units(drive_t *drive);  /* for a new configuration: what reference_take() multiplies with */
 void reference_take(drive_t *drive);   /* command to per-unit */
 void reference_vector(drive_t *drive); /* speed or torque -> i_ref */
+void reference_range(drive_t *drive, pm_q_t most, pm_q_t *i_min,
+                     pm_q_t *i_max); /* of i_q: within +-most and the limits */
+pm_q_t reference_torque(drive_t *drive, pm_q_t omega, pm_q_t i_min,
+                        pm_q_t i_max); /* speed or torque -> i_q */
 void reference_reset(drive_t *drive, pm_q_t i_q);
 
 /* rest.c: at 1 kHz, while the vector is controlled: the carrier goes off and on again. */
 void rest_slow(drive_t *drive);
+
+#if PM_HAS(six_step)
+/* block.c */
+
+typedef enum {
+    BLOCK_RUNS,
+    BLOCK_SLOW,    /* below the speed at which the crossings show */
+    BLOCK_LOST,    /* the crossings are not where they belong; all legs are off */
+    BLOCK_STALLED, /* nor have they been since the start */
+} block_result_t;
+
+#define BLOCK_SETTLED_MS 1000U /* after these a loss of synchronism is the first one */
+
+bool block_may_begin(const drive_t *drive); /* in STAGE_VECTOR */
+void block_begin(drive_t *drive);
+bool block_from_rest(
+    drive_t *drive); /* in STAGE_OPEN_LOOP, at rest behind the align; false: not its kind of start */
+void block_step(drive_t *drive, const drive_in_t *in, drive_out_t *out);
+block_result_t block_slow(drive_t *drive);
+#endif
 
 /* open_loop.c: align, open-loop start, current mode, hand-over to the observer and back. */
 void open_loop_start(drive_t *drive);

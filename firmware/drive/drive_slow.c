@@ -100,10 +100,30 @@ PM_RARE static void go_on(drive_t *drive)
 }
 #endif
 
+#if PM_HAS(flying_start) || PM_HAS(six_step)
+/* The rotor is known, and i_q flows: the EMF is the voltage that keeps it, from the period that has begun on. */
+PM_RARE static void take_over(drive_t *drive, const pm_pll_t *known, pm_q_t i_q)
+{
+    const drive_config_t *c = &drive->config;
+    position_take(&drive->position, &c->position, known);
+    const pm_q_t v_top = pm_unit(drive->status.v_dc, c->v_share);
+    const pm_q_t emf = pm_mul(known->omega, c->machine.psi_m);
+    const pm_dq_t v = {.d = 0, .q = pm_clamp(emf, -v_top, v_top)};
+    regulator_reset(&drive->regulator, &c->regulator, v, (pm_dq_t){0, i_q}, known->omega);
+    reference_reset(drive, i_q);
+    const int32_t turn = pm_omega_to_angle(known->omega, c->k_theta);
+    const pm_angle_t middle = known->theta + (pm_angle_t)pm_half(turn);
+    const pm_dq_t e = {.d = 0, .q = emf};
+    drive->v_acting = pm_park_inverse(e, pm_dir(middle));
+    drive->v_next = pm_park_inverse(e, pm_dir(middle + (pm_angle_t)turn));
+    drive->status.theta = known->theta;
+    drive->i_open = 0;
+}
+#endif
+
 #if PM_HAS(flying_start)
-/* The EMF is the voltage that keeps the current at zero, from the period that has begun on. Where the link has less, the
- * current that weakens the field is wanted at once; any other comes little by little. At a speed where neither source
- * sees the rotor it is held by a vector along its d-axis. */
+/* Where the link has less than the EMF, the current that weakens the field is wanted at once; any other comes little by
+ * little. At a speed where neither source sees the rotor it is held by a vector along its d-axis. */
 PM_RARE static void begin_caught(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
@@ -113,24 +133,14 @@ PM_RARE static void begin_caught(drive_t *drive)
     if (imposed) {
         open_loop_start(drive);
     }
-    position_take(&drive->position, &c->position, &caught);
+    take_over(drive, &caught, 0);
     const pm_q_t v_top = pm_unit(drive->status.v_dc, c->v_share);
-    const pm_q_t emf = pm_mul(caught.omega, c->machine.psi_m);
-    const pm_dq_t v = {.d = 0, .q = pm_clamp(emf, -v_top, v_top)};
-    regulator_reset(&drive->regulator, &c->regulator, v, (pm_dq_t){0, 0}, caught.omega);
-    reference_reset(drive, 0);
-    const pm_q_t over = pm_abs(emf) - (v_top - v_top / 20);
+    const pm_q_t over = pm_abs(pm_mul(caught.omega, c->machine.psi_m)) - (v_top - v_top / 20);
     if (over > 0) {
         const pm_q_t x = pm_mul(pm_abs(caught.omega), c->machine.L_d);
         drive->field_weakening.i_d = -pm_min(pm_div(over, x), c->field_weakening.i_max);
         drive->i_ref.d = drive->field_weakening.i_d;
     }
-    const int32_t turn = pm_omega_to_angle(caught.omega, c->k_theta);
-    const pm_angle_t middle = caught.theta + (pm_angle_t)pm_half(turn);
-    const pm_dq_t e = {.d = 0, .q = emf};
-    drive->v_acting = pm_park_inverse(e, pm_dir(middle));
-    drive->v_next = pm_park_inverse(e, pm_dir(middle + (pm_angle_t)turn));
-    drive->status.theta = caught.theta;
     drive->theta_open = caught.theta;
     drive->omega_ramp = caught.omega;
     drive->omega_open = caught.omega;
@@ -171,15 +181,22 @@ static bool is_passed_over(const drive_t *drive, uint8_t procedure)
 #endif
 }
 
+static uint32_t next_step(const drive_t *drive, uint32_t from)
+{
+    uint32_t next = from;
+    while (next < SEQUENCE_STEPS &&
+           is_passed_over(drive, sequence_step((sequence_id_t)drive->sequence.id, next)->procedure)) {
+        next++;
+    }
+    return next;
+}
+
 /* A procedure has come to its end, this way or that. */
 static void advance(drive_t *drive, pm_procedure_t result)
 {
     sequence_t *self = &drive->sequence;
     const sequence_id_t id = (sequence_id_t)self->id;
-    uint32_t next = sequence_next(sequence_step(id, self->step), result);
-    while (next < SEQUENCE_STEPS && is_passed_over(drive, sequence_step(id, next)->procedure)) {
-        next++;
-    }
+    const uint32_t next = next_step(drive, sequence_next(sequence_step(id, self->step), result));
     const bool rests = self->procedure == (uint8_t)PROCEDURE_flying_start && result == PM_FAILED_NOT_TURNING;
     if (result != PM_DONE && !rests) {
         drive->round = drive->round || result == PM_FAILED_SALIENCY;
@@ -251,8 +268,82 @@ PM_APART static void resolve_slip(drive_t *drive) /* its stack is not that of th
     }
 }
 
+#if PM_HAS(six_step)
+/* The vector goes on at the rotor's angle with the current that flows. */
+PM_RARE static void begin_vector(drive_t *drive)
+{
+    const pm_dq_t i = drive->status.i;
+    const pm_pll_t pll = drive->pll;
+    take_over(drive, &pll, i.q);
+    drive->stage = STAGE_VECTOR;
+}
+
+/* The rotor has gone astray: what a start does behind the calibration, which looks for one that turns first. */
+PM_RARE static void begin_again(drive_t *drive)
+{
+    begin_sequence(drive);
+    drive->sequence.step = (uint8_t)next_step(drive, 1);
+    drive->stage = STAGE_OFF;
+    drive->state = DRIVE_FINDING;
+}
+
+/* No current is led into a rotor that may turn at speed, unless it is looked for first. */
+static bool may_look(const drive_t *drive)
+{
+    return !is_passed_over(drive, (uint8_t)PROCEDURE_flying_start);
+}
+
+PM_RARE static void try_again(drive_t *drive, drive_fault_t fault)
+{
+    if (drive->state == DRIVE_STOPPING) {
+        switch_off(drive);
+    } else if (drive->block_tries >= drive->config.block.tries) {
+        drive_trip(drive, fault);
+    } else {
+        drive->block_tries++;
+        begin_again(drive);
+    }
+}
+
+static void run_block(drive_t *drive)
+{
+    switch (block_slow(drive)) {
+    case BLOCK_SLOW:
+        if (!drive->config.block.from_rest) {
+            begin_vector(drive);
+        } else if (drive->state == DRIVE_STOPPING) {
+            switch_off(drive);
+        } else {
+            begin_again(drive);
+        }
+        break;
+    case BLOCK_LOST:
+        if (may_look(drive)) {
+            try_again(drive, DRIVE_FAULT_POSITION_LOST);
+        } else {
+            drive_trip(drive, DRIVE_FAULT_POSITION_LOST);
+        }
+        break;
+    case BLOCK_STALLED:
+        try_again(drive, DRIVE_FAULT_STALL);
+        break;
+    default:
+        break;
+    }
+}
+#endif
+
 static void run(drive_t *drive)
 {
+#if PM_HAS(six_step)
+    if (drive->stage == STAGE_SIX_STEP) {
+        run_block(drive);
+        return;
+    }
+    if (drive->stage == STAGE_OPEN_LOOP && block_from_rest(drive)) {
+        return;
+    }
+#endif
     const position_config_t *c = &drive->config.position;
     position_slow(&drive->position, c, drive->i_ab, drive->status.i);
     if (drive->stage == STAGE_OPEN_LOOP) {
@@ -263,6 +354,12 @@ static void run(drive_t *drive)
 #if PM_HAS(carrier_rest)
     if (drive->config.rest.after_ms != 0U) {
         rest_slow(drive);
+    }
+#endif
+#if PM_HAS(six_step)
+    if (block_may_begin(drive)) {
+        block_begin(drive);
+        return;
     }
 #endif
     /* without injection nothing shows the position at low speed */
@@ -294,6 +391,7 @@ static void move(drive_t *drive)
     switch (drive->state) {
     case DRIVE_OFF:
         if (enable) {
+            PM_IN_IMAGE(six_step, drive->block_tries = 0;)
             begin_sequence(drive);
         }
         break;
@@ -349,8 +447,14 @@ static void report(drive_t *drive)
     drive_status_t *s = &drive->status;
     s->state = drive->fault == DRIVE_FAULT_NONE ? drive->state : DRIVE_FAULT;
     s->fault = drive->fault;
-    if (drive->stage < STAGE_OPEN_LOOP) {
+    if (drive->stage < STAGE_SIX_STEP) {
         report_nothing(drive);
+    } else if (drive->stage == STAGE_SIX_STEP) {
+        s->omega = drive->pll.omega;
+        s->omega_ref = drive->speed.reference;
+        s->weight = PM_ONE;
+        s->quality = PM_ONE;
+        s->slips = 0;
     } else {
         s->omega = drive->position.pll.omega;
         s->omega_ref = drive->stage == STAGE_OPEN_LOOP ? drive->omega_ramp : drive->speed.reference;

@@ -2,6 +2,7 @@
 #ifndef DRIVE_DRIVE_STATE_H
 #define DRIVE_DRIVE_STATE_H
 
+#include "firmware/drive/block.h"
 #include "firmware/drive/drive.h"
 #include "firmware/drive/follow.h"
 #include "firmware/drive/open_phase.h"
@@ -13,6 +14,7 @@ typedef enum {
     STAGE_OFF,
     STAGE_SHORT,     /* after a fault: all low switches on (fault_short.h) */
     STAGE_PROCEDURE, /* a procedure has the legs, each by itself */
+    STAGE_SIX_STEP,  /* block commutation by the zero crossings (block.h) */
     STAGE_OPEN_LOOP, /* current vector at an imposed angle */
     STAGE_VECTOR,    /* field-oriented control at the estimated angle */
 } drive_stage_t;
@@ -53,9 +55,10 @@ struct drive {
     int32_t turn_open;     /* and the turn of a period at that speed */
 
     union {                    /* the stage says which: */
-        pm_pll_t pll;          /* always, the first of both: angle and speed, zero below STAGE_OPEN_LOOP */
+        pm_pll_t pll;          /* always, the first of all: angle and speed, zero below STAGE_SIX_STEP */
         position_t position;   /* from STAGE_OPEN_LOOP on */
         procedure_t procedure; /* in STAGE_PROCEDURE */
+        PM_IN_IMAGE(six_step, block_t block;) /* in STAGE_SIX_STEP */
     };
 
     drive_config_t config; /* begins with what a period needs, too */
@@ -83,6 +86,9 @@ struct drive {
     uint16_t wait_ms;  /* for that, where the observer should */
     uint16_t rest_ms;  /* until the vector turns once more */
     follow_t follow;
+    PM_IN_IMAGE(six_step, uint16_t block_ms; /* in STAGE_SIX_STEP */
+                uint8_t block_tries;         /* to find synchronism again */
+                thresholds_t thresholds;)    /* learnt, from start to start */
     int32_t temperature_dC;
     pm_q_t heat;        /* of the windings: the current's square, through the low-pass of t_winding */
     pm_q_t bridge_heat; /* the same of the bridge, t_bridge */

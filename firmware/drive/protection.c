@@ -82,7 +82,7 @@ static bool is_blocked(const drive_t *drive)
 void protection_slow(drive_t *drive)
 {
     const protection_config_t *c = &drive->config.protection;
-    const bool turning = drive->stage == STAGE_VECTOR;
+    const bool turning = drive->stage == STAGE_VECTOR || drive->stage == STAGE_SIX_STEP;
     if (drive->temperature_dC >= c->temp_trip_dC) {
         drive_trip(drive, DRIVE_FAULT_OVER_TEMPERATURE);
     }
@@ -101,7 +101,8 @@ void protection_slow(drive_t *drive)
     /* Also in open loop, where the rotor can lose synchronism, except during the ramp up to the speed from
      * which the observer's angle is used; not during identification. */
     const bool ramp = drive->forced && open_loop_ramps(drive);
-    const bool judged = drive->state >= DRIVE_RUNNING && drive->command.mode < DRIVE_MODE_CURRENT && !ramp;
+    const bool judged = drive->state >= DRIVE_RUNNING && drive->command.mode < DRIVE_MODE_CURRENT && !ramp &&
+                        drive->stage != STAGE_SIX_STEP; /* which knows at once (block.h) */
     if (lasts(&drive->lost_ms, judged && drive->position.quality == 0, c->lost_ms)) {
         drive_trip(drive, DRIVE_FAULT_POSITION_LOST);
     }

@@ -65,21 +65,19 @@ static pm_q_t measured_speed(drive_t *drive)
     return speed_step(&drive->position.speed, &drive->config.position.speed, &in);
 }
 
-void reference_vector(drive_t *drive)
+void reference_range(drive_t *drive, pm_q_t most, pm_q_t *i_min, pm_q_t *i_max)
+{
+    protection_current_limits(drive, i_min, i_max);
+    *i_min = pm_max(*i_min, -most);
+    *i_max = pm_min(*i_max, most);
+}
+
+pm_q_t reference_torque(drive_t *drive, pm_q_t omega, pm_q_t i_min, pm_q_t i_max)
 {
     const drive_config_t *c = &drive->config;
     const bool stopping = drive->state == DRIVE_STOPPING;
-    pm_q_t i_min;
-    pm_q_t i_max;
-    protection_current_limits(drive, &i_min, &i_max);
-    const pm_q_t share = pm_mul(drive->i_ref.d, drive->i_ref.d);
-    const pm_q_t room = pm_sqrt(pm_mul(c->i_max, c->i_max) - share);
-    i_min = pm_max(i_min, -room);
-    i_max = pm_min(i_max, room);
-
     bool limited = false;
     pm_q_t i_q;
-    const pm_q_t omega = measured_speed(drive);
     if (drive->command.mode == DRIVE_MODE_TORQUE && !stopping) {
         const pm_q_t wanted = current_for(drive, drive->torque_target);
         i_q = pm_clamp(wanted, i_min, i_max);
@@ -92,6 +90,17 @@ void reference_vector(drive_t *drive)
         i_q = speed_control_step(&drive->speed, &c->speed, target, omega, i_min, i_max, &limited);
     }
     drive->status.limits |= limited ? DRIVE_LIMIT_CURRENT : 0U;
+    return i_q;
+}
+
+void reference_vector(drive_t *drive)
+{
+    const drive_config_t *c = &drive->config;
+    const pm_q_t share = pm_mul(drive->i_ref.d, drive->i_ref.d);
+    pm_q_t i_min;
+    pm_q_t i_max;
+    reference_range(drive, pm_sqrt(pm_mul(c->i_max, c->i_max) - share), &i_min, &i_max);
+    const pm_q_t i_q = reference_torque(drive, measured_speed(drive), i_min, i_max);
     /* at once it would disturb an observer in proportion to the errors of R and L */
     drive->i_open -= drive->i_open / 16;
     drive->i_ref = (pm_dq_t){.d = flux_current(drive, i_q) + drive->i_open, .q = i_q};

@@ -61,16 +61,6 @@ void sim_run_period(hal_t *hal)
     }
 }
 
-static void fill_samples(const hal_t *hal, pm_measure_t *more)
-{
-    more->sampled = hal->sampled;
-    for (uint32_t n = 0; n < PM_SAMPLES; n++) {
-        for (uint32_t leg = 0; leg < PM_LEGS; leg++) {
-            more->i_sample[n][leg] = hal->sample[n].i_leg[leg];
-        }
-    }
-}
-
 /* Star point against the mean of the terminals. The plant's differential channel sees the opposite; without
  * it the difference of the channels takes its place, half of the code's range on either side. */
 static uint16_t neutral_code(const plant_adc_t *adc, const plant_sensor_t *sensor)
@@ -81,6 +71,21 @@ static uint16_t neutral_code(const plant_adc_t *adc, const plant_sensor_t *senso
     }
     const int32_t sum = adc->v_leg[0] + adc->v_leg[1] + adc->v_leg[2];
     return (uint16_t)(MID_SCALE + (3 * adc->v_neutral[0] - sum) / (2 * PM_LEGS));
+}
+
+static void fill_samples(const hal_t *hal, uint32_t channels, pm_measure_t *more)
+{
+    more->sampled = hal->sampled;
+    for (uint32_t n = 0; n < PM_SAMPLES; n++) {
+        const plant_adc_t *adc = &hal->sample[n];
+        for (uint32_t leg = 0; leg < PM_LEGS; leg++) {
+            more->i_sample[n][leg] = adc->i_leg[leg];
+            more->v_sample[n][leg] = (channels & NEEDS_TERMINALS) != 0U ? adc->v_leg[leg] : 0U;
+        }
+        more->v_dc_sample[n] = adc->v_dc;
+        more->v_neutral_sample[n] =
+            (channels & NEEDS_NEUTRAL) != 0U ? neutral_code(adc, plant_sensor(hal->plant)) : 0U;
+    }
 }
 
 static void fill_captures(const hal_t *hal, pm_measure_t *more)
@@ -110,7 +115,7 @@ static void fill_more(const hal_t *hal, pm_measure_t *more)
         more->v_neutral = neutral_code(&hal->adc, plant_sensor(hal->plant));
     }
     if ((channels & NEEDS_SECOND_SAMPLE) != 0U) {
-        fill_samples(hal, more);
+        fill_samples(hal, channels, more);
     }
     if ((channels & NEEDS_CAPTURES) != 0U) {
         fill_captures(hal, more);

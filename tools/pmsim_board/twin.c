@@ -78,6 +78,7 @@ static int mode(const void *before)
                                                  : FIGURE_PULSES;
     case STAGE_OPEN_LOOP:
         return drive->state == DRIVE_FINDING ? FIGURE_ALIGN : FIGURE_OPEN_LOOP;
+    case STAGE_SIX_STEP:
     case STAGE_VECTOR:
         break;
     }

@@ -58,7 +58,7 @@ TEST(BusParameters, AtAndBeyondTheirLimits)
             drive_params_t wanted = params;
             drive_param_set(&wanted, id, value);
             drive_config_t config = {};
-            const bool good = drive_configure(&config, &wanted, PM_CHANNELS).ok;
+            const bool good = drive_configure(&config, &wanted, hal_channels(&x.loop.hal)).ok;
             EXPECT_EQ(x.set(id, value), good ? 0U : INCOMPATIBLE) << info.name << " " << value;
             EXPECT_EQ(x.parameter(id), good ? value : drive_param_get(&params, id)) << info.name;
             taken += good ? 1 : 0;

@@ -93,7 +93,9 @@ uint32_t drive_says(const od_entry_t &entry, int64_t value)
     drive_params_t wanted = defaults();
     drive_config_t config = {};
     drive_param_set(&wanted, drive_param_id_t(entry.slot), int32_t(value));
-    return drive_configure(&config, &wanted, PM_CHANNELS).ok ? uint32_t(DONE) : uint32_t(INCOMPATIBLE);
+    const Bench board;
+    return drive_configure(&config, &wanted, hal_channels(&board.loop.hal)).ok ? uint32_t(DONE)
+                                                                               : uint32_t(INCOMPATIBLE);
 }
 
 bool is_pdo(const od_entry_t &entry)

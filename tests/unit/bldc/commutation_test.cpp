@@ -39,6 +39,43 @@ TEST(Commutation, IsDueThirtyDegreesBehindTheCrossing)
     EXPECT_EQ(c.crossed, 1);
 }
 
+// Constant torque from rest: 30 degrees in t_30, the crossings at t_30 root(2 n).
+TEST(Commutation, ARotorFromRestIsFollowedByItsCrossings)
+{
+    const double t_30 = 100000;
+    for (const double slower : {0.75, 1.0, 1.25}) { // than expected: 9/16 to 25/16 of the inertia
+        commutation_t c;
+        const commutation_config_t config = make();
+        commutation_start(&c, 5, 1000, static_cast<uint32_t>(t_30), 6);
+        EXPECT_NEAR(commutation_due(&c, &config), 1000 + t_30, kRounding);
+        for (int n = 1; n <= 6; ++n) {
+            ASSERT_EQ(c.young, 7 - n);
+            const double at = 1000 + slower * t_30 * std::sqrt(2.0 * n);
+            commutation_ahead(&c, static_cast<uint32_t>(at) - 500);
+            c.sector = static_cast<uint8_t>(n - 1);
+            EXPECT_GT(commutation_due(&c, &config), at) << slower << n; // it is waited for
+            commutation_crossed(&c, static_cast<uint32_t>(at));
+            const double turned = std::pow((commutation_due(&c, &config) - 1000) / slower / t_30, 2) * 30;
+            EXPECT_NEAR(turned, 60 * n + 30, 20) << slower << n; // where the legs change
+        }
+        EXPECT_EQ(c.young, 0);
+        EXPECT_EQ(commutation_state(&c, &config), COMMUTATION_LOCKED);
+    }
+}
+
+TEST(Commutation, AStartWithoutCrossingsIsLost)
+{
+    commutation_t c;
+    const commutation_config_t config = make();
+    commutation_start(&c, 0, 0, 100000, 6);
+    for (int n = 0; n < 4; ++n) {
+        EXPECT_EQ(commutation_state(&c, &config), COMMUTATION_LOCKED);
+        commutation_missed(&c);
+    }
+    EXPECT_EQ(commutation_state(&c, &config), COMMUTATION_LOST);
+    EXPECT_EQ(c.young, 6);
+}
+
 TEST(Commutation, AdvanceAndDelayAreTakenOff)
 {
     const commutation_t c = locked();

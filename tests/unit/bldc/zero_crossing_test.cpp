@@ -24,7 +24,7 @@ double degrees(double counts)
     return 60.0 * counts / kT60;
 }
 
-constexpr zero_expected_t kExpected = {0, kT60, 0};
+constexpr zero_expected_t kExpected = {0, kT60, 0, 0};
 
 struct Sample {
     zero_sample_t measured;
@@ -255,12 +255,7 @@ TEST(ZeroCrossing, OffTimeSamplesOfWhichARailCutsHalf)
                 b.open();
                 bool found = false;
                 for (double at = first; at < 30000 && !found; at += kSpacing) {
-                    Sample s = b.sample(at);
-                    // upper diode: the terminal does not go above
-                    const uint8_t open = sector_legs(sector, false).open;
-                    s.measured.v[open] =
-                        std::min(s.measured.v[open], s.measured.v_dc + fixed(0.01 / kBase_V, 28));
-                    found = b.step(s);
+                    found = b.step(b.sample(at)); // between zero and the upper diode's voltage above v_dc
                 }
                 ASSERT_TRUE(found);
                 EXPECT_LT(std::abs(degrees(static_cast<int32_t>(b.self.at))), 0.5) << legs << sector << first;
@@ -276,6 +271,31 @@ TEST(ZeroCrossing, ThresholdMovesIt)
     e.threshold = fixed(0.5 / kBase_V, 28);
     const double moved = std::asin(0.5 / kAmplitude) / kDegree / 60 * kT60;
     EXPECT_NEAR(b.find(-29000, e), moved, 2 * kShape_counts);
+}
+
+// A rotor at rest: what is left is noise, which crosses in each second sample.
+TEST(ZeroCrossing, NoiseIsNoCrossingWhereAnEmfIsAskedFor)
+{
+    for (const bool asked : {true, false}) {
+        Bench b;
+        zero_expected_t e = kExpected;
+        e.seen = asked ? b.config.swing / 8 : 0;
+        b.open();
+        bool found = false;
+        for (int k = 1; k < 20 && !found; ++k) {
+            found = b.step(b.terminal(-30000 + 2000 * k, kV_dc / 2 + (k % 2 == 0 ? 0.05 : -0.05)), e);
+        }
+        EXPECT_EQ(found, !asked);
+        EXPECT_EQ(b.self.ahead, !asked);
+    }
+}
+
+TEST(ZeroCrossing, AnEmfIsSeenWhereOneIsAskedFor)
+{
+    Bench b;
+    zero_expected_t e = kExpected;
+    e.seen = b.config.swing / 8;
+    EXPECT_NEAR(b.find(-29000, e), 0, kShape_counts);
 }
 
 TEST(ZeroCrossing, InstantsWrap)

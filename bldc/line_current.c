@@ -1,0 +1,25 @@
+#include "bldc/line_current.h"
+
+#include "firmware/math/root.h"
+
+void line_current_reset(line_current_t *self, const line_current_config_t *config, pm_q_t i)
+{
+    *self = (line_current_t){.pi = {.integral = pm_widen(pm_mul(config->R_2, i))}, .i_ref = i};
+}
+
+void line_current_prepare(line_current_t *self, pm_q_t i_ref, pm_q_t emf, pm_q_t v_dc)
+{
+    self->i_ref = i_ref;
+    self->emf = emf;
+    self->per_v = pm_div(PM_ONE, v_dc);
+}
+
+void line_current_step(line_current_t *self, const line_current_config_t *config, pm_q_t i, pm_q_t v_dc)
+{
+    const pm_q_t e = self->i_ref - i;
+    const pm_wide_t v = pm_pi_output(&self->pi, &config->pi, e, self->emf);
+    const pm_wide_t given = pm_clamp(v, 0, pm_widen(v_dc));
+    self->limited = self->limited || given != v;
+    pm_pi_update(&self->pi, &config->pi, e, given - v);
+    self->u = pm_min(pm_mul_sat(pm_narrow(given), self->per_v), PM_ONE);
+}

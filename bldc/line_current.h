@@ -1,0 +1,56 @@
+/* Control of the current that flows in by one leg and out by the other, in block commutation (METHODS.md 1.4.2, row 9).
+ *
+ *   e = i_ref - i                     i: of the leg that stays across the last commutation, whose current does not dip
+ *   v = kp e + integral + emf         voltage between the two legs, 0 ... v_dc
+ *   u = v / v_dc                      patterns.h
+ *   kp = 2 w_c L,  ki = 2 w_c R T     two phases in series; w_c: bandwidth
+ *   emf = (3 sqrt(3) / pi) psi_m w    mean of 60 degrees; a trapezoid of that fundamental has half a per cent less
+ * v does not fall below zero: with complementary pulses a smaller v than the EMF brakes, with diodes the current ceases.
+ *
+ * The fundamental of the blocks is what field orientation calls i_q:
+ *   i = (pi / (2 sqrt(3))) i_q
+ * so limits, torque and speed control are those of the vector. Called once a period with the current at t_k; acts in
+ * [t_k+1, t_k+2). 30 instructions. Per-unit: Q28, gains as pi.h.
+ * Tests: tests/unit/bldc/line_current_test.cpp, tests/scenario/six_step.yaml. */
+#ifndef BLDC_LINE_CURRENT_H
+#define BLDC_LINE_CURRENT_H
+
+#include "firmware/math/pi.h"
+#include "firmware/params/types.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define LINE_OF_Q      PM_Q(0.90689968211710892) /* i / i_q */
+#define Q_OF_LINE      PM_Q(1.1026577908435840)
+#define LINE_OF_PHASES PM_Q(1.6539866862653761) /* emf / (psi_m w) */
+
+typedef struct {
+    pm_pi_config_t pi;
+    pm_q_t R_2; /* of both phases */
+} line_current_config_t;
+
+typedef struct {
+    pm_pi_t pi;
+    pm_q_t i_ref, emf; /* of 1 kHz */
+    pm_q_t per_v;      /* 1 / v_dc */
+    pm_q_t u;          /* 0 ... 1 */
+    bool limited;      /* v has been at an end since it was last cleared */
+} line_current_t;
+
+/* i flows already, and is wanted. */
+void line_current_reset(line_current_t *self, const line_current_config_t *config, pm_q_t i);
+
+/* 1 kHz; v_dc > 1/8. */
+void line_current_prepare(line_current_t *self, pm_q_t i_ref, pm_q_t emf, pm_q_t v_dc);
+
+void line_current_step(line_current_t *self, const line_current_config_t *config, pm_q_t i, pm_q_t v_dc);
+
+void make_line_current(maker_t *m, line_current_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,68 @@
+#include "bldc/six_step.h"
+
+#include "firmware/params/maker.h"
+
+#define RAIL_mV 350
+
+static uint16_t counts(maker_t *m, drive_param_id_t id)
+{
+    const pm_num_t per_s = pm_num_mul(pm_num(2 * m->params->timer_counts), si(m, DRIVE_PARAM_f_pwm));
+    return (uint16_t)pm_min(fixed(m, pm_num_mul(si(m, id), per_s), 0, id), UINT16_MAX);
+}
+
+static void make_pattern(maker_t *m, pattern_config_t *c)
+{
+    const drive_params_t *p = m->params;
+    c->id = (pattern_id_t)p->pattern;
+    c->complementary = p->freewheeling != 0;
+    c->half_period = (uint16_t)p->timer_counts;
+    c->lead = counts(m, DRIVE_PARAM_t_lead);
+    const int32_t least = c->lead + counts(m, DRIVE_PARAM_t_blank) + counts(m, DRIVE_PARAM_dead_time);
+    if (least >= p->timer_counts) {
+        refuse(m, DRIVE_PARAM_t_blank, "with t_lead and dead_time beyond half a period");
+    }
+    c->least = (uint16_t)pm_min(least, p->timer_counts);
+    require(m, c->complementary ? 0U : NEEDS_ONE_SWITCH, DRIVE_PARAM_freewheeling);
+}
+
+/* What the open terminal rises by, per psi_m w and rad, times pi / 3. */
+static pm_num_t swing_of(const maker_t *m)
+{
+    const pm_num_t pi_third = pm_num_mul(PM_NUM_TWO_PI, pm_num_ratio(1, 6));
+    const pm_num_t sine = pm_num_ratio(3, 2), trapezoid = pm_num_mul(PM_NUM_TWO_PI, pm_num_ratio(1, 4));
+    const pm_num_t slope = pm_num_mul(m->params->emf_shape == 0 ? sine : trapezoid, pi_third);
+    return m->params->zero_reference == 0 ? slope : pm_num_mul(slope, pm_num_ratio(2, 3));
+}
+
+static void make_crossing(maker_t *m, uint32_t turn_base, zero_crossing_config_t *c)
+{
+    const pm_num_t swing = mul3(swing_of(m), si(m, DRIVE_PARAM_psi_m), m->base.omega);
+    c->reference = m->params->zero_reference == 0 ? ZERO_LINK : ZERO_TERMINALS;
+    c->rail = fixed(m, pm_num_div(pm_num_dec(RAIL_mV, -3), m->base.v), Q_BITS, DRIVE_PARAM_v_full_scale);
+    c->blank = counts(m, DRIVE_PARAM_t_blank);
+    c->swing = gain(m, pm_num_div(swing, m->base.v), Q_BITS, DRIVE_PARAM_psi_m);
+    c->t_60 = (turn_base + SECTORS / 2U) / SECTORS;
+}
+
+void make_six_step(maker_t *m, six_step_config_t *c)
+{
+    const drive_params_t *p = m->params;
+    const pm_num_t per_s = pm_num_mul(pm_num(2 * p->timer_counts), si(m, DRIVE_PARAM_f_pwm));
+    const pm_num_t turn = pm_num_div(pm_num_mul(PM_NUM_TWO_PI, per_s), m->base.omega);
+    c->commutation.turn_base = (uint32_t)fixed(m, turn, 0, DRIVE_PARAM_speed_trip);
+    const pm_num_t advance = pm_num_mul(si(m, DRIVE_PARAM_six_step_advance), pm_num_ratio(1, 60));
+    const pm_num_t half = pm_num_sub(pm_num_ratio(1, 2), advance);
+    c->commutation.half =
+        fixed(m, pm_num_mul(half, pm_num_ratio(1, 6)), FRAC_BITS, DRIVE_PARAM_six_step_advance);
+    c->commutation.delay = 0;
+    c->commutation.strikes = (uint8_t)p->missed_crossings;
+    make_pattern(m, &c->pattern);
+    make_crossing(m, c->commutation.turn_base, &c->crossing);
+    const pm_num_t vertical = pm_num_mul(pm_num_ratio(3, 2), si(m, DRIVE_PARAM_learn_vertical));
+    c->thresholds.k_V = fixed(m, vertical, FRAC_BITS, DRIVE_PARAM_learn_vertical);
+    c->thresholds.k_H =
+        fixed(m, si(m, DRIVE_PARAM_learn_horizontal), FRAC_BITS, DRIVE_PARAM_learn_horizontal);
+    c->thresholds.most =
+        fixed(m, pm_num_div(pm_num_mul(pm_num_ratio(1, 12), si(m, DRIVE_PARAM_v_dc_nominal)), m->base.v),
+              Q_BITS, DRIVE_PARAM_v_dc_nominal);
+}

@@ -1,0 +1,234 @@
+#include "firmware/drive/block.h"
+
+#include "firmware/drive/drive_parts.h"
+#include "firmware/math/root.h"
+#include "firmware/math/trig.h"
+
+#if PM_HAS(six_step)
+
+#define V_DC_LEAST PM_Q(0.15)
+#define SIXTH      PM_TURN(1.0 / 6)
+#define WRONG_MS   20U
+
+/* The sample of two periods ago, in per-unit. */
+static void take_sample(const drive_t *drive, const drive_in_t *in, zero_sample_t *sample)
+{
+    const pm_q_t per_code = drive->config.block.per_code;
+    for (uint32_t leg = 0; leg < PM_LEGS; leg++) {
+        sample->v[leg] = pm_mul(pm_shl(in->more.v_sample[0][leg], PM_Q_BITS - 16), per_code);
+    }
+    sample->v_dc = pm_shl(in->more.v_dc_sample[0], (uint32_t)drive->config.protection.v_bits);
+    sample->v_neutral = 0;
+}
+
+/* Of the rotor at t_k, by the last crossing. */
+static pm_angle_t angle(const block_t *self)
+{
+    const commutation_t *c = &self->six_step.commutation;
+    const pm_angle_t theta = ((uint32_t)c->crossed + 1U) * SIXTH + (self->now - c->crossing) * self->rate;
+    return self->six_step.reverse ? 0U - theta : theta;
+}
+
+void block_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
+{
+    const block_config_t *c = &drive->config.block;
+    block_t *self = &drive->block;
+    const pm_q_t i[PM_LEGS] = {drive->i_abc.a, drive->i_abc.b, drive->i_abc.c};
+    const int32_t counts = c->six_step.pattern.half_period;
+    self->now += 2U * (uint32_t)counts;
+    self->i = six_step_current(&self->six_step, i);
+    line_current_step(&self->current, &c->current, self->i, drive->status.v_dc);
+
+    six_step_in_t seen = {.now = self->now, .sampled = pm_sampled(&in->more, 0), .u = self->current.u};
+    if (seen.sampled) {
+        take_sample(drive, in, &seen.sample);
+    }
+    six_step_out_t next;
+    six_step_step(&self->six_step, &c->six_step, &seen, &next);
+    for (uint32_t leg = 0; leg < PM_LEGS; leg++) {
+        drive_write_leg(out->compare[leg], pm_frac(next.legs.duty[leg], pm_shl(counts, 32 - PM_Q_BITS)));
+    }
+    out->legs = next.legs.legs;
+    out->trip = 0;
+    out->instants = (pm_instants_t){.sample_at = {next.sample_at},
+                                    .commutate_at = next.commutate_at,
+                                    .then = next.commutate_at != 0U ? next.then : 0U};
+    self->pll.theta = angle(self);
+    drive->status.theta = self->pll.theta;
+}
+
+/* What the sectors say, at 1 kHz. */
+static void look(block_t *self, const block_config_t *c)
+{
+    const commutation_t *seen = &self->six_step.commutation;
+    const pm_q_t omega = commutation_speed(seen, &c->six_step.commutation);
+    self->pll.omega = self->six_step.reverse ? -omega : omega;
+    self->rate = UINT32_MAX / seen->sum;
+}
+
+/* The current up to which a crossing is seen in time, where the freewheeling lasts longest: into a sector whose new leg is
+ * chopped. */
+static pm_q_t most(const drive_t *drive)
+{
+    const block_config_t *c = &drive->config.block;
+    const block_t *self = &drive->block;
+    const pattern_id_t pattern = c->six_step.pattern.id;
+    const freewheeling_in_t in = {.pattern = pattern,
+                                  .sector = pattern_chops_incoming(pattern, 1) ? 1U : 0U,
+                                  .u = self->current.u,
+                                  .v_dc = drive->status.v_dc,
+                                  .omega = pm_max(pm_abs(self->pll.omega), 1)};
+    const pm_q_t left = PM_Q(0.5235987755982988) - pm_mul(in.omega, c->blind);
+    const pm_q_t i = pm_mul_sat(freewheeling_current(&c->freewheeling, &in, pm_max(left, 0)), Q_OF_LINE);
+    return pm_max(i, drive->config.i_max / 8); /* with less it would not keep its speed */
+}
+
+static void prepare(drive_t *drive, pm_q_t i_q)
+{
+    block_t *self = &drive->block;
+    const pm_q_t psi = pm_mul(drive->config.machine.psi_m, LINE_OF_PHASES);
+    const pm_q_t emf = pm_mul(psi, pm_abs(self->pll.omega));
+    const pm_q_t i = pm_mul(i_q, LINE_OF_Q);
+    line_current_prepare(&self->current, self->six_step.reverse ? -i : i, emf,
+                         pm_max(drive->status.v_dc, V_DC_LEAST));
+}
+
+bool block_may_begin(const drive_t *drive)
+{
+    const block_config_t *c = &drive->config.block;
+    return c->on && drive->state == DRIVE_RUNNING && drive->command.mode < DRIVE_MODE_CURRENT &&
+           drive->position.weight == PM_ONE && drive->position.quality > PM_Q(0.5) &&
+           pm_abs(drive->pll.omega) >= c->omega_on;
+}
+
+/* Of what the vector path leaves behind. */
+static void enter(drive_t *drive, pm_q_t i_q)
+{
+    block_t *self = &drive->block;
+    const pm_q_t i = pm_mul(i_q, LINE_OF_Q);
+    line_current_reset(&self->current, &drive->config.block.current, self->six_step.reverse ? -i : i);
+    look(self, &drive->config.block);
+    prepare(drive, i_q);
+    drive->i_open = 0;
+    drive->field_weakening.i_d = 0;
+    drive->modulator.hidden = 0;
+    drive->modulator.limited = 0;
+    drive->block_ms = 0;
+    drive->stage = STAGE_SIX_STEP;
+}
+
+void block_begin(drive_t *drive)
+{
+    const pm_pll_t pll = drive->pll;
+    block_t *self = &drive->block;
+    *self = (block_t){.pll = pll, .six_step = {.thresholds = drive->thresholds}};
+    six_step_reset(&self->six_step, &drive->config.block.six_step, pll.theta, pll.omega, 0);
+    enter(drive, drive->status.i.q);
+}
+
+/* The direction in which the command wants it to turn, 0: not at all, or too slowly. */
+static int32_t wanted(const drive_t *drive)
+{
+    const pm_q_t least = drive->command.mode == DRIVE_MODE_TORQUE ? 1 : drive->config.block.omega_off;
+    const pm_q_t x = drive->command.mode == DRIVE_MODE_TORQUE ? drive->torque_target : drive->omega_target;
+    if (drive->state == DRIVE_STOPPING || pm_abs(x) < least) {
+        return 0;
+    }
+    return x < 0 ? -1 : 1;
+}
+
+bool block_from_rest(drive_t *drive)
+{
+    const block_config_t *c = &drive->config.block;
+    if (!c->on || !c->from_rest || drive->command.mode >= DRIVE_MODE_CURRENT) {
+        return false;
+    }
+    const int32_t direction = wanted(drive);
+    if (direction == 0) {
+        open_loop_hold(drive);
+        return true;
+    }
+    block_t *self = &drive->block;
+    const pm_angle_t theta = drive->theta_open;
+    *self = (block_t){.six_step = {.thresholds = drive->thresholds}};
+    six_step_start(&self->six_step, &c->six_step, theta, direction < 0, c->t_30, 0);
+    self->pll.theta = theta;
+    enter(drive, direction < 0 ? -c->i_start : c->i_start);
+    return true;
+}
+
+static void report(drive_t *drive, pm_q_t i_q)
+{
+    const block_t *self = &drive->block;
+    const pm_q_t i = pm_mul(self->i, Q_OF_LINE);
+    drive->i_ref = (pm_dq_t){.d = 0, .q = i_q};
+    drive->status.i = (pm_dq_t){.d = 0, .q = self->six_step.reverse ? -i : i};
+    const pm_q_t v = pm_mul(pm_mul(self->current.u, drive->status.v_dc), PM_Q(1 / 1.6539866862653761));
+    drive->v_next =
+        pm_park_inverse((pm_dq_t){.d = 0, .q = self->six_step.reverse ? -v : v}, pm_dir(self->pll.theta));
+    drive->status.limits |= self->current.limited ? DRIVE_LIMIT_VOLTAGE : 0U;
+}
+
+/* Whether a rotor that starts by its crossings is to end here. */
+static bool is_slow(const drive_t *drive)
+{
+    const block_config_t *c = &drive->config.block;
+    const block_t *self = &drive->block;
+    if (!c->from_rest) {
+        return pm_abs(self->pll.omega) < c->omega_off;
+    }
+    const bool other = wanted(drive) != (self->six_step.reverse ? -1 : 1);
+    return other && drive->command.mode != DRIVE_MODE_TORQUE && pm_abs(self->pll.omega) < c->omega_off;
+}
+
+/* Of crossings that the voltage between the legs belies. */
+static bool is_wrong(block_t *self, const block_config_t *c, pm_q_t v_dc)
+{
+    const pm_q_t e = pm_mul(self->current.u, v_dc) - pm_mul(c->current.R_2, self->i);
+    const pm_q_t emf = self->current.emf;
+    const bool wrong = c->six_step.pattern.complementary && pm_abs(e - emf) > pm_half(emf);
+    self->wrong_ms = wrong ? (uint16_t)(self->wrong_ms + 1U) : 0U;
+    return self->wrong_ms > WRONG_MS;
+}
+
+block_result_t block_slow(drive_t *drive)
+{
+    const block_config_t *c = &drive->config.block;
+    block_t *self = &drive->block;
+    const bool young = self->six_step.commutation.young != 0U;
+    drive->thresholds = self->six_step.thresholds;
+    if (self->six_step.lost) {
+        return young ? BLOCK_STALLED : BLOCK_LOST;
+    }
+    six_step_slow(&self->six_step, &c->six_step);
+    look(self, c);
+    if (young) {
+        const pm_q_t i_q = self->six_step.reverse ? -c->i_start : c->i_start;
+        speed_control_reset(&drive->speed, self->pll.omega, i_q);
+        prepare(drive, i_q);
+        report(drive, i_q);
+        return BLOCK_RUNS;
+    }
+    if (is_slow(drive)) {
+        return BLOCK_SLOW;
+    }
+    if (is_wrong(self, c, drive->status.v_dc)) {
+        return BLOCK_LOST;
+    }
+    if (drive->block_ms < BLOCK_SETTLED_MS) {
+        drive->block_ms++;
+    } else {
+        drive->block_tries = 0;
+    }
+    const pm_q_t i_max = drive->config.i_max;
+    pm_q_t i_min;
+    pm_q_t i_most;
+    reference_range(drive, c->limit ? pm_min(most(drive), i_max) : i_max, &i_min, &i_most);
+    const pm_q_t i_q = reference_torque(drive, self->pll.omega, i_min, i_most);
+    prepare(drive, i_q);
+    report(drive, i_q);
+    self->current.limited = false;
+    return BLOCK_RUNS;
+}
+
+#endif

@@ -1,0 +1,70 @@
+/* Block commutation in the drive: the branch of drive_step() beside the vector's, STAGE_SIX_STEP (METHODS.md 1.4.2, 10.2.3;
+ * rows 9, 108, 109).
+ *
+ * six_step_start says what leads to it:
+ *   0  Start, open loop and what is slower than six_step_speed are those of the vector path. From that speed on, with the flux
+ *      observer alone in charge, the rotor's angle and speed are given to bldc/six_step.h, and the current goes on at what
+ *      it was: i = (pi / (2 sqrt(3))) i_q
+ *   1  The align of the vector path leaves the rotor at rest. With i_open_loop as i_q it turns its first 30 degrees in
+ *        t_30 = root(2 (pi / 6) J / (1.5 p^2 psi_m i_q))
+ *      and shows its crossings from then on. After START_CROSSINGS that belong together the speed control has it. A rotor that
+ *      is wanted slower than 3/4 of six_step_speed, or the other way, begins anew with the align.
+ * From then on angle and speed come from the zero crossings:
+ *   theta = theta of the last crossing + (t - t_z) / turn
+ * The voltage must be that of the speed, on average: u v_dc - 2 R i within half of the EMF, else crossings are believed that are
+ * none, as of a rotor that was stopped. Where diodes carry the off time u v_dc is not the voltage, and this is not looked at.
+ *
+ * A turn whose crossings are not where they belong ends it (missed_crossings): all legs off in the same period. With
+ * flying_start the rotor is looked for, caught by the vector path and given back; without, or after resync_tries, the fault
+ * is POSITION_LOST. A start whose crossings do not come is tried again, as often, and then the fault is STALL.
+ *
+ * Current limit: i_max, derated as the vector's, and with freewheeling_limit what leaves the crossing to be seen:
+ *   theta_f(i) + w (t_blank + T) <= 30 degrees             (freewheeling.h)
+ *
+ * block_step(): one period, currents and DC link have been checked. block_slow(): 1 kHz.
+ * Tests: tests/scenario/six_step.yaml, six_step_patterns.yaml, bldc_demo.yaml. */
+#ifndef DRIVE_BLOCK_H
+#define DRIVE_BLOCK_H
+
+#include "bldc/freewheeling.h"
+#include "bldc/line_current.h"
+#include "bldc/six_step.h"
+#include "firmware/math/pll.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct {
+    bool on;          /* commutation = six_step */
+    uint8_t tries;    /* resync_tries */
+    bool limit;       /* freewheeling_limit */
+    bool from_rest;   /* six_step_start = 1 */
+    uint32_t t_30;    /* counts */
+    pm_q_t i_start;   /* as i_q */
+    pm_q_t omega_on;  /* six_step_speed ... */
+    pm_q_t omega_off; /* ... and 3/4 of it */
+    pm_q_t per_code;  /* per-unit volts of a terminal at full scale */
+    pm_q_t blind;     /* rad at base speed in t_blank and a period, Q28 */
+    six_step_config_t six_step;
+    line_current_config_t current;
+    freewheeling_config_t freewheeling;
+} block_config_t;
+
+typedef struct {
+    pm_pll_t pll; /* begins position_t, too */
+    six_step_t six_step;
+    line_current_t current;
+    uint32_t now;      /* counts at t_k */
+    uint32_t rate;     /* of the angle, per count */
+    pm_q_t i;          /* at t_k */
+    uint16_t wrong_ms; /* for which the voltage has spoken against the speed */
+} block_t;
+
+void make_block(maker_t *m, block_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,115 @@
+// Current of two legs in double precision: a line of 2 R, 2 L and an EMF, sampled once a period, with the delay of the drive.
+#include "bldc/line_current.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/bldc/rig.h"
+
+namespace
+{
+
+using bldc_rig::fixed;
+using bldc_rig::real;
+
+// BLDC-FAN, per-unit of 40 V and 10 A.
+constexpr double kBase_V = 40, kBase_A = 10, kT_s = 50e-6;
+constexpr double kR_ohm = 0.4, kL_H = 0.5e-3, kV_dc = 24;
+constexpr double kBandwidth = 2 * bldc_rig::kPi * 800;
+constexpr double kRest_A = 0.01;
+
+line_current_config_t config()
+{
+    const double kp = 2 * kBandwidth * kL_H * kBase_A / kBase_V;
+    const double ki = 2 * kBandwidth * kR_ohm * kT_s * kBase_A / kBase_V;
+    return {{fixed(kp, 26), fixed(ki, 26), fixed(ki / kp, 31)}, fixed(2 * kR_ohm * kBase_A / kBase_V, 28)};
+}
+
+struct Line {
+    line_current_config_t c = config();
+    line_current_t self = {};
+    double i_A = 0, u = 0, emf_V;
+
+    explicit Line(double emf, double flows_A = 0) : i_A(flows_A), emf_V(emf)
+    {
+        line_current_reset(&self, &c, fixed(flows_A / kBase_A, 28));
+        u = (emf_V + 2 * kR_ohm * flows_A) / kV_dc;
+    }
+    void want(double i)
+    {
+        line_current_prepare(&self, fixed(i / kBase_A, 28), fixed(emf_V / kBase_V, 28),
+                             fixed(kV_dc / kBase_V, 28));
+    }
+    void period()
+    {
+        line_current_step(&self, &c, fixed(i_A / kBase_A, 28), fixed(kV_dc / kBase_V, 28));
+        const double decay = std::exp(-kR_ohm / kL_H * kT_s);
+        i_A = i_A * decay + (u * kV_dc - emf_V) / (2 * kR_ohm) * (1 - decay);
+        u = real(self.u); // acts from the next period on
+    }
+};
+
+TEST(LineCurrent, ReachesItsReferenceWithTheBandwidth)
+{
+    Line x(8);
+    x.want(3);
+    int rise = 0;
+    for (int k = 0; k < 200; ++k) {
+        x.period();
+        rise = rise == 0 && x.i_A > 3 * 0.63 ? k : rise;
+        ASSERT_LT(x.i_A, 3 * 1.15);
+    }
+    EXPECT_NEAR(x.i_A, 3, kRest_A);
+    EXPECT_NEAR(rise * kT_s, 1 / kBandwidth, 2 * kT_s); // and the delay of a period
+    EXPECT_FALSE(x.self.limited);
+}
+
+TEST(LineCurrent, GoesOnAtTheCurrentThatFlows)
+{
+    Line x(8, 2);
+    x.want(2);
+    for (int k = 0; k < 50; ++k) {
+        x.period();
+        ASSERT_NEAR(x.i_A, 2, kRest_A) << k;
+    }
+}
+
+TEST(LineCurrent, BrakesDownToNoVoltageAndComesBack)
+{
+    Line x(4);
+    x.want(-9); // 4 V over 0.8 ohm is 5 A
+    for (int k = 0; k < 400; ++k) {
+        x.period();
+        ASSERT_GE(x.self.u, 0);
+    }
+    EXPECT_NEAR(x.i_A, -5, kRest_A);
+    EXPECT_TRUE(x.self.limited);
+    x.want(1);
+    for (int k = 0; k < 100; ++k) {
+        x.period();
+    }
+    EXPECT_NEAR(x.i_A, 1, 0.05); // no integral has wound up meanwhile
+}
+
+TEST(LineCurrent, GivesNoMoreThanTheLink)
+{
+    Line x(20);
+    x.want(8); // 4 V over 0.8 ohm is 5 A
+    for (int k = 0; k < 400; ++k) {
+        x.period();
+        ASSERT_LE(x.self.u, PM_ONE);
+    }
+    EXPECT_NEAR(x.i_A, 5, kRest_A);
+    EXPECT_TRUE(x.self.limited);
+}
+
+// The fundamental of blocks of 120 degrees, and the torque of both.
+TEST(LineCurrent, ALineOfItsShareHasTheFundamentalOfQ)
+{
+    EXPECT_NEAR(real(LINE_OF_Q), bldc_rig::kPi / (2 * std::sqrt(3.0)), 1e-8);
+    EXPECT_NEAR(real(LINE_OF_Q) * real(Q_OF_LINE), 1, 1e-8);
+    EXPECT_NEAR(real(LINE_OF_PHASES) * real(LINE_OF_Q), 1.5, 1e-7);
+}
+
+} // namespace
