@@ -12,6 +12,7 @@
 #define PM_WITHOUT_neutral 1
 #define PM_WITHOUT_third_integration 1
 #define PM_WITHOUT_third_sogi 1
+#define PM_WITHOUT_third_crossings 1
 #define PM_WITHOUT_pwm_excitation 1
 
 #endif
