@@ -29,7 +29,7 @@ static inline void zero_anti_rotating_step(zero_anti_rotating_t *self,
 {
     const pm_q_t x = zero_voltage(self, config, in);
     const pm_unit_t next = zero_cosine(self, config);
-    zero_sample_t sample;
+    zero_sequence_sample_t sample;
     if (self->measured != 0U) {
         sample = zero_measured(self, config, in, x);
     } else {

@@ -14,7 +14,7 @@ void zero_pulsating_step(zero_pulsating_t *self, const zero_pulsating_config_t *
 {
     const pm_q_t x = zero_voltage(self, config, in);
     const pm_unit_t next = zero_cosine(self, config);
-    zero_sample_t sample;
+    zero_sequence_sample_t sample;
     if (self->measured != 0U) {
         sample = zero_measured(self, config, in, x);
     } else {

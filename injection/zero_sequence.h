@@ -100,7 +100,7 @@ typedef struct {
 
 typedef struct {
     pm_q_t d, s;
-} zero_sample_t;
+} zero_sequence_sample_t;
 
 /* x_k. */
 static inline pm_q_t zero_voltage(zero_t *self, const zero_config_t *config, const injection_in_t *in)
@@ -112,8 +112,8 @@ static inline pm_q_t zero_voltage(zero_t *self, const zero_config_t *config, con
 }
 
 /* The measured form. */
-static inline zero_sample_t zero_measured(zero_t *self, const zero_config_t *config, const injection_in_t *in,
-                                          pm_q_t x)
+static inline zero_sequence_sample_t zero_measured(zero_t *self, const zero_config_t *config,
+                                                   const injection_in_t *in, pm_q_t x)
 {
     const pm_half_dir_t twice = pm_dir_sum(in->dir, in->dir);
     const pm_ab_t u = {pm_mulh_sub(pm_mulh(in->i.alpha, twice.cos), in->i.beta, twice.sin),
@@ -123,8 +123,8 @@ static inline zero_sample_t zero_measured(zero_t *self, const zero_config_t *con
     const int32_t g_re = pm_mulh_sub(pm_mulh(re, config->c_re), im, config->c_im);
     const int32_t g_im = pm_mulh_add(pm_mulh(re, config->c_im), im, config->c_re);
     self->u = u;
-    const zero_sample_t sample = {x + pm_shl(pm_sat(g_re, 20), PM_Q_BITS - 21),
-                                  pm_shl(pm_sat(g_im, 20), PM_Q_BITS - 20)};
+    const zero_sequence_sample_t sample = {x + pm_shl(pm_sat(g_re, 20), PM_Q_BITS - 21),
+                                           pm_shl(pm_sat(g_im, 20), PM_Q_BITS - 20)};
     return sample;
 }
 
@@ -151,7 +151,7 @@ static inline int32_t zero_amplitude(const zero_config_t *config, pm_unit_t r)
 
 /* Closes the period: d~, s~, eps and the fundamental current. */
 static inline void zero_close(zero_t *self, const zero_config_t *config, const injection_in_t *in,
-                              zero_sample_t sample, injection_out_t *out)
+                              zero_sequence_sample_t sample, injection_out_t *out)
 {
     const uint32_t at = self->at;
     zero_place_t *place = &self->place[at];

@@ -22,7 +22,8 @@ void third_integration_reset(third_integration_t *self, const third_integration_
     const int32_t sum = seed.d - pm_shl(pm_mulh(seed.q, self->back), 2);
     const pm_q_t per = pm_div(PM_ONE / 64, pm_abs(self->lift) / 2); /* of 1 / lift in Q22 */
     const int32_t psi = pm_shl(pm_sat(pm_mulh(sum, per), 20), 10);
-    self->psi = in->omega < 0 ? -psi : psi;
+    /* half a period ahead of the present: a period more than the seed */
+    self->psi = (in->omega < 0 ? -psi : psi) + pm_mulh(self->x, config->third.t_s);
 }
 
 void third_integration_step(third_integration_t *self, const third_integration_config_t *config,

@@ -273,7 +273,7 @@ enum {
     OD_PARAMETER_EKF_SPEED_NOISE,
     OD_PARAMETER_EKF_ANGLE_NOISE,
 #endif
-#if PM_HAS(third_sogi) || PM_HAS(third_integration)
+#if PM_HAS(third_sogi) || PM_HAS(third_integration) || PM_HAS(third_crossings)
     OD_PARAMETER_PSI_3,
     OD_PARAMETER_THIRD_DL_0,
     OD_PARAMETER_THIRD_NOTCH,

@@ -43,6 +43,7 @@
 #define PM_WITHOUT_mras_simple 1
 #define PM_WITHOUT_third_integration 1
 #define PM_WITHOUT_third_sogi 1
+#define PM_WITHOUT_third_crossings 1
 #define PM_WITHOUT_rotating_sine 1
 #define PM_WITHOUT_inform 1
 #define PM_WITHOUT_pwm_excitation 1

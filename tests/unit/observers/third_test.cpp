@@ -20,7 +20,8 @@ constexpr bench::Base kB = bench::kIpmBase;
 constexpr double kRc_s = 100e-6;
 // Second order in 3 omega T = 0.09: RC and half a period as one lag, the mean of two periods.
 constexpr double kExact_deg = 0.1;
-const std::vector<observer_id_t> kAll = {OBSERVER_third_integration, OBSERVER_third_sogi};
+const std::vector<observer_id_t> kAll = {OBSERVER_third_integration, OBSERVER_third_sogi,
+                                         OBSERVER_third_crossings};
 
 drive_params_t params(observer_id_t id)
 {
