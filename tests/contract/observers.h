@@ -101,9 +101,10 @@ inline std::vector<InjectionCase> injection_cases(const Machine &m = kIpmLinear,
         p.start_method = 1;
         drive_config_t config = {};
         const drive_result_t result = drive_configure(&config, &p, PM_CHANNELS);
+        injection_config_t none = {};
+        none.id = INJECTION_COUNT;
         all.push_back({result.ok ? name : name + (": " + std::string(drive_param_table[result.param].name)),
-                       traits,
-                       result.ok ? config.position.injection : injection_config_t{INJECTION_COUNT, 0, {}}});
+                       traits, result.ok ? config.position.injection : none});
     };
 #define PM_METHOD(name, help, traits, needs) add(INJECTION_##name, #name, traits);
 #include "injection/injections.def"
