@@ -13,5 +13,7 @@
 #include "observers/mras_simple.h"
 #include "observers/mras_voltage.h"
 #include "observers/sliding_mode.h"
+#include "observers/third_integration.h"
+#include "observers/third_sogi.h"
 
 #endif

@@ -79,6 +79,8 @@ static inline void observer_step(observer_t *self, const observer_config_t *conf
     }
 }
 
+uint32_t observer_traits(observer_id_t id); /* SOURCE_... */
+
 void make_observer(maker_t *m, observer_config_t *c);
 
 #ifdef __cplusplus

@@ -2,6 +2,16 @@
 #include "firmware/params/maker.h"
 #include "observers/observer.h"
 
+uint32_t observer_traits(observer_id_t id)
+{
+    static const uint8_t traits_of[OBSERVER_COUNT] = {
+#define PM_METHOD(name, help, traits, needs) (uint8_t)(traits),
+#include "observers/observers.def"
+#undef PM_METHOD
+    };
+    return traits_of[id];
+}
+
 void make_observer(maker_t *m, observer_config_t *c)
 {
     c->id = (observer_id_t)m->params->observer;

@@ -30,6 +30,9 @@ static int32_t per_span(maker_t *m)
 void make_position(maker_t *m, position_config_t *c, bool injection)
 {
     make_observer(m, &c->observer);
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    c->traits_high = (uint8_t)observer_traits(c->observer.id);
+#endif
     c->injects = injection;
     c->current_low = PM_UNIT_MAX;
     c->omega_low = speed(m, DRIVE_PARAM_speed_low);

@@ -1,5 +1,5 @@
 /* The star point against the mean of the terminals, by a differential channel or as the difference of four (METHODS.md
- * 11.2.1, 6.1): from code to signal.
+ * 11.2.1, row 122; 6.1): from code to signal.
  *
  *   v_zero = v_S - v_N = (zero - code) full scale / v_base
  * S is the star of three equal resistors, N the motor's neutral. With a balanced winding this is the zero-sequence voltage

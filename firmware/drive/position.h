@@ -35,6 +35,9 @@ typedef struct {
     mismatch_config_t mismatch;
     speed_config_t speed;
     uint8_t traits; /* of the low-speed source */
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    uint8_t traits_high; /* of the observer; without these channels none is ambiguous */
+#endif
     pm_q_t omega_low, omega_high;
     int32_t per_span;      /* 1 / (omega_high - omega_low), Q20 */
     pm_unit_t current_low; /* share of the bandwidth of current control while injection leads */

@@ -119,10 +119,15 @@ PM_RARE void position_turn(position_t *self, const position_config_t *config, pm
 pm_angle_t position_resolve_slip(position_t *self, const position_config_t *config,
                                  const pm_machine_t *machine, pm_dq_t v, pm_ab_t i)
 {
-    if (!self->inject) {
+    uint32_t traits = self->inject ? config->traits : 0U;
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    const bool third = self->weight == PM_ONE && (config->traits_high & (uint32_t)SOURCE_THIRD_TURN) != 0U;
+    traits = third ? (uint32_t)SOURCE_THIRD_TURN : traits;
+#endif
+    if (traits == 0U) {
         return 0;
     }
-    const slip_in_t in = {.traits = config->traits,
+    const slip_in_t in = {.traits = traits,
                           .omega_least = config->omega_low,
                           .omega = self->pll.omega,
                           .v = v,
@@ -131,6 +136,11 @@ pm_angle_t position_resolve_slip(position_t *self, const position_config_t *conf
     if (turn != 0U) {
         position_turn(self, config, turn, i);
     }
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    if (turn != 0U && third) { /* which third it is has been known from the start: something is wrong */
+        self->slip.count = SLIP_MOST + 1U;
+    }
+#endif
     return turn;
 }
 

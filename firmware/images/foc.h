@@ -10,6 +10,8 @@
 
 #define PM_WITHOUT_finite_set 1
 #define PM_WITHOUT_neutral 1
+#define PM_WITHOUT_third_integration 1
+#define PM_WITHOUT_third_sogi 1
 #define PM_WITHOUT_pwm_excitation 1
 #define PM_WITHOUT_zero_anti_rotating 1
 #define PM_WITHOUT_zero_rotating 1

@@ -36,6 +36,8 @@
 #define PM_WITHOUT_mras_current 1
 #define PM_WITHOUT_mras_voltage 1
 #define PM_WITHOUT_mras_simple 1
+#define PM_WITHOUT_third_integration 1
+#define PM_WITHOUT_third_sogi 1
 #define PM_WITHOUT_rotating_sine 1
 #define PM_WITHOUT_inform 1
 #define PM_WITHOUT_pwm_excitation 1

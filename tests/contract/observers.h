@@ -12,6 +12,16 @@
 namespace bench
 {
 
+// Of the star point: third harmonic and L_s2 - M_s2.
+constexpr double kPsi3_Wb = 7e-3, kDL0_H = 2e-3;
+
+// v_0 with currents that stand in the rotor's frame (METHODS.md 0.2, E3).
+inline double star_point_V(double theta_rad, double omega_rad_s, Complex i_dq_A)
+{
+    const Complex flux = kPsi3_Wb - 0.5 * kDL0_H * i_dq_A;
+    return (kJ * 3.0 * omega_rad_s * flux * std::polar(1.0, 3 * theta_rad)).real();
+}
+
 struct ObserverCase {
     std::string name;
     observer_config_t config;
@@ -42,7 +52,9 @@ inline drive_params_t parameters(const Machine &linear, const Base &b)
     set(DRIVE_PARAM_psi_m, linear.psi_m_Wb);
     set(DRIVE_PARAM_zero_dL_0, kNeutral.dL_0_H);
     set(DRIVE_PARAM_neutral_full_scale, kNeutral.full_scale_V);
-    set(DRIVE_PARAM_neutral_filter, kNeutral.filter_s);
+    set(DRIVE_PARAM_psi_3, kPsi3_Wb);
+    set(DRIVE_PARAM_third_dL_0, kDL0_H);
+    set(DRIVE_PARAM_neutral_filter, 0);
     return p;
 }
 
@@ -86,6 +98,7 @@ inline std::vector<InjectionCase> injection_cases(const Machine &m = kIpmLinear,
         drive_params_t p = parameters(m, b);
         p.injection = static_cast<int32_t>(id);
         p.start_method = 1;
+        p.neutral_filter = static_cast<int32_t>(std::lround(kNeutral.filter_s * 1e9));
         drive_config_t config = {};
         const drive_result_t result = drive_configure(&config, &p, PM_CHANNELS);
         all.push_back({result.ok ? name : name + (": " + std::string(drive_param_table[result.param].name)),

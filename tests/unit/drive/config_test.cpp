@@ -325,6 +325,7 @@ TEST(Config, LqBelowLdIsAccepted)
     for (int32_t observer = 0; observer < OBSERVER_COUNT; observer++) {
         drive_params_t p = changed({{DRIVE_PARAM_L_d, 80e-3}});
         p.observer = observer;
+        p.psi_3 = 7080000; // for those that need it
         drive_config_t one = {};
         const drive_result_t r = drive_configure(&one, &p, PM_CHANNELS);
         EXPECT_TRUE(r.ok) << observer << ' ' << drive_param_table[r.param].name << ' ' << r.reason;

@@ -1,7 +1,9 @@
 // neutral.h: from code to volts of the zero sequence, with the channel's offset taken out, on the plant's own channels.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <complex>
 #include <memory>
 
 #include "tests/support/application.h"
@@ -127,6 +129,69 @@ TEST(Neutral, IsTheThirdHarmonicOfTheEmfWithItsSign)
         EXPECT_GT(std::sqrt(square), 2.5) << "nothing to see";
         EXPECT_LT(worst_V, 3 * lsb_V) << differential;
     }
+}
+
+// Torque control without torque at an imposed speed, PWM with dead time, leg capacitance and L_s2 - M_s2: amplitude and angle of the
+// third harmonic in the signal, over whole turns, of what METHODS.md 11.2.1 says and the RC leaves.
+struct Sensed {
+    double amplitude_rel, angle_deg; // the angle of the position
+};
+
+Sensed sensed(bool differential, double filter_s, double speed_rel)
+{
+    Loop x(differential);
+    x.config.winding.dL_0_H = 2e-3;
+    x.config.sensor.filter_s = differential ? 0 : filter_s;
+    x.config.sensor.v_zero_filter_s = differential ? filter_s : 0;
+    x.plant.reset(plant_create(&x.config, 1.0, &x.error));
+    x.params.i_d_light = 0;
+    EXPECT_TRUE(sim_loop_init(&x.loop, x.plant.get(), &x.params).ok);
+    drive_command_t c = {};
+    c.enable = true;
+    c.mode = DRIVE_MODE_TORQUE;
+    drive_command(&x.loop.app.drive, &c);
+    const double omega = 314.16 * speed_rel;
+    int turns = 0, periods = 0;
+    std::complex<double> sum = 0;
+    double travelled = 0, last = 0;
+    for (int k = 0; k < 60000 && turns < 4; ++k) {
+        if (k > 3000) { // started at rest
+            plant_set_speed(x.plant.get(), omega / 3 * std::min(1.0, (k - 3000) / 5000.0));
+        }
+        plant_truth_t truth;
+        plant_truth(x.plant.get(), &truth);
+        sim_loop_step(&x.loop);
+        if (k > 10000) {
+            sum += x.seen_V() * std::polar(1.0, -3 * truth.theta_e_rad);
+            travelled += k == 10001 ? 0 : std::remainder(truth.theta_e_rad - last, 2 * M_PI);
+            ++periods;
+            turns = static_cast<int>(travelled / (2 * M_PI));
+        }
+        last = truth.theta_e_rad;
+    }
+    EXPECT_EQ(drive_status(&x.loop.app.drive)->state, DRIVE_RUNNING);
+    const std::complex<double> j = {0, 1},
+                               law = 3.0 * j * omega * kPsi_3_Wb / (1.0 + 3.0 * j * omega * filter_s);
+    const std::complex<double> ratio = 2.0 * sum / static_cast<double>(periods) / law;
+    return {std::abs(ratio), std::arg(ratio) / 3 * 180 / M_PI};
+}
+
+TEST(Neutral, BehindAnRcItIsTheThirdHarmonicAtAnySpeed)
+{
+    for (const bool differential : {true, false}) {
+        for (const double speed : {0.05, 0.2, 1.0}) {
+            const Sensed s = sensed(differential, 100e-6, speed);
+            EXPECT_NEAR(s.amplitude_rel, 1, 0.02) << differential << ' ' << speed;
+            EXPECT_NEAR(s.angle_deg, 0, 0.3) << differential << ' ' << speed;
+        }
+    }
+}
+
+// One sample at the zero vector: half of the wave is below the negative rail, where four unipolar channels see nothing.
+TEST(Neutral, TwinWithoutAnRcLosesHalfOfIt)
+{
+    const Sensed s = sensed(false, 0, 1.0);
+    EXPECT_NEAR(s.amplitude_rel, 0.58, 0.05);
 }
 
 } // namespace

@@ -1,0 +1,248 @@
+// third.h, third_integration.h, third_sogi.h: the angle that a star point's voltage stands for, by METHODS.md 0.2 E3 behind an RC.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <vector>
+
+#include "tests/contract/observers.h"
+
+namespace
+{
+
+using bench::Complex;
+using bench::fixed;
+using bench::kDegree;
+using bench::kJ;
+using bench::real;
+
+constexpr bench::Base kB = bench::kIpmBase;
+constexpr double kRc_s = 100e-6;
+// Second order in 3 omega T = 0.09: RC and half a period as one lag, the mean of two periods.
+constexpr double kExact_deg = 0.1;
+const std::vector<observer_id_t> kAll = {OBSERVER_third_integration, OBSERVER_third_sogi};
+
+drive_params_t params(observer_id_t id)
+{
+    drive_params_t p = bench::parameters(bench::kIpmLinear, kB);
+    p.observer = id;
+    p.neutral_full_scale = 15000;
+    p.neutral_filter = 100000;
+    p.speed_low = 3200;
+    p.speed_high = 4200;
+    return p;
+}
+
+observer_config_t config(const drive_params_t &p)
+{
+    drive_config_t c = {};
+    const drive_result_t result = drive_configure(&c, &p, PM_CHANNELS);
+    EXPECT_TRUE(result.ok) << drive_param_table[result.param].name << ": " << result.reason;
+    return c.position.observer;
+}
+
+// A rotor at constant speed with constant currents in its frame, seen from a position that lags by `error`.
+struct Star {
+    double omega_rad_s;
+    Complex i_A;
+    double error_rad = 0;
+    Complex beside_V = 0; // turns with the rotor: of unlike phases
+    double theta_rad = 0.3;
+
+    double v_V() const
+    {
+        const Complex flux = bench::kPsi3_Wb - 0.5 * bench::kDL0_H * i_A;
+        const Complex e = 3.0 * kJ * omega_rad_s * flux * std::polar(1.0, 3 * theta_rad);
+        return (e / (1.0 + 3.0 * kJ * omega_rad_s * kRc_s)).real() +
+               (beside_V * std::polar(1.0, theta_rad)).real();
+    }
+
+    obs_in_t seen(obs_more_t *more) const
+    {
+        obs_in_t in = {};
+        in.dir = bench::direction(theta_rad - error_rad);
+        in.omega = fixed(omega_rad_s / kB.omega_rad_s, 28);
+        in.i_dq = bench::dq(i_A / kB.i_A);
+        more->v_zero = fixed(v_V() / kB.v_V, 28);
+        in.more = more;
+        return in;
+    }
+};
+
+struct Source {
+    observer_config_t c;
+    observer_t state;
+    obs_more_t more = {};
+
+    Source(const drive_params_t &p, const Star &at) : c(config(p))
+    {
+        std::memset(&state, 0xa5, sizeof state);
+        const obs_in_t in = at.seen(&more);
+        observer_reset(&state, &c, &in);
+    }
+
+    // Mean and largest distance from it, degrees, over the second half.
+    struct Seen {
+        double mean = 0, most = 0, misfit = 0;
+    };
+
+    Seen run(Star &at, int periods)
+    {
+        std::vector<double> eps;
+        Seen s;
+        for (int k = 0; k < periods; ++k) {
+            at.theta_rad += at.omega_rad_s * kB.period_s;
+            const obs_in_t in = at.seen(&more);
+            obs_out_t out;
+            observer_step(&state, &c, &in, &out);
+            if (k % 10 == 9) {
+                observer_slow(&state, &c, &in, &out, PM_ONE);
+            }
+            if (k >= periods / 2) {
+                eps.push_back(real(out.eps) / kDegree);
+                s.misfit = std::max(s.misfit, std::fabs(real(out.misfit)));
+            }
+        }
+        for (const double e : eps) {
+            s.mean += e / static_cast<double>(eps.size());
+        }
+        for (const double e : eps) {
+            s.most = std::max(s.most, std::fabs(e - s.mean));
+        }
+        return s;
+    }
+};
+
+// With the RC and the shift by the load compensated, 5 to 100 % of rated speed, motoring and generating.
+TEST(Third, SeesThePosition)
+{
+    for (const observer_id_t id : kAll) {
+        for (const double omega : {15.7, -15.7, 157.0, 314.0, -314.0}) {
+            for (const Complex i : {Complex{0, 0}, Complex{0, 4}, Complex{-2, 3}, Complex{1, -4}}) {
+                for (const double error : {0.0, 2.0, -2.0}) {
+                    Star at{omega, i, error * kDegree};
+                    Source source(params(id), at);
+                    const auto seen = source.run(at, 10000);
+                    const double expected = std::sin(3 * error * kDegree) / 3 / kDegree;
+                    EXPECT_NEAR(seen.mean, expected, kExact_deg)
+                        << id << ' ' << omega << ' ' << i << ' ' << error;
+                    EXPECT_LT(seen.most, kExact_deg) << id << ' ' << omega << ' ' << i;
+                    EXPECT_LT(seen.misfit, 0.02);
+                }
+            }
+        }
+    }
+}
+
+// atan(3 omega RC) / 3 is what the position errs by where the RC is not known.
+TEST(Third, TheLagOfAnUnknownFilterIsItsLaw)
+{
+    for (const double omega : {100.0, 314.0}) {
+        drive_params_t p = params(OBSERVER_third_sogi);
+        p.neutral_filter = 0;
+        Star at{omega, 0};
+        Source source(p, at);
+        EXPECT_NEAR(source.run(at, 4000).mean, -std::atan(3 * omega * kRc_s) / 3 / kDegree, kExact_deg);
+    }
+}
+
+// The law of 11.6.3 where dL_0 is not told.
+TEST(Third, TheShiftByTheLoadIsItsLaw)
+{
+    for (const observer_id_t id : kAll) {
+        for (const Complex i : {Complex{0, 4}, Complex{-1.75, 4}, Complex{1, -3}}) {
+            drive_params_t p = params(id);
+            p.third_dL_0 = 0;
+            Star at{157, i};
+            Source source(p, at);
+            // seen with L = psi_3: the imaginary part of e^{-j shift} |L| / psi_3
+            const Complex l = 1.0 - 0.5 * bench::kDL0_H * i / bench::kPsi3_Wb;
+            const double shift = -std::arg(l);
+            EXPECT_NEAR(source.run(at, 4000).mean, std::max(-1.0, std::min(1.0, l.imag())) / 3 / kDegree, 0.1)
+                << id << i;
+            EXPECT_GT(std::fabs(shift / 3 / kDegree), 6.0);
+        }
+    }
+}
+
+TEST(Third, AThirdOfATurnIsNotSeen)
+{
+    for (const observer_id_t id : kAll) {
+        for (const double third : {120.0, -120.0}) {
+            Star at{157, {0, 2}, third * kDegree};
+            Source source(params(id), at);
+            EXPECT_NEAR(source.run(at, 2000).mean, 0, kExact_deg) << id;
+        }
+    }
+}
+
+// A sine of the frequency of rotation, 60 % of the third harmonic: gone with the notch, and the third harmonic not turned by it.
+TEST(Third, TheNotchTakesOutTheFrequencyOfRotation)
+{
+    for (const double omega : {31.4, -157.0}) {
+        const double beside_V = 0.6 * 3 * std::fabs(omega) * bench::kPsi3_Wb;
+        drive_params_t p = params(OBSERVER_third_sogi);
+        Star with{omega, 0, 0, beside_V}, without = with;
+        Source bare(p, without);
+        EXPECT_GT(bare.run(without, 20000).most, 8.0);
+        p.third_notch = 300;
+        Source notched(p, with);
+        const auto seen = notched.run(with, 40000);
+        EXPECT_NEAR(seen.mean, 0, kExact_deg);
+        EXPECT_LT(seen.most, 0.1);
+    }
+}
+
+TEST(Third, AMachineWithoutShowsNone)
+{
+    for (const observer_id_t id : kAll) {
+        Star at{157, 0};
+        Source source(params(id), at);
+        for (int k = 0; k < 4000; ++k) {
+            at.theta_rad += at.omega_rad_s * kB.period_s;
+            obs_in_t in = at.seen(&source.more);
+            source.more.v_zero = 0;
+            obs_out_t out;
+            observer_step(&source.state, &source.c, &in, &out);
+        }
+        EXPECT_GT(real(observer_last(&source.state, &source.c).misfit), 0.98);
+    }
+}
+
+TEST(Third, IsRefusedWithoutAThirdHarmonicAndBelowFourStepsOfIt)
+{
+    for (const observer_id_t id : kAll) {
+        drive_params_t p = params(id);
+        drive_config_t c = {};
+        p.psi_3 = 0;
+        EXPECT_EQ(drive_configure(&c, &p, PM_CHANNELS).param, DRIVE_PARAM_psi_3);
+        p = params(id);
+        // four steps of 30 V / 4096 over 3 psi_3 and three pole pairs: 0.46 rad/s; 18 times that with 450 V
+        p.neutral_full_scale = 450000;
+        p.speed_low = 3200;
+        const double least = 4 * 900.0 / 4096 / (3 * bench::kPsi3_Wb) / 3;
+        p.speed_high = static_cast<int32_t>(1000 * least * 0.98);
+        EXPECT_EQ(drive_configure(&c, &p, PM_CHANNELS).param, DRIVE_PARAM_speed_high) << id;
+        p.speed_high = static_cast<int32_t>(1000 * least * 1.02);
+        EXPECT_TRUE(drive_configure(&c, &p, PM_CHANNELS).ok) << id;
+    }
+}
+
+// R and L_q do not enter: the same configuration, bit for bit.
+TEST(Third, KnowsNeitherResistanceNorInductances)
+{
+    for (const observer_id_t id : kAll) {
+        const observer_config_t told = config(params(id));
+        for (const double wrong : {0.5, 1.5}) {
+            drive_params_t p = params(id);
+            p.R_s = static_cast<int32_t>(p.R_s * wrong);
+            p.L_q = p.L_q_rated = p.L_qh_rated = static_cast<int32_t>(p.L_q * (wrong < 1 ? 0.8 : wrong));
+            const observer_config_t other = config(p);
+            const size_t size =
+                id == OBSERVER_third_sogi ? sizeof told.third_sogi : sizeof told.third_integration;
+            EXPECT_EQ(std::memcmp(&told.third_sogi, &other.third_sogi, size), 0);
+        }
+    }
+}
+
+} // namespace
