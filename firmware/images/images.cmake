@@ -27,7 +27,7 @@ set(PM_IMAGE_neutral_CCM 10240)
 set(PM_IMAGE_neutral_INTERRUPT_MEAN 440)
 set(PM_IMAGE_neutral_INTERRUPT_WORST 500)
 set(PM_IMAGE_neutral_DRIVE_STEP_FLUX 280)
-set(PM_IMAGE_neutral_DRIVE_STEP_INJECTION 326)
+set(PM_IMAGE_neutral_DRIVE_STEP_INJECTION 322)
 
 # the reference set within 64 KiB of flash and 12 KiB of RAM
 set(PM_IMAGE_small_BOARD stm32g431)
