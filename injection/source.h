@@ -41,6 +41,10 @@ static inline excitation_t excitation_of(pm_ab_t v)
 {
     excitation_t e;
     e.v = v;
+#if PM_HAS(counted_carrier)
+    e.i.d = 0;
+    e.i.q = 0;
+#endif
 #if PM_CARRIES(NEEDS_HALVES)
     e.split.alpha = 0;
     e.split.beta = 0;

@@ -27,7 +27,7 @@ set(PM_IMAGE_neutral_CCM 10240)
 set(PM_IMAGE_neutral_INTERRUPT_MEAN 440)
 set(PM_IMAGE_neutral_INTERRUPT_WORST 500)
 set(PM_IMAGE_neutral_DRIVE_STEP_FLUX 280)
-set(PM_IMAGE_neutral_DRIVE_STEP_INJECTION 326)
+set(PM_IMAGE_neutral_DRIVE_STEP_INJECTION 322)
 
 # all carriers, the saliency map measured by the drive itself, one observer
 set(PM_IMAGE_salient_BOARD stm32g431)

@@ -64,7 +64,7 @@ class Source
     virtual void aim(double) // angle of the estimated frame where the next voltage acts
     {
     }
-    virtual bool injects() const
+    virtual bool behind_filter() const // reads the answer to its carrier at the star point, behind the RC
     {
         return false;
     }
@@ -146,7 +146,7 @@ class Injection : public Source
     {
         ahead_ = {fixed(std::cos(ahead_rad), 30), fixed(std::sin(ahead_rad), 30)};
     }
-    bool injects() const override
+    bool behind_filter() const override
     {
         return true;
     }
@@ -275,10 +275,8 @@ class Drive
         Seen in = {};
         in.between = bench::ab(i_between_ / kBase.i_A);
         in.v = bench::ab(v_mean_ / kBase.v_V);
-        // what a carrier makes behind the filter, or the third harmonic
-        const Complex i_dq_A = i * kBase.i_A * std::polar(1.0, -theta_);
-        const double v_zero_V = source_.injects() ? v_zero_ : bench::star_point_V(theta_, omega_, i_dq_A);
-        in.v_zero = fixed(v_zero_V / kBase.v_V, 28);
+        const double e_0 = bench::star_point_V(theta_, omega_, i * kBase.i_A * std::polar(1.0, -theta_));
+        in.v_zero = fixed((source_.behind_filter() ? v_zero_ : e_0) / kBase.v_V, 28);
         in.i = bench::ab(i);
         in.dir = bench::direction(theta_ - error_);
         in.omega = fixed(omega_ / kBase.omega_rad_s, 28);

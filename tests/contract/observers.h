@@ -50,11 +50,11 @@ inline drive_params_t parameters(const Machine &linear, const Base &b)
     set(DRIVE_PARAM_L_dqh_rated, 0);
     set(DRIVE_PARAM_cross_half, 0);
     set(DRIVE_PARAM_psi_m, linear.psi_m_Wb);
-    set(DRIVE_PARAM_psi_3, kPsi3_Wb);
-    set(DRIVE_PARAM_third_dL_0, kDL0_H);
     set(DRIVE_PARAM_zero_dL_0, kNeutral.dL_0_H);
     set(DRIVE_PARAM_neutral_full_scale, kNeutral.full_scale_V);
-    set(DRIVE_PARAM_neutral_filter, kNeutral.filter_s);
+    set(DRIVE_PARAM_psi_3, kPsi3_Wb);
+    set(DRIVE_PARAM_third_dL_0, kDL0_H);
+    set(DRIVE_PARAM_neutral_filter, 0);
     return p;
 }
 
@@ -64,7 +64,6 @@ inline ObserverCase observer_case(observer_id_t id, const char *name, const Mach
 {
     drive_params_t p = parameters(m, b);
     p.observer = static_cast<int32_t>(id);
-    p.neutral_filter = 0;
     drive_config_t config = {};
     if (!drive_configure(&config, &p, PM_CHANNELS).ok) {
         p.L_d = p.L_q;
@@ -99,6 +98,7 @@ inline std::vector<InjectionCase> injection_cases(const Machine &m = kIpmLinear,
         drive_params_t p = parameters(m, b);
         p.injection = static_cast<int32_t>(id);
         p.start_method = 1;
+        p.neutral_filter = static_cast<int32_t>(std::lround(kNeutral.filter_s * 1e9));
         drive_config_t config = {};
         const drive_result_t result = drive_configure(&config, &p, PM_CHANNELS);
         injection_config_t none = {};

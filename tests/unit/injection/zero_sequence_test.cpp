@@ -40,13 +40,20 @@ const Choice kAll[] = {{INJECTION_zero_anti_rotating, 500, ZERO_MEASURED},
                        {INJECTION_zero_pulsating, 500, ZERO_MEASURED},
                        {INJECTION_zero_pulsating, 5000, ZERO_MEASURED}};
 
-injection_config_t config(const Choice &choice)
+drive_params_t parameters(const Choice &choice)
 {
     drive_params_t p = bench::parameters(bench::kIpmLinear, rig::kBase);
     p.injection = choice.id;
     p.start_method = 1;
-    p.v_injection = 70000;
     p.f_injection = static_cast<int32_t>(std::lround(choice.f_Hz * 1e3));
+    p.neutral_filter = static_cast<int32_t>(std::lround(bench::kNeutral.filter_s * 1e9));
+    return p;
+}
+
+injection_config_t config(const Choice &choice)
+{
+    drive_params_t p = parameters(choice);
+    p.v_injection = 70000;
     p.zero_form = choice.form;
     p.zero_dL_0 = static_cast<int32_t>(std::lround(p.zero_dL_0 * choice.dL_0_told));
     p.zero_L_c0 = static_cast<int32_t>(std::lround(choice.L_c0_told_H * 1e9));
@@ -233,10 +240,7 @@ TEST(ZeroSequence, CarriersAreThoseOfTheirHeaders)
 
 drive_result_t refused(const Choice &choice, const std::function<void(drive_params_t &)> &change)
 {
-    drive_params_t p = bench::parameters(bench::kIpmLinear, rig::kBase);
-    p.injection = choice.id;
-    p.start_method = 1;
-    p.f_injection = static_cast<int32_t>(std::lround(choice.f_Hz * 1e3));
+    drive_params_t p = parameters(choice);
     change(p);
     drive_config_t c = {};
     return drive_configure(&c, &p, PM_CHANNELS);
