@@ -24,7 +24,7 @@
  * eps is exact for small e and 1/2 sin 2e beyond. misfit: the positive sequence against I_p(i_q), relative. The
  * bandwidths that sine.h allows must also suit the machine: with those of the
  * scenario, 7 Hz for the position and 2 Hz for the speed, a compressor of 2e-4 kg m2 loses its position under a
- * load of 0.3 s rise. Each period 120 instructions, 60 more to count the carrier in; rho' at 1 kHz.
+ * load of 0.3 s rise. Each period 120 instructions, 44 more to count the carrier in; rho' at 1 kHz.
  * State 400 bytes. Functions as injection.h says. Tests: tests/unit/injection/rotating_sine_test.cpp,
  * tests/scenario/rotating_sine.yaml. */
 #ifndef INJECTION_ROTATING_SINE_H
