@@ -29,7 +29,7 @@ class Project:
     def __enter__(self):
         self.folder = tempfile.TemporaryDirectory()
         self.root = Path(self.folder.name)
-        folders = ("observers", "injection", "bldc", "firmware/control", "firmware/drive/procedures")
+        folders = ("observers", "injection", "bldc", "firmware/control", "firmware/drive", "firmware/drive/procedures")
         headers = [path.relative_to(ROOT).as_posix() for folder in folders for path in sorted(ROOT.glob(f"{folder}/*.[hd]*"))]
         for path in (generate.SOURCE, generate.FAULTS, generate.LEDGER, LIST, methods.OPTIONS, *headers, *generate.parts(ROOT)):
             (self.root / path).parent.mkdir(parents=True, exist_ok=True)

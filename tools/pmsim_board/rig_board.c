@@ -74,8 +74,13 @@ static uint32_t make_page(const drive_params_t *params, uint32_t words[STORE_WOR
 /* Wound again with the machine: then its preset is another. */
 static bool is_wound(drive_param_id_t id)
 {
-    const char *unit = drive_param_text[id].unit;
-    return similar && (strcmp(unit, "A") == 0 || strcmp(unit, "ohm") == 0 || strcmp(unit, "F") == 0);
+    static const char *const units[] = {"A", "V", "ohm", "H", "F", "Wb"};
+    for (size_t n = 0; similar && n < sizeof units / sizeof units[0]; n++) {
+        if (strcmp(drive_param_text[id].unit, units[n]) == 0) {
+            return true;
+        }
+    }
+    return false;
 }
 
 /* A parameter that the image has not, and that is not as it would be without it */

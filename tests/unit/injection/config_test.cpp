@@ -24,6 +24,13 @@ drive_params_t with(int32_t injection)
     return p;
 }
 
+// Its answer is that of zero_dL_0, not of the currents: tests/unit/injection/zero_sequence_test.cpp.
+bool at_neutral(int32_t id)
+{
+    return id == INJECTION_zero_anti_rotating || id == INJECTION_zero_rotating ||
+           id == INJECTION_zero_pulsating;
+}
+
 drive_config_t configure(const drive_params_t &p)
 {
     drive_config_t c = {};
@@ -87,6 +94,9 @@ TEST(InjectionConfig, SquareWavesTurnByHalfAPeriod)
 TEST(InjectionConfig, SaliencyOfFivePerCentIsEnough)
 {
     for (int32_t id = 0; id < INJECTION_COUNT; ++id) {
+        if (at_neutral(id)) {
+            continue;
+        }
         for (const double share : {0.045, 0.055}) {
             drive_params_t p = with(id);
             p.start_method = 0;
@@ -103,6 +113,9 @@ TEST(InjectionConfig, SaliencyOfFivePerCentIsEnough)
 TEST(InjectionConfig, AnswerMustExceedTheNoise)
 {
     for (int32_t id = 0; id < INJECTION_COUNT; ++id) {
+        if (at_neutral(id)) {
+            continue;
+        }
         drive_params_t p = with(id);
         p.start_method = 0;
         p.i_noise = 1;
