@@ -45,12 +45,10 @@ typedef struct {
     uint16_t timeout; /* periods that the decay may take */
     pm_q_t duty;      /* of the driven leg, 0 ... 1 */
     pm_q_t i_zero;    /* currents below count as zero: noise, and what rings */
-    pm_q_t
-        y_min; /* least |y| of six pulses that counts as a saliency: two fifths of what the machine's data promise:
-                         less is gone under load */
-    pm_q_t i_noise;  /* of one current */
-    pm_q_t i_bridge; /* what the bridge may add to the currents that show the polarity */
-    bool reversed;   /* polarity.h: L_d_falls */
+    pm_q_t y_min;     /* least |y| of six pulses that counts as a saliency: a fourth of the machine's */
+    pm_q_t i_noise;   /* of one current */
+    pm_q_t i_bridge;  /* what the bridge may add to the currents that show the polarity */
+    bool reversed;    /* polarity.h: L_d_falls */
 } pulses_config_t;
 
 typedef struct {

@@ -28,7 +28,7 @@ PM_APART static void make_y_min(maker_t *m, pm_num_t i_peak, pulses_config_t *c)
     const pm_num_t L_q = si(m, DRIVE_PARAM_L_q);
     const pm_num_t share = pm_num_div(pm_num_sub(L_q, si(m, DRIVE_PARAM_L_d)), L_q);
     const pm_num_t i_pulse = pm_num_div(i_peak, m->base.i);
-    c->y_min = fixed(m, mul3(share, i_pulse, pm_num_ratio(6, 5)), Q_BITS, DRIVE_PARAM_i_pulse);
+    c->y_min = fixed(m, mul3(share, i_pulse, pm_num_ratio(3, 4)), Q_BITS, DRIVE_PARAM_i_pulse);
 }
 
 /* Currents that noise and bridge make by themselves. What rings with the legs' capacitance between two pulses is no current

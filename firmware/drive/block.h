@@ -1,5 +1,5 @@
 /* Block commutation in the drive: the branch of drive_step() beside the vector's, STAGE_SIX_STEP (METHODS.md 1.4.2, 10.2.3;
- * rows 9, 108, 109).
+ * rows 9, 108).
  *
  * six_step_start says what leads to it:
  *   0  Start, open loop and what is slower than six_step_speed are those of the vector path. From that speed on, with the flux

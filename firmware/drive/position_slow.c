@@ -157,7 +157,7 @@ static void set_quality(position_t *self, const position_config_t *config, const
     if (self->inject) {
         low = injection_last(&self->injection, &config->injection);
     }
-    const bool in_mean = (config->traits & (uint8_t)SOURCE_IN_MEAN) != 0U;
+    const bool in_mean = PM_CARRIES(NEEDS_NEUTRAL) != 0 && (config->traits & (uint8_t)SOURCE_IN_MEAN) != 0U;
     const pm_q_t low_eps = magnitude_after(&self->injection_eps, low.eps, in_mean ? K_MEAN_NOISE : K_NOISE);
     /* also while the observer is tied: an EMF that the position does not explain */
     pm_q_t eps = magnitude_after(&self->observer_eps, seen->eps + mismatch_eps(&self->mismatch, i), K_NOISE);

@@ -462,7 +462,7 @@ class Made(unittest.TestCase):
         text = lzma.decompress(data, format=lzma.FORMAT_ALONE).decode("ascii")
         whole = self.files[f"{generate.PACKAGE}/pmdrive.eds"]
         self.assertEqual(sheet(text), sheet(whole))
-        self.assertLess(len(data), 4500)  # of 64 KiB of flash; was 3.7 KB
+        self.assertLess(len(data), 5000)  # of 64 KiB of flash; was 3.7 KB
 
     def test_same_source_same_files(self):
         self.assertEqual(self.files, generate.files(ROOT))

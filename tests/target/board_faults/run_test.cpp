@@ -60,7 +60,7 @@ TEST(BoardRun, CurrentsArriveWithSignAndScale)
         plant_truth_t before =
             b.truth(); // at the centre of the zero vector: what the image is about to sample
         b.run_ms(0.1);
-        const image_in_t &in = b.watched()->in;
+        const drive_in_t &in = b.watched()->in;
         for (int leg = 0; leg < DRIVE_LEGS; leg++) {
             double seen_A = BOARD_I_FULL_SCALE_A * (in.i_leg[leg] / 32768.0 - 1.0);
             EXPECT_NEAR(seen_A, before.i_A[leg],
