@@ -56,7 +56,7 @@ void six_step_reset(six_step_t *self, const six_step_config_t *config, pm_angle_
     begin(self, config, sector, now);
 }
 
-void six_step_start(six_step_t *self, const six_step_config_t *config, pm_angle_t theta, bool reverse,
+void six_step_begin(six_step_t *self, const six_step_config_t *config, pm_angle_t theta, bool reverse,
                     uint32_t t_30, uint32_t now)
 {
     self->reverse = reverse;

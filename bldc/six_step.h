@@ -9,7 +9,7 @@
  * Instants are counts from the start of the period. `now` is the count at t_k; it goes on by 2 N a period and wraps.
  *
  * Start: six_step_reset() with the angle and speed of a rotor that turns, from a drive with field orientation, an open
- * loop or a rotor that was caught; 20 degrees and 10 % of the speed may be missing. Or six_step_start() with a rotor that an
+ * loop or a rotor that was caught; 20 degrees and 10 % of the speed may be missing. Or six_step_begin() with a rotor that an
  * align has left at rest, which is turned by its crossings from the first one on. After COMMUTATION_LOST
  * (commutation.h) `lost` is set and all legs are off from the next call on, until the next reset.
  *
@@ -94,7 +94,7 @@ static inline pm_q_t six_step_current(const six_step_t *self, const pm_q_t i[PM_
  * (commutation.h): it is in charge of the crossings from the first one on, and has started when commutation.young is
  * 0, START_CROSSINGS in succession where they belong. */
 #define START_CROSSINGS 6U
-void six_step_start(six_step_t *self, const six_step_config_t *config, pm_angle_t theta, bool reverse,
+void six_step_begin(six_step_t *self, const six_step_config_t *config, pm_angle_t theta, bool reverse,
                     uint32_t t_30, uint32_t now);
 
 void six_step_step(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in,

@@ -2,6 +2,8 @@
 #ifndef CAN_DICTIONARY_SLOTS_H
 #define CAN_DICTIONARY_SLOTS_H
 
+/* clang-format off */
+
 #include "firmware/math/image.h"
 
 /* Words of the node; behind them the places of PDOs, of which it keeps the mapped objects */

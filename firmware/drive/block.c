@@ -151,7 +151,7 @@ bool block_from_rest(drive_t *drive)
     block_t *self = &drive->block;
     const pm_angle_t theta = drive->theta_open;
     *self = (block_t){.six_step = {.thresholds = drive->thresholds}};
-    six_step_start(&self->six_step, &c->six_step, theta, direction < 0, c->t_30, 0);
+    six_step_begin(&self->six_step, &c->six_step, theta, direction < 0, c->t_30, 0);
     self->pll.theta = theta;
     enter(drive, direction < 0 ? -c->i_start : c->i_start);
     return true;

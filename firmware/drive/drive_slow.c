@@ -262,7 +262,7 @@ PM_APART static void resolve_slip(drive_t *drive) /* its stack is not that of th
     const drive_config_t *c = &drive->config;
     const pm_dq_t v = {.d = pm_narrow(drive->voltage.v.d), .q = pm_narrow(drive->voltage.v.q)};
     const pm_angle_t turn =
-        position_resolve_slip(&drive->position, &c->position, &c->machine, v, drive->i_ab);
+        position_resolve_slip(&drive->position, &c->position, &c->machine, v, drive->status.i, drive->i_ab);
     if (turn != 0U) {
         turn_frame(drive, turn, v);
     }

@@ -42,8 +42,8 @@ typedef struct {
 #if PM_CARRIES(NEEDS_NEUTRAL)
     uint8_t traits_high; /* of the observer; without these channels none is ambiguous */
 #endif
-    bool injects;          /* the low-speed source leads at low speed; else the observer at all speeds */
-    bool corrects;         /* one of the optional stages is on */
+    bool injects;  /* the low-speed source leads at low speed; else the observer at all speeds */
+    bool corrects; /* one of the optional stages is on */
 } position_config_t;
 
 typedef struct {
@@ -130,11 +130,11 @@ static inline pm_q_t position_injected(const position_t *self)
  * weight of the observer. */
 pm_unit_t position_current_share(const position_t *self, const position_config_t *config);
 
-/* Between two steps, while the low-speed source takes part: v is the voltage of the last step without carrier, Q28, i
- * its current. A slip is resolved: the position turns by what is returned, 0 if there was none, and both sources
+/* Between two steps, while the low-speed source takes part: v is the voltage of the last step without carrier, Q28,
+ * i_dq its current, i the sampled one. A slip is resolved: the position turns by what is returned, 0 if there was none, and both sources
  * start anew from there. */
 pm_angle_t position_resolve_slip(position_t *self, const position_config_t *config,
-                                 const pm_machine_t *machine, pm_dq_t v, pm_ab_t i);
+                                 const pm_machine_t *machine, pm_dq_t v, pm_dq_t i_dq, pm_ab_t i);
 
 /* The position turns by `turn`, speed as it is; both sources start anew from there. */
 void position_turn(position_t *self, const position_config_t *config, pm_angle_t turn, pm_ab_t i);

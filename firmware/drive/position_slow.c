@@ -8,7 +8,7 @@
 #define K_MEAN PM_FRAC(0.05)
 /* The position counts as lost when the mean error signal reaches 0.3 rad or the model is off by 0.5. */
 #define PER_EPS_LOST    PM_Q(1.0 / 0.3)
-#define PER_MISFIT_LOST PM_Q(1.0 / 0.5)
+#define PER_MISFIT_LOST 2
 /* Noise of a single error signal: 3 ms. */
 #define K_NOISE PM_FRAC(0.3)
 /* The same of a source that is right in the mean over a sixth of a turn: 64 ms. */
@@ -117,7 +117,7 @@ PM_RARE void position_turn(position_t *self, const position_config_t *config, pm
 }
 
 pm_angle_t position_resolve_slip(position_t *self, const position_config_t *config,
-                                 const pm_machine_t *machine, pm_dq_t v, pm_ab_t i)
+                                 const pm_machine_t *machine, pm_dq_t v, pm_dq_t i_dq, pm_ab_t i)
 {
     uint32_t traits = self->inject ? config->traits : 0U;
 #if PM_CARRIES(NEEDS_NEUTRAL)
@@ -127,11 +127,8 @@ pm_angle_t position_resolve_slip(position_t *self, const position_config_t *conf
     if (traits == 0U) {
         return 0;
     }
-    const slip_in_t in = {.traits = traits,
-                          .omega_least = config->omega_low,
-                          .omega = self->pll.omega,
-                          .v = v,
-                          .i = pm_park(i, pm_dir(self->pll.theta))};
+    const slip_in_t in = {
+        .traits = traits, .omega_least = config->omega_low, .omega = self->pll.omega, .v = v, .i = i_dq};
     const pm_angle_t turn = slip_slow(&self->slip, machine, &in);
     if (turn != 0U) {
         position_turn(self, config, turn, i);
@@ -172,8 +169,7 @@ static void set_quality(position_t *self, const position_config_t *config, const
     }
     (void)pm_lp1(&self->eps_mean, eps, K_MEAN);
     (void)pm_lp1(&self->misfit_mean, misfit, K_MEAN);
-    const pm_q_t worst =
-        pm_max(pm_mul(self->eps_mean, PER_EPS_LOST), pm_mul(self->misfit_mean, PER_MISFIT_LOST));
+    const pm_q_t worst = pm_max(pm_mul(self->eps_mean, PER_EPS_LOST), PER_MISFIT_LOST * self->misfit_mean);
     self->quality = pm_max(0, PM_ONE - worst);
 }
 
