@@ -17,11 +17,11 @@ static void make_pattern(maker_t *m, pattern_config_t *c)
     c->complementary = p->freewheeling != 0;
     c->half_period = (uint16_t)p->timer_counts;
     c->lead = counts(m, DRIVE_PARAM_t_lead);
-    const int32_t least = c->lead + counts(m, DRIVE_PARAM_t_blank) + counts(m, DRIVE_PARAM_dead_time);
-    if (least >= p->timer_counts) {
+    const int32_t blind = c->lead + counts(m, DRIVE_PARAM_t_blank) + counts(m, DRIVE_PARAM_dead_time);
+    if (blind >= p->timer_counts) {
         refuse(m, DRIVE_PARAM_t_blank, "with t_lead and dead_time beyond half a period");
     }
-    c->least = (uint16_t)pm_min(least, p->timer_counts);
+    c->least = (uint16_t)pm_min(blind, p->timer_counts);
     require(m, c->complementary ? 0U : NEEDS_ONE_SWITCH, DRIVE_PARAM_freewheeling);
 }
 

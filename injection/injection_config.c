@@ -40,9 +40,9 @@ void make_injection(maker_t *m, injection_config_t *c)
         break;
     }
 #if PM_HAS(injection_stages)
-    const bool square = c->id == INJECTION_pulsating_square;
-    const bool sine = c->id == INJECTION_pulsating_sine;
-    make_injection_stages(m, &c->stages, square || sine, sine ? sine_flux(m) : flux_of_period(m));
+    const bool is_square = c->id == INJECTION_pulsating_square;
+    const bool is_sine = c->id == INJECTION_pulsating_sine;
+    make_injection_stages(m, &c->stages, is_square || is_sine, is_sine ? sine_flux(m) : flux_of_period(m));
     c->inlined = c->id == INJECTION_INLINE && !c->stages.on;
 #endif
 }

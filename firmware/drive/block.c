@@ -68,7 +68,7 @@ static void look(block_t *self, const block_config_t *c)
 
 /* The current up to which a crossing is seen in time, where the freewheeling lasts longest: into a sector whose new leg is
  * chopped. */
-static pm_q_t most(const drive_t *drive)
+static pm_q_t most_of(const drive_t *drive)
 {
     const block_config_t *c = &drive->config.block;
     const block_t *self = &drive->block;
@@ -223,7 +223,7 @@ block_result_t block_slow(drive_t *drive)
     const pm_q_t i_max = drive->config.i_max;
     pm_q_t i_min;
     pm_q_t i_most;
-    reference_range(drive, c->limit ? pm_min(most(drive), i_max) : i_max, &i_min, &i_most);
+    reference_range(drive, c->limit ? pm_min(most_of(drive), i_max) : i_max, &i_min, &i_most);
     const pm_q_t i_q = reference_torque(drive, self->pll.omega, i_min, i_most);
     prepare(drive, i_q);
     report(drive, i_q);

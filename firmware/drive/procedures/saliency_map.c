@@ -34,7 +34,7 @@ static bool is_on_map(const saliency_map_t *self)
     return self->at > 0U && self->at < (uint8_t)LAST;
 }
 
-static int32_t column(const saliency_map_t *self)
+static int32_t column_of(const saliency_map_t *self)
 {
     return ((int32_t)self->at - 1) % SALIENCY_MAP_SIDE;
 }
@@ -52,7 +52,7 @@ static pm_ab_t wanted(const drive_t *drive)
         return (pm_ab_t){0, 0};
     }
     const pm_q_t quarter = drive->saliency_map.i / 4;
-    return pm_park_inverse((pm_dq_t){.d = quarter * (column(self) - ZERO), .q = quarter * row(self)},
+    return pm_park_inverse((pm_dq_t){.d = quarter * (column_of(self) - ZERO), .q = quarter * row(self)},
                            pm_dir(self->theta));
 }
 
@@ -184,7 +184,7 @@ static pm_procedure_t take(drive_t *drive)
         return PM_FAILED_NO_CURRENT;
     }
     if (is_on_map(self)) {
-        saliency_point_t *point = &map->point[row(self)][column(self)];
+        saliency_point_t *point = &map->point[row(self)][column_of(self)];
         *point = saliency_circle_inductances(&self->circle, self->theta, drive->config.saliency_map.flux);
         return point->L_d > 0 && point->L_q > 0 ? PM_RUNNING : PM_FAILED_IMPLAUSIBLE;
     }

@@ -58,8 +58,8 @@ TEST(RandomSquare, CyclesHaveNoVoltSecondsAndBeginEitherWay)
     int forwards = 0, same = 0, before = 0, longest = 0, length = 0;
     const int cycles = static_cast<int>(run.given.size()) / 2;
     for (int n = 0; n < cycles; ++n) {
-        const int first = sign_of(run.given[2 * n], run.theta),
-                  second = sign_of(run.given[2 * n + 1], run.theta);
+        const int first = sign_of(run.given[static_cast<size_t>(2 * n)], run.theta),
+                  second = sign_of(run.given[static_cast<size_t>(2 * n + 1)], run.theta);
         ASSERT_EQ(first, -second) << n;
         forwards += first > 0;
         same += first == before;
