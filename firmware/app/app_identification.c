@@ -132,21 +132,15 @@ static bool map_value(const app_t *app, uint16_t slot, int32_t *value)
         return map->i != 0 && measured_value(app, slot, value);
     }
 }
-#else
-static bool map_value(const app_t *app, uint16_t slot, int32_t *value)
-{
-    (void)app;
-    (void)slot;
-    (void)value;
-    return false;
-}
 #endif
 
 bool app_identify_value(const app_t *app, uint16_t slot, int32_t *value)
 {
+#if PM_HAS(saliency_map)
     if (map_value(app, slot, value)) {
         return true;
     }
+#endif
     const commissioning_report_t *report = &app->drive.commissioning_report;
     const commissioning_result_t *r = &report->result;
     for (uint32_t n = 0; n < sizeof results / sizeof results[0]; n++) {
