@@ -25,7 +25,7 @@ static pm_num_t ratio_of_sums(const inductances_t *L)
 static pm_num_t amplitude(const maker_t *m)
 {
     const inductances_t L = inductances_at_zero(m);
-    return pm_num_mul(mul3(si(m, DRIVE_PARAM_zero_dL_0), si(m, DRIVE_PARAM_v_injection), ratio_of_sums(&L)),
+    return pm_num_mul(mul3(si(m, DRIVE_PARAM_dL_0), si(m, DRIVE_PARAM_v_injection), ratio_of_sums(&L)),
                       pm_num_ratio(1, 2));
 }
 
@@ -61,8 +61,8 @@ static void make_channel(maker_t *m, zero_config_t *c, pm_num_t unit)
     }
     const pm_num_t a = decay(x);
     const pm_num_t now = pm_num_div(m->base.v, pm_num_mul(unit, pm_num_sub(pm_num(1), a)));
-    c->v_now = fixed(m, now, 22, DRIVE_PARAM_zero_dL_0);
-    c->v_past = fixed(m, pm_num_mul(now, a), 22, DRIVE_PARAM_zero_dL_0);
+    c->v_now = fixed(m, now, 22, DRIVE_PARAM_dL_0);
+    c->v_past = fixed(m, pm_num_mul(now, a), 22, DRIVE_PARAM_dL_0);
 }
 
 /* c / T_s of a current per unit, in `unit`. */
@@ -104,14 +104,14 @@ void make_zero_sequence(maker_t *m, zero_config_t *c)
 {
     const pm_num_t unit = pm_num_mul(pm_num(8), amplitude(m));
     if (pm_num_cmp(magnitude(unit), pm_num_mul(m->base.v, pm_num_ratio(8, 1000))) < 0) {
-        refuse(m, DRIVE_PARAM_zero_dL_0, "leaves no answer at the neutral");
+        refuse(m, DRIVE_PARAM_dL_0, "leaves no answer at the neutral");
         return;
     }
     make_saliency_sequence(m, &c->saliency, flux_of_period(m));
     make_carrier(m, c);
     make_channel(m, c, unit);
     make_kappa(m, c);
-    c->c_re = link(m, DRIVE_PARAM_zero_dL_0, unit);
+    c->c_re = link(m, DRIVE_PARAM_dL_0, unit);
     c->c_im = -link(m, DRIVE_PARAM_zero_L_c0, unit);
     c->form = (uint8_t)m->params->zero_form;
     c->told_first = m->params->zero_form != (int32_t)ZERO_MEASURED;

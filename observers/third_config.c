@@ -33,8 +33,8 @@ void make_third(maker_t *m, third_config_t *c)
         return;
     }
     c->psi_3 = per_unit(m, DRIVE_PARAM_psi_3, m->base.psi);
-    const pm_num_t shift = pm_num_mul(si(m, DRIVE_PARAM_third_dL_0), m->base.i);
-    c->relative = fixed(m, pm_num_div(shift, pm_num_mul(pm_num(2), psi)), Q_BITS, DRIVE_PARAM_third_dL_0);
+    const pm_num_t shift = pm_num_mul(si(m, DRIVE_PARAM_dL_0), m->base.i);
+    c->relative = fixed(m, pm_num_div(shift, pm_num_mul(pm_num(2), psi)), Q_BITS, DRIVE_PARAM_dL_0);
     c->t_s = fixed(m, pm_num_mul(m->base.t_s, m->base.omega), FRAC_BITS, DRIVE_PARAM_f_pwm);
     c->rc = fixed(m, mul3(pm_num(3), si(m, DRIVE_PARAM_neutral_filter), m->base.omega), Q_BITS,
                   DRIVE_PARAM_neutral_filter);

@@ -277,7 +277,11 @@ enum {
 #endif
 #if PM_HAS(third_sogi) || PM_HAS(third_integration) || PM_HAS(third_crossings)
     OD_PARAMETER_PSI_3,
-    OD_PARAMETER_THIRD_DL_0,
+#endif
+#if PM_HAS(neutral)
+    OD_PARAMETER_DL_0,
+#endif
+#if PM_HAS(third_sogi) || PM_HAS(third_integration) || PM_HAS(third_crossings)
     OD_PARAMETER_THIRD_NOTCH,
     OD_PARAMETER_THIRD_GAIN,
     OD_PARAMETER_THIRD_DRIFT,
@@ -321,7 +325,6 @@ enum {
     OD_PARAMETER_ASYMMETRY_LEARNING,
 #endif
 #if PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating)
-    OD_PARAMETER_ZERO_DL_0,
     OD_PARAMETER_ZERO_L_C0,
     OD_PARAMETER_ZERO_FORM,
 #endif

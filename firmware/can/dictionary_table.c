@@ -4,7 +4,7 @@
 
 /* clang-format off */
 
-const uint32_t od_schema = 0x8D494B63U;
+const uint32_t od_schema = 0xE5DACD20U;
 
 /* least, preset, most; those of parameters are in firmware/params/parameters.def */
 const od_values_t od_values[] = {
@@ -347,10 +347,16 @@ const od_entry_t od_table[] = {
     {0x2320U, 2U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_EKF_SPEED_NOISE, 0U, 0U},
     {0x2320U, 3U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_EKF_ANGLE_NOISE, 0U, 0U},
 #endif
-#if PM_HAS(third_sogi) || PM_HAS(third_integration) || PM_HAS(third_crossings)
+#if PM_HAS(third_sogi) || PM_HAS(third_integration) || PM_HAS(third_crossings) || PM_HAS(neutral)
     {0x2330U, 0U, OD_READ, OD_U8, OD_CONSTANT, OD_GROUP_NONE, 0U, 39U, 0U},
+#endif
+#if PM_HAS(third_sogi) || PM_HAS(third_integration) || PM_HAS(third_crossings)
     {0x2330U, 1U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_MACHINE, OD_PARAMETER_PSI_3, 0U, 0U},
-    {0x2330U, 2U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_MACHINE, OD_PARAMETER_THIRD_DL_0, 0U, 0U},
+#endif
+#if PM_HAS(neutral)
+    {0x2330U, 2U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_MACHINE, OD_PARAMETER_DL_0, 0U, 0U},
+#endif
+#if PM_HAS(third_sogi) || PM_HAS(third_integration) || PM_HAS(third_crossings)
     {0x2330U, 3U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_MACHINE, OD_PARAMETER_THIRD_NOTCH, 0U, 0U},
     {0x2330U, 4U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_MACHINE, OD_PARAMETER_THIRD_GAIN, 0U, 0U},
     {0x2330U, 5U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_MACHINE, OD_PARAMETER_THIRD_DRIFT, 0U, 0U},
@@ -395,7 +401,6 @@ const od_entry_t od_table[] = {
     {0x2400U, 44U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_ASYMMETRY_LEARNING, 0U, 0U},
 #endif
 #if PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating)
-    {0x2400U, 48U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_ZERO_DL_0, 0U, 0U},
     {0x2400U, 49U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_ZERO_L_C0, 0U, 0U},
     {0x2400U, 50U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_ZERO_FORM, 0U, 0U},
 #endif

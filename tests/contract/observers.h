@@ -50,10 +50,9 @@ inline drive_params_t parameters(const Machine &linear, const Base &b)
     set(DRIVE_PARAM_L_dqh_rated, 0);
     set(DRIVE_PARAM_cross_half, 0);
     set(DRIVE_PARAM_psi_m, linear.psi_m_Wb);
-    set(DRIVE_PARAM_zero_dL_0, kNeutral.dL_0_H);
     set(DRIVE_PARAM_neutral_full_scale, kNeutral.full_scale_V);
     set(DRIVE_PARAM_psi_3, kPsi3_Wb);
-    set(DRIVE_PARAM_third_dL_0, kDL0_H);
+    set(DRIVE_PARAM_dL_0, kDL0_H);
     set(DRIVE_PARAM_neutral_filter, 0);
     return p;
 }

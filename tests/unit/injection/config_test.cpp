@@ -24,7 +24,7 @@ drive_params_t with(int32_t injection)
     return p;
 }
 
-// Its answer is that of zero_dL_0, not of the currents: tests/unit/injection/zero_sequence_test.cpp.
+// Its answer is that of dL_0, not of the currents: tests/unit/injection/zero_sequence_test.cpp.
 bool at_neutral(int32_t id)
 {
     return id == INJECTION_zero_anti_rotating || id == INJECTION_zero_rotating ||

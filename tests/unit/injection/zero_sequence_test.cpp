@@ -55,7 +55,7 @@ injection_config_t config(const Choice &choice)
     drive_params_t p = parameters(choice);
     p.v_injection = 70000;
     p.zero_form = choice.form;
-    p.zero_dL_0 = static_cast<int32_t>(std::lround(p.zero_dL_0 * choice.dL_0_told));
+    p.dL_0 = static_cast<int32_t>(std::lround(p.dL_0 * choice.dL_0_told));
     p.zero_L_c0 = static_cast<int32_t>(std::lround(choice.L_c0_told_H * 1e9));
     drive_config_t c = {};
     const drive_result_t result = drive_configure(&c, &p, PM_CHANNELS);
@@ -250,7 +250,7 @@ TEST(ZeroSequence, RefusesWhatGivesNoAnswer)
 {
     const Choice sine = kAll[0];
     EXPECT_TRUE(refused(sine, [](drive_params_t &) {}).ok);
-    EXPECT_EQ(refused(sine, [](drive_params_t &p) { p.zero_dL_0 = 0; }).param, DRIVE_PARAM_zero_dL_0);
+    EXPECT_EQ(refused(sine, [](drive_params_t &p) { p.dL_0 = 0; }).param, DRIVE_PARAM_dL_0);
     EXPECT_EQ(refused(sine, [](drive_params_t &p) { p.neutral_filter = 0; }).param,
               DRIVE_PARAM_neutral_filter);
     EXPECT_EQ(refused(sine, [](drive_params_t &p) { p.neutral_filter = 400000; }).param,

@@ -153,7 +153,7 @@ TEST(Third, TheShiftByTheLoadIsItsLaw)
     for (const observer_id_t id : kAll) {
         for (const Complex i : {Complex{0, 4}, Complex{-1.75, 4}, Complex{1, -3}}) {
             drive_params_t p = params(id);
-            p.third_dL_0 = 0;
+            p.dL_0 = 0;
             Star at{157, i};
             Source source(p, at);
             // seen with L = psi_3: the imaginary part of e^{-j shift} |L| / psi_3
