@@ -199,11 +199,18 @@ def plot(results, path):
     plt.close(figure)
 
 
+def place_in_list():
+    """What the parameter `injection` is for each source."""
+    return {row[0]: n for n, row in enumerate(methods(LIST))}
+
+
 def measure(pool, rows, chosen, count):
     studies = {"standstill": standstill(), "slow": slow(), "step": load_step(), "ramp": load_ramp(),
                "reversal": reversal(), "machines": machines(count), "disturbed": disturbances()}
     results, jobs = {}, {}
-    for n, (name, *_) in enumerate(rows):
+    number = place_in_list()
+    for name, *_ in rows:
+        n = number[name]
         if name in chosen:
             own = [f"{key}={value}" for key, value in settings(name).items()]
             jobs[name] = {key: study.submit(pool, n, own) for key, study in studies.items()}
@@ -305,9 +312,10 @@ def page(rows, results, plot_name, values, bytes_of):
 
 def probe_page(names, path):
     """Half load at slow speed, forwards, every source."""
+    number = place_in_list()
     common.check(path, [("free rotor under speed control", "50 %", f"`{name}`, forwards",
-                         slow(), (n, [f"{key}={value}" for key, value in settings(name).items()], "0.5 1"))
-                        for n, name in enumerate(names)])
+                         slow(), (number[name], [f"{key}={value}" for key, value in settings(name).items()], "0.5 1"))
+                        for name in names])
 
 
 def main():
