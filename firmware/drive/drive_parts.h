@@ -47,6 +47,24 @@ static inline bool drive_injects(const drive_t *drive)
 /* drive.c: at 1 kHz, what the step needs of the present operating point and stage. */
 void drive_prepare(drive_t *drive);
 
+/* drive_slow.c */
+
+void drive_switch_off(drive_t *drive);
+/* Current and voltage stay as they are; both have other coordinates in the frame that has been turned. */
+void drive_turn_frame(drive_t *drive, pm_angle_t turn, pm_dq_t v);
+/* The vector goes on with a rotor whose angle and speed are known, and with i_q. */
+void drive_take_over(drive_t *drive, const pm_pll_t *known, pm_q_t i_q);
+
+/* start.c: the sequence of procedures that finds the rotor, at 1 kHz. */
+
+void start_begin(drive_t *drive);
+void start_slow(drive_t *drive);
+void start_step(
+    drive_t *drive); /* begins the next procedure; from drive_slow() itself: the deepest stack of all */
+void start_again(drive_t *drive); /* behind the calibration, which looks for a rotor that turns first */
+/* A step that this start or this board does without. */
+bool start_passes_over(const drive_t *drive, uint8_t procedure);
+
 /* protection.c */
 
 void protection_step(drive_t *drive);   /* names the fault of a period that has not passed */
