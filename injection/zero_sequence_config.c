@@ -112,7 +112,7 @@ void make_zero_sequence(maker_t *m, zero_config_t *c)
     make_channel(m, c, unit);
     make_kappa(m, c);
     c->c_re = link(m, DRIVE_PARAM_dL_0, unit);
-    c->c_im = -link(m, DRIVE_PARAM_zero_L_c0, unit);
+    c->c_im = pm_sub_sat(0, link(m, DRIVE_PARAM_zero_L_c0, unit));
     c->form = (uint8_t)m->params->zero_form;
     c->told_first = m->params->zero_form != (int32_t)ZERO_MEASURED;
     c->turn6 =

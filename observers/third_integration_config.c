@@ -5,7 +5,11 @@
 void make_third_integration(maker_t *m, third_integration_config_t *c)
 {
     make_third(m, &c->third);
-    c->third.rc += c->third.t_s / 16 * 3 / 2; /* half a period, Q28 */
+    /* Half a period more, of the sum of the trapezia. */
+    const pm_num_t half = pm_num_mul(pm_num_ratio(1, 2), m->base.t_s);
+    c->third.rc =
+        fixed(m, mul3(pm_num(3), pm_num_add(si(m, DRIVE_PARAM_neutral_filter), half), m->base.omega), Q_BITS,
+              DRIVE_PARAM_neutral_filter);
     c->g = fixed(m, si(m, DRIVE_PARAM_third_drift), Q_BITS, DRIVE_PARAM_third_drift);
     if (m->params->third_notch != 0) {
         refuse(m, DRIVE_PARAM_third_notch, "observer 12 alone has it");

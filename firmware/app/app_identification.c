@@ -108,7 +108,8 @@ static bool measured_value(const app_t *app, uint16_t slot, int32_t *value)
 static bool map_value(const app_t *app, uint16_t slot, int32_t *value)
 {
     const saliency_map_result_t *map = &app->drive.saliency_map;
-    const saliency_point_t *point = &map->point[0][app->map_point];
+    const saliency_point_t *point =
+        &map->point[app->map_point / SALIENCY_MAP_SIDE][app->map_point % SALIENCY_MAP_SIDE];
     switch (slot) {
     case OD_LIVE_IDENTIFICATION_MAP_POINT:
         *value = app->map_point;
