@@ -10,9 +10,13 @@ enum {
     ADC1_TEMPERATURE = 5,
     ADC1_DIAL = 11,
     ADC1_NEUTRAL = 14,
+    ADC1_V_BUS = 1,
+    ADC1_TERMINAL_W = 14,
     ADC1_REFERENCE = 18,
     ADC2_PHASE_V = 3,
     ADC2_V_BUS = 1,
+    ADC2_TERMINAL_U = 17,
+    ADC2_TERMINAL_V = 5,
 };
 
 #define BREAKS (TIM_SR_BIF | TIM_SR_SBIF)
@@ -48,6 +52,22 @@ static void start_amplifier(opamp_t *opamp)
                  reg_field(OPAMP_CSR_PGA_GAIN, OPAMP_GAIN_16_BIAS_VINM0);
 }
 
+#if PORT_AT_PB11 == NEEDS_TERMINALS
+/* Behind the currents. The DC link comes last and by the converter whose end starts the control interrupt: the other one,
+ * which alone has two of the terminals, is through by then. The dividers are some 2 kohm: longer sampling. */
+static void add_terminals(void)
+{
+    ADC1.SMPR1 |= reg_field(ADC_SMPR1_SMP1, ADC_SMP_6_5);
+    ADC1.SMPR2 |= reg_field(ADC_SMPR2_SMP14, ADC_SMP_12_5);
+    ADC2.SMPR1 |= reg_field(ADC_SMPR1_SMP5, ADC_SMP_12_5);
+    ADC2.SMPR2 = reg_field(ADC_SMPR2_SMP17, ADC_SMP_12_5);
+    ADC1.JSQR = sequence_of(ADC1_PHASE_U, ADC1_PHASE_W) + reg_field(ADC_JSQR_JL, 2U) +
+                reg_field(ADC_JSQR_JSQ3, ADC1_TERMINAL_W) + reg_field(ADC_JSQR_JSQ4, ADC1_V_BUS);
+    ADC2.JSQR = sequence_of(ADC2_PHASE_V, ADC2_TERMINAL_U) + reg_field(ADC_JSQR_JL, 1U) +
+                reg_field(ADC_JSQR_JSQ3, ADC2_TERMINAL_V);
+}
+#endif
+
 void measure_start(void)
 {
     start_amplifier(&OPAMP1);
@@ -67,6 +87,9 @@ void measure_start(void)
     ADC1.SMPR2 |= reg_field(ADC_SMPR2_SMP14, ADC_SMP_6_5);
     ADC1.JSQR = sequence_of(ADC1_PHASE_U, ADC1_PHASE_W) + reg_field(ADC_JSQR_JL, 1U) +
                 reg_field(ADC_JSQR_JSQ3, ADC1_NEUTRAL);
+#endif
+#if PORT_AT_PB11 == NEEDS_TERMINALS
+    add_terminals();
 #endif
 }
 
@@ -123,7 +146,14 @@ void hal_measure(hal_t *hal, drive_in_t *in)
     in->i_leg[0] = current_code(ADC1.JDR1);
     in->i_leg[1] = current_code(ADC2.JDR1);
     in->i_leg[2] = current_code(ADC1.JDR2);
+#if PORT_AT_PB11 == NEEDS_TERMINALS
+    in->more.v_terminal[0] = code_of(ADC2.JDR2 * 16U);
+    in->more.v_terminal[1] = code_of(ADC2.JDR3 * 16U);
+    in->more.v_terminal[2] = code_of(ADC1.JDR3 * 16U);
+    in->v_dc = code_of(ADC1.JDR4 * 16U);
+#else
     in->v_dc = code_of(ADC2.JDR2 * 16U);
+#endif
 #if PM_CARRIES(NEEDS_NEUTRAL)
     in->more.v_neutral = code_of(ADC1.JDR3 * 16U);
 #endif

@@ -1,17 +1,25 @@
 /* Port for ST's B-G431B-ESC1 (STM32G431CB, 170 MHz): the state that the application allocates.
  *
  * Both halves of a carrier period are equal: compare[leg][0] serves both. New compare values take effect at
- * the centre of the zero vector, a change of the legs' states about 1 us later. docs/board.md has wiring and
+ * the centre of the zero vector, a change of the legs' states about 1 us later, in programs
+ * with more channels up to 2.1 us. docs/board.md has wiring and
  * bench checks, README.md here the registers that are used. */
 #ifndef STM32G431_PORT_H
 #define STM32G431_PORT_H
 
 #include "hal/hal.h"
 
-/* As wired and programmed today: three leg currents and the DC-link voltage, both halves of a period alike. In programs
- * that carry it the neutral, by an amplifier of the user's at PB11 in place of phase W's divider (docs/board.md).
- * The other dividers of the terminals (PA4, PC4, switched on by PB5 low) are not in the sequence of the converters. PWM on one switch and commutation by COM events are within TIM1 and not yet programmed. */
-#define PORT_CHANNELS (NEEDS_NEUTRAL | NEEDS_HELD)
+/* PB11 has phase W's divider, or an amplifier of the user's in its place (docs/board.md): a program carries the terminals or
+ * the neutral. */
+#if PM_CARRIES(NEEDS_TERMINALS) && !PM_CARRIES(NEEDS_NEUTRAL)
+#define PORT_AT_PB11 NEEDS_TERMINALS
+#else
+#define PORT_AT_PB11 NEEDS_NEUTRAL
+#endif
+
+/* As wired and programmed today, beside three leg currents and the DC-link voltage; both halves of a period alike. PWM on one
+ * switch, a second sample and commutation by COM events are within TIM1 and the converters and not yet programmed. */
+#define PORT_CHANNELS (PORT_AT_PB11 | NEEDS_HELD)
 
 #define PORT_CONSOLE_SIZE 128U /* powers of two */
 #define PORT_CAN_FRAMES   16U

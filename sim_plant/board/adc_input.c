@@ -16,7 +16,7 @@
 #define REFERENCE_S       4e-6
 #define CCR_VREFEN        0x00400000u
 
-typedef enum { LEG_U, LEG_V, LEG_W, LINK_VOLTAGE, TEMPERATURE, DIAL, NEUTRAL } source_t;
+typedef enum { LEG_U, LEG_V, LEG_W, LINK_VOLTAGE, TEMPERATURE, DIAL, PB11, TERMINAL_U, TERMINAL_V } source_t;
 
 static const struct {
     int converter, channel;
@@ -26,7 +26,8 @@ static const struct {
 } inputs[] = {
     {0, 3, LEG_U, PORT_A, 2},        {1, 3, LEG_V, PORT_A, 6},        {0, 12, LEG_W, PORT_B, 1},
     {1, 1, LINK_VOLTAGE, PORT_A, 0}, {0, 1, LINK_VOLTAGE, PORT_A, 0}, {0, 5, TEMPERATURE, PORT_B, 14},
-    {0, 11, DIAL, PORT_B, 12},       {0, 14, NEUTRAL, PORT_B, 11},
+    {0, 11, DIAL, PORT_B, 12},       {0, 14, PB11, PORT_B, 11},       {1, 14, PB11, PORT_B, 11},
+    {1, 17, TERMINAL_U, PORT_A, 4},  {1, 5, TERMINAL_V, PORT_C, 4},
 };
 
 static uint32_t share_code(double share)
@@ -81,6 +82,22 @@ static uint32_t neutral_code(const adc_converter_t *c, const plant_adc_t *seen)
     return share_code(0.5 - (seen->v_zero[0] / 65536.0 - 0.5) * per_supply(c));
 }
 
+/* A divider, whose lower end PB5 takes to ground; the code stops at the supply. */
+static uint32_t terminal_code(const adc_converter_t *c, int leg, const plant_adc_t *seen)
+{
+    if (gpio_drives_high(&c->chip->gpio, PORT_B, 5)) {
+        cpu_fail(c->chip->cpu, "ADC%d: the dividers of the terminals are off (PB5 is high)", c->which + 1);
+    }
+    return share_code(seen->v_leg[leg] / 65536.0 * per_supply(c));
+}
+
+/* Phase W's divider where the plant has channels of the terminals, else the neutral's amplifier. */
+static uint32_t pb11_code(const adc_converter_t *c, const plant_adc_t *seen)
+{
+    const bool divider = plant_sensor(c->chip->plant)->v_leg_full_scale_V > 0.0;
+    return divider ? terminal_code(c, 2, seen) : neutral_code(c, seen);
+}
+
 uint32_t adc_input(const adc_converter_t *c, uint32_t channel, const plant_adc_t *seen)
 {
     if (c->which == 0 && channel == REFERENCE_CHANNEL) {
@@ -99,8 +116,12 @@ uint32_t adc_input(const adc_converter_t *c, uint32_t channel, const plant_adc_t
             return share_code(seen->v_dc / 65536.0 * per_supply(c));
         case TEMPERATURE:
             return temperature_code(&c->chip->wiring);
-        case NEUTRAL:
-            return neutral_code(c, seen);
+        case PB11:
+            return pb11_code(c, seen);
+        case TERMINAL_U:
+            return terminal_code(c, 0, seen);
+        case TERMINAL_V:
+            return terminal_code(c, 1, seen);
         case DIAL:
             return share_code(c->chip->wiring.dial);
         case LEG_U:

@@ -1,6 +1,5 @@
 #include "tools/pmsim_board/console.h"
 
-#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -59,11 +58,13 @@ static int run(board_t *board, double duration_s, const char *last)
     return begins_line(board_console(board), "FAIL") ? 1 : 0;
 }
 
-int board_show_console(const char *elf_path, double duration_s, const char *last)
+int board_show_console(const char *elf_path, double duration_s, const char *last, bool terminals)
 {
     char error[300];
     const char *reason = NULL;
-    plant_t *plant = plant_create(&bench, 0.0, &reason);
+    plant_config_t config = bench;
+    config.sensor.v_leg_full_scale_V = terminals ? BOARD_V_FULL_SCALE_V : 0.0;
+    plant_t *plant = plant_create(&config, 0.0, &reason);
     if (plant == NULL) {
         fprintf(stderr, "pmsim board: plant: %s\n", reason);
         return 2;

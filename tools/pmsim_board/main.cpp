@@ -28,7 +28,7 @@ struct BoardOptions {
     int load = BUS_QUIET; // a bus_noise_kind_t
     double console_s = 0.0;
     int gdb_port = -1;
-    bool busy = false, similar = false;
+    bool busy = false, similar = false, terminals = false;
 };
 
 // NAME=MOST: a line like those of the expectations. Returns whether it holds.
@@ -65,7 +65,7 @@ int run(RunOptions options, const BoardOptions &board, NodeOptions node)
 {
     if (board.console_s > 0.0) {
         return board_show_console(board.image.c_str(), board.console_s,
-                                  board.last.empty() ? nullptr : board.last.c_str());
+                                  board.last.empty() ? nullptr : board.last.c_str(), board.terminals);
     }
     if (options.scenario.empty()) {
         throw InputError("a scenario is wanted, or --console SECONDS");
@@ -127,6 +127,8 @@ int main(int argc, char **argv)
         "no scenario: run the image for so many seconds and print what its UART says; exit 1 when a line "
         "begins with FAIL");
     app.add_option("--until", board.last, "with --console: end at a line that begins with this");
+    app.add_flag("--terminals", board.terminals,
+                 "with --console: the dividers of the terminals are in place");
     app.add_option("--gdb", board.gdb_port,
                    "wait for gdb on this port of this machine (0: a free one) before the first instruction; "
                    "time stands while it has stopped the processor")

@@ -22,6 +22,7 @@ typedef struct {
     reg_t JDR1;
     reg_t JDR2;
     reg_t JDR3;
+    reg_t JDR4;
 } adc_t;
 
 #define ADC_ISR_ADRDY    (1U << 0)
@@ -41,6 +42,7 @@ typedef struct {
 #define ADC_SMPR2_SMP11  (7U << 3)
 #define ADC_SMPR2_SMP12  (7U << 6)
 #define ADC_SMPR2_SMP14  (7U << 12)
+#define ADC_SMPR2_SMP17  (7U << 21)
 #define ADC_SMPR2_SMP18  (7U << 24)
 #define ADC_SQR1_SQ1     (0x1FU << 6)
 #define ADC_JSQR_JL      (3U << 0)
@@ -49,9 +51,16 @@ typedef struct {
 #define ADC_JSQR_JSQ1    (0x1FU << 9)
 #define ADC_JSQR_JSQ2    (0x1FU << 15)
 #define ADC_JSQR_JSQ3    (0x1FU << 21)
+#define ADC_JSQR_JSQ4    (0x1FU << 27)
 
 /* values of SMPx, in cycles of the converter's clock, of JEXTSEL and of JEXTEN */
-enum { ADC_SMP_6_5 = 1, ADC_SMP_247_5 = 6, ADC_JEXTSEL_TIM1_TRGO2 = 8, ADC_JEXTEN_RISING = 1 };
+enum {
+    ADC_SMP_6_5 = 1,
+    ADC_SMP_12_5 = 2,
+    ADC_SMP_247_5 = 6,
+    ADC_JEXTSEL_TIM1_TRGO2 = 8,
+    ADC_JEXTEN_RISING = 1
+};
 
 typedef struct {
     reg_t CSR;

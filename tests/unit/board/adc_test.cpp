@@ -192,6 +192,40 @@ TEST_F(Adc, Neutral)
     }
 }
 
+// Dividers of 30 V full scale: a leg that is held high shows the link.
+TEST_F(Adc, Terminals)
+{
+    plant_config_t config = rig::plant_config();
+    config.sensor.v_leg_full_scale_V = 30.0;
+    const struct {
+        uint32_t converter, channel;
+    } input[] = {{rig::adc2, 17}, {rig::adc2, 5}, {rig::adc1, 14}};
+    for (uint32_t leg = 0; leg < 3; leg++) {
+        Chip chip(config);
+        chip.all();
+        chip.write(rig::tim1 + 0x34 + 4 * leg, 0xFFFF); // this one high, the others low
+        chip.write(rig::tim1 + 0x20, 0x555);
+        chip.set(rig::tim1 + 0x44, 0x8000);
+        chip.run_period();
+        chip.run_period();
+        for (uint32_t n = 0; n < 3; n++) {
+            chip.write(input[n].converter + sqr1, input[n].channel << 6);
+            chip.write(input[n].converter + cr, 0x10000000 | 4);
+            chip.run(1200);
+            EXPECT_NEAR(chip.read(input[n].converter + dr), n == leg ? 4096.0 * 24.0 / 30.0 : 0.0, 20.0)
+                << leg << n;
+        }
+        EXPECT_EQ(chip.take_error(), "");
+        chip.write(rig::gpiob + 0x18, 1u << 5); // PB5
+        chip.write(rig::gpiob, (chip.read(rig::gpiob) & ~(3u << 10)) | 1u << 10);
+        chip.write(rig::adc2 + sqr1, 17u << 6);
+        chip.write(rig::adc2 + cr, 0x10000000 | 4);
+        chip.run(1200);
+        (void)chip.read(rig::adc2 + dr);
+        EXPECT_NE(chip.take_error().find("PB5 is high"), std::string::npos);
+    }
+}
+
 TEST_F(Adc, AStuckConverterNeverEnds)
 {
     c.all();
