@@ -36,20 +36,34 @@ static bool dead_time_code(uint32_t dead_time_ns, uint32_t *code)
     return false;
 }
 
+static uint32_t modes_12(uint32_t first, uint32_t second)
+{
+    return reg_field(TIM_CCMR1_OC1M, first) | TIM_CCMR1_OC1PE | reg_field(TIM_CCMR1_OC2M, second) |
+           TIM_CCMR1_OC2PE;
+}
+
+/* The fourth starts the converters. */
+static uint32_t modes_34(uint32_t third)
+{
+    return reg_field(TIM_CCMR2_OC3M, third) | TIM_CCMR2_OC3PE | reg_field(TIM_CCMR2_OC4M, TIM_OCM_PWM2) |
+           TIM_CCMR2_OC4PE;
+}
+
 static void configure_timer(uint32_t counts)
 {
     TIM1.CR1 = reg_field(TIM_CR1_CMS, TIM_CMS_CENTRE) | TIM_CR1_ARPE;
     TIM1.CR2 = reg_field(TIM_CR2_MMS2, TIM_MMS2_OC4REF);
     TIM1.ARR = counts;
-    TIM1.CCMR1 = reg_field(TIM_CCMR1_OC1M, TIM_OCM_PWM1) | TIM_CCMR1_OC1PE |
-                 reg_field(TIM_CCMR1_OC2M, TIM_OCM_PWM1) | TIM_CCMR1_OC2PE;
-    TIM1.CCMR2 = reg_field(TIM_CCMR2_OC3M, TIM_OCM_PWM1) | TIM_CCMR2_OC3PE |
-                 reg_field(TIM_CCMR2_OC4M, TIM_OCM_PWM2) | TIM_CCMR2_OC4PE;
+    TIM1.CCMR1 = modes_12(TIM_OCM_PWM1, TIM_OCM_PWM1);
+    TIM1.CCMR2 = modes_34(TIM_OCM_PWM1);
     TIM1.CCR1 = 0U;
     TIM1.CCR2 = 0U;
     TIM1.CCR3 = 0U;
     TIM1.CCR4 = counts - 1U; /* the converters start at the centre of the zero vector */
     TIM1.CCER = 0U;
+#if PM_CARRIES(NEEDS_ONE_SWITCH)
+    TIM1.CR2 |= TIM_CR2_CCPC; /* from now on states of legs wait for a COM event */
+#endif
     TIM1.AF1 = TIM_AF1_BKINE | TIM_AF1_BKCMP1E | TIM_AF1_BKCMP2E | TIM_AF1_BKCMP4E;
     TIM1.RCR = 0U;
     TIM1.EGR = TIM_EGR_UG;
@@ -113,6 +127,47 @@ void bridge_run(void)
     TIM1.RCR = 1U;
 }
 
+#if PM_CARRIES(NEEDS_ONE_SWITCH)
+/* Outputs and mode of a channel by the state of its leg. Two outputs are complementary, with dead time; one alone follows
+ * the channel, the lower switch's too: in mode 2 it is on where the upper one would be off. */
+static const struct {
+    uint8_t outputs, mode;
+} OF_STATE[] = {
+    [PM_LEG_OFF] = {0, TIM_OCM_PWM1},
+    [PM_LEG_PWM] = {LEG, TIM_OCM_PWM1},
+    [PM_LEG_UPPER] = {TIM_CCER_CC1E, TIM_OCM_PWM1},
+    [PM_LEG_LOWER] = {TIM_CCER_CC1NE, TIM_OCM_PWM2},
+    [PM_LEG_HIGH] = {LEG, TIM_OCM_HIGH},
+    [PM_LEG_LOW] = {LEG, TIM_OCM_LOW},
+};
+
+/* For the next COM event. */
+static void write_states(uint32_t legs)
+{
+    const uint32_t a = legs & 7U, b = legs >> 4U & 7U, c = legs >> 8U & 7U;
+    TIM1.CCER =
+        OF_STATE[a].outputs | (uint32_t)OF_STATE[b].outputs << 4U | (uint32_t)OF_STATE[c].outputs << 8U;
+    TIM1.CCMR1 = modes_12(OF_STATE[a].mode, OF_STATE[b].mode);
+    TIM1.CCMR2 = modes_34(OF_STATE[c].mode);
+    port_hal.legs = legs;
+}
+
+void hal_bridge_write(hal_t *hal, const drive_out_t *out)
+{
+    (void)hal;
+    TIM1.CCR1 = out->compare[0][0];
+    TIM1.CCR2 = out->compare[1][0];
+    TIM1.CCR3 = out->compare[2][0];
+    if (out->trip != 0U) {
+        TIM1.BDTR = port_hal.bridge;
+        write_states(PM_LEGS_OFF);
+    } else if (out->legs != port_hal.legs) {
+        write_states(out->legs);
+    } else {
+        /* most periods */
+    }
+}
+#else
 #if PM_CARRIES(NEEDS_HELD)
 /* A leg that is held follows a compare value that the counter never passes, or never falls below. */
 static uint32_t on_time(const drive_out_t *out, uint32_t leg)
@@ -154,6 +209,7 @@ void hal_bridge_write(hal_t *hal, const drive_out_t *out)
         port_hal.legs = 0U;
     }
 }
+#endif
 
 bool hal_bridge_arm(hal_t *hal)
 {

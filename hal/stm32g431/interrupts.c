@@ -6,7 +6,11 @@
 
 void port_control(void)
 {
+#if PM_CARRIES(NEEDS_ONE_SWITCH)
+    TIM1.EGR = TIM_EGR_COMG;
+#else
     TIM1.CCER = port_hal.legs;
+#endif
     ADC1.ISR = ADC_ISR_JEOS;
     app_control(port_hal.app);
 }

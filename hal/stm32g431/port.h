@@ -17,9 +17,9 @@
 #define PORT_AT_PB11 NEEDS_NEUTRAL
 #endif
 
-/* As wired and programmed today, beside three leg currents and the DC-link voltage; both halves of a period alike. PWM on one
- * switch, a second sample and commutation by COM events are within TIM1 and the converters and not yet programmed. */
-#define PORT_CHANNELS (PORT_AT_PB11 | NEEDS_HELD)
+/* As wired and programmed today, beside three leg currents and the DC-link voltage; both halves of a period alike. A
+ * second sample and commutation within the period are within TIM1 and the converters and not yet programmed. */
+#define PORT_CHANNELS (PORT_AT_PB11 | NEEDS_HELD | NEEDS_ONE_SWITCH)
 
 #define PORT_CONSOLE_SIZE 128U /* powers of two */
 #define PORT_CAN_FRAMES   16U
@@ -43,7 +43,7 @@ struct hal {
     bool up, crystal;
     bool slow;       /* the PLL has failed: the clock after reset, too slow for the bus */
     bool sound;      /* flash holds what was built */
-    uint32_t legs;   /* CCER of the coming period */
+    uint32_t legs;   /* of the coming period: CCER, or with PWM on one switch PM_LEGS_... */
     uint32_t bridge; /* BDTR with everything but the main output enable */
     bool refused;    /* the bridge cannot be armed */
     hal_reset_t reset;

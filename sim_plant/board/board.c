@@ -182,6 +182,7 @@ static void finish_period(board_t *board, uint64_t cycle)
     for (int leg = 0; leg < BOARD_LEGS; leg++) {
         pwm.compare[leg][0] = pwm.compare[leg][1] = chip->tim1.compare[leg];
         pwm.driven[leg] = chip->wiring.driven[leg];
+        pwm.state[leg] = chip->wiring.state[leg];
     }
     plant_set_pwm(board->plant, &pwm);
     plant_run_period(board->plant);

@@ -29,21 +29,23 @@ void board_catch_up(board_chip_t *chip, uint64_t cycle)
     board_told(chip);
 }
 
-void board_drive(board_chip_t *chip, const bool driven[BOARD_LEGS])
+void board_drive(board_chip_t *chip, const bool driven[BOARD_LEGS], const plant_leg_state_t state[BOARD_LEGS])
 {
     board_wiring_t *wiring = &chip->wiring;
-    if (memcmp(wiring->driven, driven, BOARD_LEGS * sizeof *driven) == 0) {
+    if (memcmp(wiring->driven, driven, BOARD_LEGS * sizeof *driven) == 0 &&
+        memcmp(wiring->state, state, BOARD_LEGS * sizeof *state) == 0) {
         return;
     }
     bool any = false;
     for (int leg = 0; leg < BOARD_LEGS; leg++) {
         wiring->driven[leg] = driven[leg];
+        wiring->state[leg] = state[leg];
         any = any || driven[leg];
     }
     adc_sample_until(&chip->adc, cpu_now(chip->cpu));
     plant_move(chip->plant, board_within_s(chip, cpu_now(chip->cpu)));
     if (any) {
-        plant_drive(chip->plant, wiring->driven);
+        plant_drive_legs(chip->plant, wiring->driven, wiring->state);
     } else {
         plant_trip(chip->plant);
     }

@@ -27,7 +27,7 @@ typedef struct {
     double temperature_degC, dial;
     double supply_V;         /* of the processor */
     bool driven[PLANT_LEGS]; /* what the plant was told last */
-
+    plant_leg_state_t state[PLANT_LEGS];
 } board_wiring_t;
 
 /* Seconds since the start of the plant's period, at that cycle. */
@@ -36,8 +36,9 @@ double board_within_s(const board_chip_t *chip, uint64_t cycle);
 /* The plant at that cycle of the present period, samples due before included. */
 void board_catch_up(board_chip_t *chip, uint64_t cycle);
 
-/* TIM1's outputs have changed: which legs the plant drives follows, at this cycle. */
-void board_drive(board_chip_t *chip, const bool driven[BOARD_LEGS]);
+/* TIM1's outputs have changed: which legs the plant drives, and how, follows at this cycle. */
+void board_drive(board_chip_t *chip, const bool driven[BOARD_LEGS],
+                 const plant_leg_state_t state[BOARD_LEGS]);
 
 /* Pins have new modes, functions or levels: outputs and inputs of the timer may have changed. */
 void board_pins_changed(board_chip_t *chip);

@@ -9,18 +9,25 @@
 #define PERIOD_SAME 2.5e-4 /* half a count of the shortest period */
 
 #define UG   0x1u
+#define COMG 0x20u
 #define BG   0x80u
+#define CCPC 0x1u
+#define OSSR 0x800u
 #define CMS1 0x20u
 #define ARPE 0x80u
 
-#define PWM_1 6u
-#define PWM_2 7u
+#define FORCED_LOW  4u
+#define FORCED_HIGH 5u
+#define PWM_1       6u
+#define PWM_2       7u
+
+#define OC4 0xFF00u /* in CCMR2 */
 
 static const board_register_t list[] = {
     {TIM1_CR1, "CR1", 0, TIM1_CEN | CMS1 | ARPE, 0x10u},
-    {TIM1_CR2, "CR2", 0, 0x00F00000u, 0},
+    {TIM1_CR2, "CR2", 0, 0x00F00000u | CCPC, 0},
     {TIM1_SR, "SR", 0, TIM1_UIF, TIM1_BIF | TIM1_SBIF},
-    {TIM1_EGR, "EGR", 0, UG | BG, 0},
+    {TIM1_EGR, "EGR", 0, UG | COMG | BG, 0},
     {TIM1_CCMR1, "CCMR1", 0, 0x00007878u, 0},
     {TIM1_CCMR2, "CCMR2", 0, 0x00007878u, 0},
     {TIM1_CCER, "CCER", 0, 0x555u, 0},
@@ -59,6 +66,7 @@ void tim1_reset(tim1_t *tim)
     for (int n = 0; n < 4; n++) {
         tim->compare[n] = 0u;
     }
+    tim->enables = tim->modes[0] = tim->modes[1] = 0u;
     cpu_alarm(tim->chip->cpu, tim, UINT64_MAX, trigger);
     tim->chip->wiring.in_step = false;
     tim1_outputs(tim);
@@ -94,8 +102,7 @@ bool tim1_follows_plant(const tim1_t *tim)
 
 static uint32_t mode(const tim1_t *tim, int channel)
 {
-    uint32_t ccmr = tim->regs.value[(channel < 2 ? TIM1_CCMR1 : TIM1_CCMR2) / 4];
-    return board_field(ccmr, 4 + 8 * (channel % 2), 3);
+    return board_field(tim->modes[channel / 2], 4 + 8 * (channel % 2), 3);
 }
 
 static bool preloaded(const tim1_t *tim, int channel)
@@ -211,30 +218,94 @@ static void check_leg(const tim1_t *tim, int leg)
                      pin[leg][n].function);
         }
     }
-    if (mode(tim, leg) != PWM_1 || !preloaded(tim, leg)) {
-        cpu_fail(cpu, "TIM1: channel %d is driven in a mode other than PWM 1 with preload", leg + 1);
+    if (!preloaded(tim, leg)) {
+        cpu_fail(cpu, "TIM1: channel %d is driven without preload", leg + 1);
+    }
+    if ((tim->regs.value[TIM1_BDTR / 4] & OSSR) == 0u && board_field(tim->enables, 4 * leg, 3) != 5u) {
+        cpu_fail(cpu, "TIM1: channel %d leaves a gate without a level (OSSR)", leg + 1);
+    }
+}
+
+/* RM0440 28.3.17: with both outputs on they are complementary, with dead time; one alone follows OCxREF without, OCxN as
+ * well, so that mode 2 has the lower switch on where mode 1 has the upper one off. */
+static plant_leg_state_t state_of(const tim1_t *tim, int leg)
+{
+    static const struct {
+        uint32_t enables, mode;
+        plant_leg_state_t state;
+    } known[] = {
+        {5u, PWM_1, PLANT_LEG_PWM},        {1u, PWM_1, PLANT_LEG_UPPER},    {4u, PWM_2, PLANT_LEG_LOWER},
+        {5u, FORCED_HIGH, PLANT_LEG_HIGH}, {5u, FORCED_LOW, PLANT_LEG_LOW},
+    };
+    const uint32_t enables = board_field(tim->enables, 4 * leg, 3);
+    for (size_t n = 0; n < sizeof known / sizeof *known; n++) {
+        if (known[n].enables == enables && known[n].mode == mode(tim, leg)) {
+            return known[n].state;
+        }
+    }
+    cpu_fail(tim->chip->cpu, "TIM1: outputs %u of channel %d in mode %u are not modelled", (unsigned)enables,
+             leg + 1, (unsigned)mode(tim, leg));
+    return PLANT_LEG_PWM;
+}
+
+/* Without the dead-time generator between them one switch would close while the other opens. */
+static void check_change(const tim1_t *tim, int leg, plant_leg_state_t to)
+{
+    const plant_leg_state_t from = tim->chip->wiring.state[leg];
+    const bool upper = from == PLANT_LEG_UPPER || from == PLANT_LEG_HIGH;
+    const bool unsafe = (upper && to == PLANT_LEG_LOWER) ||
+                        (from == PLANT_LEG_LOW && to == PLANT_LEG_UPPER) ||
+                        (from == PLANT_LEG_LOWER && (to == PLANT_LEG_UPPER || to == PLANT_LEG_HIGH));
+    if (unsafe && tim->chip->wiring.driven[leg]) {
+        cpu_fail(tim->chip->cpu, "TIM1: channel %d goes from one switch to the other without dead time",
+                 leg + 1);
     }
 }
 
 void tim1_outputs(tim1_t *tim)
 {
     bool driven[BOARD_LEGS];
+    plant_leg_state_t state[BOARD_LEGS] = {PLANT_LEG_PWM};
     bool on = tim1_main_output(tim);
     for (int leg = 0; leg < BOARD_LEGS; leg++) {
-        uint32_t enables = board_field(tim->regs.value[TIM1_CCER / 4], 4 * leg, 3);
-        driven[leg] = on && enables == 5u;
-        if (on && (enables == 1u || enables == 4u)) {
-            cpu_fail(tim->chip->cpu, "TIM1_CCER: only one output of channel %d is on", leg + 1);
-        }
+        driven[leg] = on && board_field(tim->enables, 4 * leg, 3) != 0u;
         if (driven[leg]) {
+            state[leg] = state_of(tim, leg);
             check_leg(tim, leg);
+            check_change(tim, leg, state[leg]);
         }
     }
     if (on && !tim->armed_before) {
         check_arming(tim);
     }
     tim->armed_before = on;
-    board_drive(tim->chip, driven);
+    board_drive(tim->chip, driven, state);
+}
+
+static bool waits_for_com(const tim1_t *tim)
+{
+    return (tim->regs.value[TIM1_CR2 / 4] & CCPC) != 0u;
+}
+
+/* What CCER and CCMR say of the legs takes effect. */
+static void commutate(tim1_t *tim)
+{
+    tim->enables = tim->regs.value[TIM1_CCER / 4];
+    tim->modes[0] = tim->regs.value[TIM1_CCMR1 / 4];
+    tim->modes[1] = tim->regs.value[TIM1_CCMR2 / 4];
+    tim1_outputs(tim);
+}
+
+static void write_modes(tim1_t *tim, uint32_t offset, uint32_t before)
+{
+    const uint32_t now = tim->regs.value[offset / 4];
+    const bool waits = waits_for_com(tim);
+    const uint32_t at_once = !waits ? UINT32_MAX : offset == TIM1_CCMR2 ? OC4 : 0u;
+    if (tim->counting && ((now ^ before) & at_once) != 0u) {
+        cpu_fail(tim->chip->cpu, "TIM1: change of modes while counting is not modelled");
+    }
+    uint32_t *mode = &tim->modes[offset == TIM1_CCMR2 ? 1 : 0];
+    *mode = (*mode & ~at_once) | (now & at_once);
 }
 
 void tim1_freeze(tim1_t *tim, bool frozen)
@@ -284,13 +355,16 @@ static void write_cr1(tim1_t *tim, uint32_t before)
     }
 }
 
-/* Events by software: an update, a break. */
+/* Events by software: an update, a commutation, a break. */
 static void generate(tim1_t *tim)
 {
     uint32_t events = tim->regs.value[TIM1_EGR / 4];
     *board_register(&tim->regs, TIM1_EGR) = 0u;
     if ((events & BG) != 0u) {
         tim1_break(tim);
+    }
+    if ((events & COMG) != 0u && waits_for_com(tim)) {
+        commutate(tim);
     }
     if ((events & UG) != 0u) {
         if (tim->counting) {
@@ -321,14 +395,16 @@ static bool tim1_write(void *self, uint32_t offset, uint32_t value, uint32_t mas
         break;
     case TIM1_CCMR1:
     case TIM1_CCMR2:
+        write_modes(tim, offset, before);
+        break;
     case TIM1_CR2:
         if (tim->counting && tim->regs.value[offset / 4] != before) {
             cpu_fail(tim->chip->cpu, "TIM1: change of modes while counting is not modelled");
         }
         break;
     case TIM1_CCER:
-        if (tim->regs.value[TIM1_CCER / 4] != before) {
-            tim1_outputs(tim);
+        if (!waits_for_com(tim) && tim->regs.value[TIM1_CCER / 4] != before) {
+            commutate(tim);
         }
         break;
     case TIM1_BDTR:

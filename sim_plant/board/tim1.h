@@ -3,7 +3,8 @@
  * The counter is computed from the time, not ticked. Compare values and reload are preloaded; the repetition
  * counter takes RCR at every update event, so that with RCR = 1 the events stay at the extreme that the first
  * one had: the overflow when RCR is written between start and first overflow. A leg is driven while its pins
- * are the timer's, both its channels are enabled and the main output is; breaks switch that off at once.
+ * are the timer's, an output of its channel is enabled and the main output is; breaks switch that off at once. Outputs and
+ * modes of the legs change when they are written, or with CR2.CCPC at the next COM event by software.
  *
  * Refused on arming, because the plant could not follow: a dead time that is not the plant's, update events
  * at the underflow, another period than the plant's. Not modelled: interrupts, flags of compare channels,
@@ -17,7 +18,8 @@
 typedef struct {
     board_chip_t *chip;
     board_registers_t regs;
-    uint32_t reload, compare[4]; /* in effect */
+    uint32_t reload, compare[4]; /* in effect, */
+    uint32_t enables, modes[2];  /* as these of CCER and CCMR */
     uint32_t repetitions;        /* left until the next update event */
     bool counting, frozen;
     bool top;         /* the last update event was at the overflow ... */

@@ -30,10 +30,12 @@ typedef struct {
 #define TIM_CR1_CEN     (1U << 0)
 #define TIM_CR1_CMS     (3U << 5)
 #define TIM_CR1_ARPE    (1U << 7)
+#define TIM_CR2_CCPC    (1U << 0)
 #define TIM_CR2_MMS2    (0xFU << 20)
 #define TIM_SR_BIF      (1U << 7)
 #define TIM_SR_SBIF     (1U << 13)
 #define TIM_EGR_UG      (1U << 0)
+#define TIM_EGR_COMG    (1U << 5)
 #define TIM_EGR_BG      (1U << 7)
 #define TIM_CCMR1_OC1PE (1U << 3)
 #define TIM_CCMR1_OC1M  (7U << 4) /* the lower three of four bits */
@@ -63,7 +65,14 @@ typedef struct {
 #define TIM_AF1_BKCMP4E (1U << 4)
 
 /* values of OCxM, CMS, MMS2 */
-enum { TIM_OCM_PWM1 = 6, TIM_OCM_PWM2 = 7, TIM_CMS_CENTRE = 1, TIM_MMS2_OC4REF = 7 };
+enum {
+    TIM_OCM_LOW = 4,
+    TIM_OCM_HIGH = 5,
+    TIM_OCM_PWM1 = 6,
+    TIM_OCM_PWM2 = 7,
+    TIM_CMS_CENTRE = 1,
+    TIM_MMS2_OC4REF = 7
+};
 
 extern tim_t TIM1, TIM2;
 

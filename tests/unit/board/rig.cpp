@@ -154,6 +154,7 @@ void Chip::run_period()
     for (int leg = 0; leg < BOARD_LEGS; leg++) {
         pwm.compare[leg][0] = pwm.compare[leg][1] = chip->tim1.compare[leg];
         pwm.driven[leg] = chip->wiring.driven[leg];
+        pwm.state[leg] = chip->wiring.state[leg];
     }
     plant_set_pwm(plant, &pwm);
     plant_run_period(plant);

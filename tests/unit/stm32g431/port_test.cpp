@@ -109,41 +109,50 @@ TEST_F(Port, WritesLegsAndTrips)
     EXPECT_EQ(TIM1.CCR1, 100U);
     EXPECT_EQ(TIM1.CCR2, 200U);
     EXPECT_EQ(TIM1.CCR3, 300U);
-    EXPECT_EQ(hal->legs, TIM_CCER_CC1E | TIM_CCER_CC1NE | TIM_CCER_CC3E | TIM_CCER_CC3NE);
+    EXPECT_EQ(TIM1.CCER, TIM_CCER_CC1E | TIM_CCER_CC1NE | TIM_CCER_CC3E | TIM_CCER_CC3NE);
     EXPECT_TRUE(hal_bridge_armed(hal));
     out.trip = true;
     hal_bridge_write(hal, &out);
-    EXPECT_EQ(hal->legs, 0U);
+    EXPECT_EQ(TIM1.CCER, 0U);
     EXPECT_FALSE(hal_bridge_armed(hal));
     hal->refused = true;
     EXPECT_FALSE(hal_bridge_arm(hal));
     EXPECT_FALSE(hal_bridge_armed(hal));
 }
 
-// RM0440, PWM mode 1: the upper switch is closed while the counter is below the compare value, here above or
-// below all that it reaches. The dead-time generator stays in charge of both switches.
-TEST_F(Port, AHeldLegFollowsACompareValueOutOfReach)
+// RM0440 28.3.17 and the table of outputs. They wait for the COM event with which the next control interrupt begins.
+TEST_F(Port, EachStateOfALegHasItsOutputsAndMode)
 {
+    const struct {
+        pm_leg_t state;
+        uint32_t outputs, mode;
+    } rows[] = {{PM_LEG_OFF, 0, 6},   {PM_LEG_PWM, 5, 6},  {PM_LEG_UPPER, 1, 6},
+                {PM_LEG_LOWER, 4, 7}, {PM_LEG_HIGH, 5, 5}, {PM_LEG_LOW, 5, 4}};
     ASSERT_EQ(bridge_start(hal, &good), HAL_OK);
-    drive_out_t out = {};
-    for (auto &compare : out.compare) {
-        compare[0] = compare[1] = 1234;
+    EXPECT_EQ(TIM1.CR2 & TIM_CR2_CCPC, TIM_CR2_CCPC);
+    for (const auto &row : rows) {
+        for (uint32_t leg = 0; leg < 3; ++leg) {
+            drive_out_t out = {};
+            out.legs = static_cast<uint16_t>(PM_LEGS_PWM & ~(15U << 4 * leg)) |
+                       static_cast<uint16_t>(row.state << 4 * leg);
+            hal_bridge_write(hal, &out);
+            EXPECT_EQ(TIM1.CCER, (0x555U & ~(15U << 4 * leg)) | row.outputs << 4 * leg);
+            const uint32_t modes[] = {reg_value(TIM_CCMR1_OC1M, TIM1.CCMR1),
+                                      reg_value(TIM_CCMR1_OC2M, TIM1.CCMR1),
+                                      reg_value(TIM_CCMR2_OC3M, TIM1.CCMR2)};
+            for (uint32_t other = 0; other < 3; ++other) {
+                EXPECT_EQ(modes[other], other == leg ? row.mode : 6U);
+            }
+            EXPECT_EQ(reg_value(TIM_CCMR2_OC4M, TIM1.CCMR2), 7U);
+            EXPECT_EQ(TIM1.CCMR1 & 0x808U, 0x808U);
+            EXPECT_EQ(TIM1.CCMR2 & 0x808U, 0x808U);
+        }
     }
-    out.legs = pm_legs_of(PM_LEG_HIGH, PM_LEG_LOW, PM_LEG_OFF);
-    hal_bridge_write(hal, &out);
-    EXPECT_GT(TIM1.CCR1, TIM1.ARR);
-    EXPECT_EQ(TIM1.CCR2, 0U);
-    EXPECT_EQ(hal->legs, TIM_CCER_CC1E | TIM_CCER_CC1NE | TIM_CCER_CC2E | TIM_CCER_CC2NE);
-    out.legs = pm_legs_of(PM_LEG_OFF, PM_LEG_PWM, PM_LEG_HIGH);
-    hal_bridge_write(hal, &out);
-    EXPECT_EQ(TIM1.CCR2, 1234U);
-    EXPECT_GT(TIM1.CCR3, TIM1.ARR);
-    EXPECT_EQ(hal->legs, TIM_CCER_CC2E | TIM_CCER_CC2NE | TIM_CCER_CC3E | TIM_CCER_CC3NE);
 }
 
 TEST_F(Port, DeclaresWhatIsWired)
 {
-    EXPECT_EQ(hal_channels(hal), NEEDS_NEUTRAL | NEEDS_HELD | PM_BOOTSTRAP);
+    EXPECT_EQ(hal_channels(hal), NEEDS_NEUTRAL | NEEDS_HELD | NEEDS_ONE_SWITCH | PM_BOOTSTRAP);
 }
 
 TEST_F(Port, CurrentsAreTurned)
