@@ -8,7 +8,8 @@ enum {
     COUNTS_LEAST = 2125, /* 40 kHz: the control interrupt needs its time */
     COUNTS_SAFE = 4250,  /* in place of a refused value: everything else is timed by this clock */
     DEAD_TIME_LEAST_ns = 300,
-    BREAK_FILTER = 12, /* of BKF: 8 samples at 1/16 of the clock, 0.75 us */
+    COMMUTATE_LEAST = 510, /* 3 us: until then the control interrupt has written to what */
+    BREAK_FILTER = 12,     /* of BKF: 8 samples at 1/16 of the clock, 0.75 us */
     BREAK_LEVEL_MOST = 0x7FFF,
     DETECTOR_2_9_V = 6, /* of PLS: below it the converters' reference is wrong, too */
 };
@@ -49,6 +50,23 @@ static uint32_t modes_34(uint32_t third)
            TIM_CCMR2_OC4PE;
 }
 
+#if PM_CARRIES(NEEDS_COMMUTATE)
+/* Counts from each update event of TIM1. Its channel rises at CCR1, which is a COM event; with 0 it is always high. */
+static void configure_commutation(void)
+{
+    RCC.APB1ENR1 |= RCC_APB1ENR1_TIM3EN;
+    TIM3.CR2 = reg_field(TIM_CR2_MMS, TIM_MMS_OC1REF);
+    TIM3.SMCR = reg_field(TIM_SMCR_SMS, TIM_SMS_RESET) | reg_field(TIM_SMCR_TS, TIM_TS_TIM1);
+    TIM3.CCMR1 = reg_field(TIM_CCMR1_OC1M, TIM_OCM_PWM2) | TIM_CCMR1_OC1PE;
+    TIM3.ARR = UINT16_MAX;
+    TIM3.CCR1 = 0U;
+    TIM3.EGR = TIM_EGR_UG;
+    TIM3.CR1 = TIM_CR1_CEN;
+    TIM1.SMCR = reg_field(TIM_SMCR_TS, TIM_TS_TIM3);
+    TIM1.CR2 |= reg_field(TIM_CR2_MMS, TIM_MMS_UPDATE) | TIM_CR2_CCUS;
+}
+#endif
+
 static void configure_timer(uint32_t counts)
 {
     TIM1.CR1 = reg_field(TIM_CR1_CMS, TIM_CMS_CENTRE) | TIM_CR1_ARPE;
@@ -61,8 +79,11 @@ static void configure_timer(uint32_t counts)
     TIM1.CCR3 = 0U;
     TIM1.CCR4 = counts - 1U; /* the converters start at the centre of the zero vector */
     TIM1.CCER = 0U;
-#if PM_CARRIES(NEEDS_ONE_SWITCH)
+#if PORT_BY_COM
     TIM1.CR2 |= TIM_CR2_CCPC; /* from now on states of legs wait for a COM event */
+#endif
+#if PM_CARRIES(NEEDS_COMMUTATE)
+    configure_commutation();
 #endif
     TIM1.AF1 = TIM_AF1_BKINE | TIM_AF1_BKCMP1E | TIM_AF1_BKCMP2E | TIM_AF1_BKCMP4E;
     TIM1.RCR = 0U;
@@ -112,6 +133,12 @@ hal_status_t bridge_start(hal_t *hal, const hal_config_t *config)
     configure_comparators(level);
     configure_timer(counts);
     hal->legs = 0U;
+#if PORT_BY_COM
+    hal->written = PM_LEGS_OFF;
+#endif
+#if PM_CARRIES(NEEDS_COMMUTATE)
+    hal->then = PM_LEGS_OFF;
+#endif
     hal->bridge = reg_field(TIM_BDTR_DTG, dead_time) | TIM_BDTR_OSSI | TIM_BDTR_OSSR | TIM_BDTR_BKE |
                   TIM_BDTR_BKP | reg_field(TIM_BDTR_BKF, BREAK_FILTER);
     /* After this only the main output enable can change, until the next reset. */
@@ -127,7 +154,7 @@ void bridge_run(void)
     TIM1.RCR = 1U;
 }
 
-#if PM_CARRIES(NEEDS_ONE_SWITCH)
+#if PORT_BY_COM
 /* Outputs and mode of a channel by the state of its leg. Two outputs are complementary, with dead time; one alone follows
  * the channel, the lower switch's too: in mode 2 it is on where the upper one would be off. */
 static const struct {
@@ -144,12 +171,25 @@ static const struct {
 /* For the next COM event. */
 static void write_states(uint32_t legs)
 {
+    if (legs == port_hal.written) {
+        return;
+    }
     const uint32_t a = legs & 7U, b = legs >> 4U & 7U, c = legs >> 8U & 7U;
     TIM1.CCER =
         OF_STATE[a].outputs | (uint32_t)OF_STATE[b].outputs << 4U | (uint32_t)OF_STATE[c].outputs << 8U;
     TIM1.CCMR1 = modes_12(OF_STATE[a].mode, OF_STATE[b].mode);
     TIM1.CCMR2 = modes_34(OF_STATE[c].mode);
-    port_hal.legs = legs;
+    port_hal.written = legs;
+}
+
+/* Of the last period a commutation is over, of this one it is still to come. */
+void bridge_begin_period(void)
+{
+    write_states(port_hal.legs);
+    TIM1.EGR = TIM_EGR_COMG;
+#if PM_CARRIES(NEEDS_COMMUTATE)
+    write_states(port_hal.then);
+#endif
 }
 
 void hal_bridge_write(hal_t *hal, const drive_out_t *out)
@@ -158,13 +198,19 @@ void hal_bridge_write(hal_t *hal, const drive_out_t *out)
     TIM1.CCR1 = out->compare[0][0];
     TIM1.CCR2 = out->compare[1][0];
     TIM1.CCR3 = out->compare[2][0];
+    port_hal.legs = out->legs;
+#if PM_CARRIES(NEEDS_COMMUTATE)
+    const uint32_t at = out->instants.commutate_at;
+    TIM3.CCR1 = at != 0U && at < COMMUTATE_LEAST ? COMMUTATE_LEAST : at;
+    port_hal.then = at != 0U ? out->instants.then : out->legs;
+#endif
     if (out->trip != 0U) {
         TIM1.BDTR = port_hal.bridge;
-        write_states(PM_LEGS_OFF);
-    } else if (out->legs != port_hal.legs) {
-        write_states(out->legs);
-    } else {
-        /* most periods */
+        port_hal.legs = PM_LEGS_OFF;
+#if PM_CARRIES(NEEDS_COMMUTATE)
+        port_hal.then = PM_LEGS_OFF;
+#endif
+        write_states(PM_LEGS_OFF); /* for a commutation of this period */
     }
 }
 #else

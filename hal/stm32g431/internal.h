@@ -40,6 +40,7 @@ void system_watchdog_period(uint32_t time_ms);
 /* --- by peripheral: configured, not running */
 hal_status_t bridge_start(hal_t *hal, const hal_config_t *config);
 void bridge_run(void);
+void bridge_begin_period(void); /* in programs with PORT_BY_COM */
 void measure_start(void);
 void measure_run(hal_t *hal);
 hal_status_t can_start(const hal_config_t *config);

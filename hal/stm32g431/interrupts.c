@@ -6,8 +6,8 @@
 
 void port_control(void)
 {
-#if PM_CARRIES(NEEDS_ONE_SWITCH)
-    TIM1.EGR = TIM_EGR_COMG;
+#if PORT_BY_COM
+    bridge_begin_period();
 #else
     TIM1.CCER = port_hal.legs;
 #endif

@@ -18,8 +18,11 @@
 #endif
 
 /* As wired and programmed today, beside three leg currents and the DC-link voltage; both halves of a period alike. A
- * second sample and commutation within the period are within TIM1 and the converters and not yet programmed. */
-#define PORT_CHANNELS (PORT_AT_PB11 | NEEDS_HELD | NEEDS_ONE_SWITCH)
+ * second sample is within TIM1 and the converters and not yet programmed. */
+#define PORT_CHANNELS (PORT_AT_PB11 | NEEDS_HELD | NEEDS_ONE_SWITCH | NEEDS_COMMUTATE)
+
+/* States of legs are written ahead and change by COM events. */
+#define PORT_BY_COM PM_CARRIES(NEEDS_ONE_SWITCH | NEEDS_COMMUTATE)
 
 #define PORT_CONSOLE_SIZE 128U /* powers of two */
 #define PORT_CAN_FRAMES   16U
@@ -41,9 +44,15 @@ enum { PORT_TEMPERATURE, PORT_DIAL, PORT_REFERENCE, PORT_TURNS };
 struct hal {
     app_t *app;
     bool up, crystal;
-    bool slow;       /* the PLL has failed: the clock after reset, too slow for the bus */
-    bool sound;      /* flash holds what was built */
-    uint32_t legs;   /* of the coming period: CCER, or with PWM on one switch PM_LEGS_... */
+    bool slow;     /* the PLL has failed: the clock after reset, too slow for the bus */
+    bool sound;    /* flash holds what was built */
+    uint32_t legs; /* of the coming period: CCER, or with PORT_BY_COM PM_LEGS_... */
+#if PORT_BY_COM
+    uint32_t written; /* PM_LEGS_... of the next COM event */
+#endif
+#if PM_CARRIES(NEEDS_COMMUTATE)
+    uint32_t then; /* PM_LEGS_... from the instant of the coming period on, or legs */
+#endif
     uint32_t bridge; /* BDTR with everything but the main output enable */
     bool refused;    /* the bridge cannot be armed */
     hal_reset_t reset;

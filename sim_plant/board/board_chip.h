@@ -13,6 +13,7 @@
 #include "sim_plant/board/rcc.h"
 #include "sim_plant/board/tim1.h"
 #include "sim_plant/board/tim2.h"
+#include "sim_plant/board/tim3.h"
 #include "sim_plant/board/usart.h"
 
 #define BOARD_FIXED_DEVICES 24
@@ -32,6 +33,7 @@ struct board_chip {
     gpio_t gpio;
     tim1_t tim1;
     tim2_t tim2;
+    tim3_t tim3;
     adc_t adc;
     analog_t analog;
     fdcan_t fdcan;

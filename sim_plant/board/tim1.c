@@ -12,6 +12,7 @@
 #define COMG 0x20u
 #define BG   0x80u
 #define CCPC 0x1u
+#define CCUS 0x4u
 #define OSSR 0x800u
 #define CMS1 0x20u
 #define ARPE 0x80u
@@ -21,11 +22,14 @@
 #define PWM_1       6u
 #define PWM_2       7u
 
-#define OC4 0xFF00u /* in CCMR2 */
+#define OC4           0xFF00u /* in CCMR2 */
+#define UPDATE_IS_OUT 2u      /* MMS */
+#define ITR2          2u      /* TS: TIM3 */
 
 static const board_register_t list[] = {
     {TIM1_CR1, "CR1", 0, TIM1_CEN | CMS1 | ARPE, 0x10u},
-    {TIM1_CR2, "CR2", 0, 0x00F00000u | CCPC, 0},
+    {TIM1_CR2, "CR2", 0, 0x00F00070u | CCUS | CCPC, 0},
+    {TIM1_SMCR, "SMCR", 0, 0x70u, 0},
     {TIM1_SR, "SR", 0, TIM1_UIF, TIM1_BIF | TIM1_SBIF},
     {TIM1_EGR, "EGR", 0, UG | COMG | BG, 0},
     {TIM1_CCMR1, "CCMR1", 0, 0x00007878u, 0},
@@ -203,6 +207,9 @@ void tim1_update(tim1_t *tim)
     if (changed) {
         plan_trigger(tim, tim->extreme);
     }
+    if (board_field(tim->regs.value[TIM1_CR2 / 4], 4, 3) == UPDATE_IS_OUT) {
+        tim3_restart(&tim->chip->tim3, tim->extreme, tim->update);
+    }
     if (tim->updates++ == 0u && tim1_main_output(tim)) {
         check_carrier(tim);
     }
@@ -294,6 +301,14 @@ static void commutate(tim1_t *tim)
     tim->modes[0] = tim->regs.value[TIM1_CCMR1 / 4];
     tim->modes[1] = tim->regs.value[TIM1_CCMR2 / 4];
     tim1_outputs(tim);
+}
+
+void tim1_triggered(tim1_t *tim)
+{
+    const bool com = (tim->regs.value[TIM1_CR2 / 4] & CCUS) != 0u;
+    if (com && waits_for_com(tim) && board_field(tim->regs.value[TIM1_SMCR / 4], 4, 3) == ITR2) {
+        commutate(tim);
+    }
 }
 
 static void write_modes(tim1_t *tim, uint32_t offset, uint32_t before)

@@ -4,7 +4,7 @@
  * counter takes RCR at every update event, so that with RCR = 1 the events stay at the extreme that the first
  * one had: the overflow when RCR is written between start and first overflow. A leg is driven while its pins
  * are the timer's, an output of its channel is enabled and the main output is; breaks switch that off at once. Outputs and
- * modes of the legs change when they are written, or with CR2.CCPC at the next COM event by software.
+ * modes of the legs change when they are written, or with CR2.CCPC at the next COM event, by software or by TIM3.
  *
  * Refused on arming, because the plant could not follow: a dead time that is not the plant's, update events
  * at the underflow, another period than the plant's. Not modelled: interrupts, flags of compare channels,
@@ -42,6 +42,7 @@ uint32_t tim1_period(const tim1_t *tim);      /* cycles from one update event to
 void tim1_update(tim1_t *tim);                /* its cycle has come */
 bool tim1_follows_plant(const tim1_t *tim);   /* its update events are ends of the plant's periods */
 
+void tim1_triggered(tim1_t *tim);    /* by TIM3 */
 void tim1_outputs(tim1_t *tim);      /* pins have changed */
 void tim1_break(tim1_t *tim);        /* a comparator has acted in the plant */
 void tim1_check_break(tim1_t *tim);  /* a break input may have changed */

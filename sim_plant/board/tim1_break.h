@@ -7,6 +7,7 @@
 enum {
     TIM1_CR1 = 0x00,
     TIM1_CR2 = 0x04,
+    TIM1_SMCR = 0x08,
     TIM1_SR = 0x10,
     TIM1_EGR = 0x14,
     TIM1_CCMR1 = 0x18,

@@ -1,4 +1,4 @@
-/* Timers: RM0440 28 (TIM1) and 29 (TIM2). */
+/* Timers: RM0440 28 (TIM1) and 29 (TIM2, TIM3). */
 #ifndef REGISTERS_TIM_H
 #define REGISTERS_TIM_H
 
@@ -31,6 +31,10 @@ typedef struct {
 #define TIM_CR1_CMS     (3U << 5)
 #define TIM_CR1_ARPE    (1U << 7)
 #define TIM_CR2_CCPC    (1U << 0)
+#define TIM_CR2_CCUS    (1U << 2)
+#define TIM_CR2_MMS     (7U << 4)
+#define TIM_SMCR_SMS    (7U << 0) /* the lower three of four bits */
+#define TIM_SMCR_TS     (7U << 4) /* the lower three of five bits */
 #define TIM_CR2_MMS2    (0xFU << 20)
 #define TIM_SR_BIF      (1U << 7)
 #define TIM_SR_SBIF     (1U << 13)
@@ -74,6 +78,9 @@ enum {
     TIM_MMS2_OC4REF = 7
 };
 
-extern tim_t TIM1, TIM2;
+/* of MMS, SMS and TS */
+enum { TIM_MMS_UPDATE = 2, TIM_MMS_OC1REF = 4, TIM_SMS_RESET = 4, TIM_TS_TIM1 = 0, TIM_TS_TIM3 = 2 };
+
+extern tim_t TIM1, TIM2, TIM3;
 
 #endif

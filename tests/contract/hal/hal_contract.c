@@ -305,6 +305,36 @@ static void check_one_switch(run_t *run)
 }
 #endif
 
+#if PM_CARRIES(NEEDS_COMMUTATE)
+/* Low at the start of the period, high at its end, where the terminals are measured. */
+static void check_commutate(run_t *run)
+{
+    struct app *app = &the_app;
+    app->out.legs = PM_LEGS_ALL(PM_LEG_LOW);
+    app->out.instants.then = PM_LEGS_ALL(PM_LEG_HIGH);
+    for (size_t early = 0; early < 2; early++) {
+        app->out.instants.commutate_at =
+            early != 0 ? 1U : (uint16_t)(run->contract->config.timer_counts + 100U);
+        wait_us(run, 1000);
+        check(run, "stays armed while the legs commutate", hal_bridge_armed(run->hal), 0);
+#if PM_CARRIES(NEEDS_TERMINALS)
+        const bool seen = app->in.v_dc > 16000U && (hal_channels(run->hal) & NEEDS_TERMINALS) != 0U;
+        for (size_t leg = 0; seen && leg < DRIVE_LEGS; leg++) {
+            check_code(run, "a terminal that has become high", app->in.more.v_terminal[leg], 8000,
+                       UINT16_MAX);
+        }
+#endif
+    }
+    app->out.instants.commutate_at = 0;
+    wait_us(run, 1000);
+#if PM_CARRIES(NEEDS_TERMINALS)
+    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        check_code(run, "a terminal that no longer does", app->in.more.v_terminal[leg], 0, 2000);
+    }
+#endif
+}
+#endif
+
 static void check_legs(run_t *run)
 {
     const uint32_t channels = hal_channels(run->hal);
@@ -322,6 +352,11 @@ static void check_legs(run_t *run)
 #if PM_CARRIES(NEEDS_ONE_SWITCH)
     if ((channels & NEEDS_ONE_SWITCH) != 0U) {
         check_one_switch(run);
+    }
+#endif
+#if PM_CARRIES(NEEDS_COMMUTATE)
+    if ((channels & NEEDS_COMMUTATE) != 0U) {
+        check_commutate(run);
     }
 #endif
     (void)channels;

@@ -190,6 +190,47 @@ TEST_F(Tim1, StatesOfLegsWaitForTheCommutation)
     EXPECT_EQ(c.take_error(), "");
 }
 
+// TIM3 counts from TIM1's update event: what was written ahead takes effect that many cycles later, once.
+TEST_F(Tim1, ACommutationIsAtItsCount)
+{
+    constexpr uint32_t tim3 = 0x40000400, smcr = rig::tim1 + 8;
+    for (const bool runs : {true, false}) {
+        Chip chip;
+        chip.supply_clocks();
+        chip.clock_170MHz();
+        chip.pins();
+        chip.gates();
+        chip.set(rig::rcc + 0x58, 2);
+        chip.write(tim3 + 4, 0x40);
+        chip.write(tim3 + 8, 4);
+        chip.write(tim3 + 0x18, 0x78);
+        chip.write(tim3, runs ? 1 : 0);
+        chip.write(smcr, 0x20);
+        chip.set(rig::tim1 + 4, 0x25);
+        chip.start_timer();
+        chip.set(bdtr, moe);
+        chip.run_period();
+        chip.write(ccer, 0x055);
+        chip.write(egr, 0x20);
+        chip.write(tim3 + 0x34, 6000);
+        chip.write(ccer, 0x550);
+        chip.run_period();
+        chip.run(5999);
+        EXPECT_TRUE(chip.chip->wiring.driven[0]);
+        EXPECT_FALSE(chip.chip->wiring.driven[2]);
+        chip.run(1);
+        EXPECT_EQ(chip.chip->wiring.driven[0], !runs);
+        EXPECT_EQ(chip.chip->wiring.driven[2], runs);
+        chip.write(tim3 + 0x34, 0);
+        chip.write(ccer, 0x555);
+        chip.run_period();
+        chip.run_period();
+        EXPECT_EQ(chip.chip->wiring.driven[2], runs);
+        EXPECT_EQ(chip.chip->wiring.driven[0], !runs);
+        EXPECT_EQ(chip.take_error(), "");
+    }
+}
+
 TEST_F(Tim1, FromOneSwitchToTheOtherNeedsAPeriodBetween)
 {
     const struct {

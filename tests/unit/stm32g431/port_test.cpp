@@ -109,6 +109,7 @@ TEST_F(Port, WritesLegsAndTrips)
     EXPECT_EQ(TIM1.CCR1, 100U);
     EXPECT_EQ(TIM1.CCR2, 200U);
     EXPECT_EQ(TIM1.CCR3, 300U);
+    bridge_begin_period();
     EXPECT_EQ(TIM1.CCER, TIM_CCER_CC1E | TIM_CCER_CC1NE | TIM_CCER_CC3E | TIM_CCER_CC3NE);
     EXPECT_TRUE(hal_bridge_armed(hal));
     out.trip = true;
@@ -136,6 +137,7 @@ TEST_F(Port, EachStateOfALegHasItsOutputsAndMode)
             out.legs = static_cast<uint16_t>(PM_LEGS_PWM & ~(15U << 4 * leg)) |
                        static_cast<uint16_t>(row.state << 4 * leg);
             hal_bridge_write(hal, &out);
+            bridge_begin_period();
             EXPECT_EQ(TIM1.CCER, (0x555U & ~(15U << 4 * leg)) | row.outputs << 4 * leg);
             const uint32_t modes[] = {reg_value(TIM_CCMR1_OC1M, TIM1.CCMR1),
                                       reg_value(TIM_CCMR1_OC2M, TIM1.CCMR1),
@@ -150,9 +152,40 @@ TEST_F(Port, EachStateOfALegHasItsOutputsAndMode)
     }
 }
 
+TEST_F(Port, ACommutationHasItsInstantAndItsLegs)
+{
+    ASSERT_EQ(bridge_start(hal, &good), HAL_OK);
+    drive_out_t out = {};
+    out.legs = PM_LEGS_PWM;
+    out.instants.then = PM_LEGS_ALL(PM_LEG_LOWER);
+    for (const uint32_t at : {1U, 509U, 510U, 4251U, 8499U}) {
+        out.instants.commutate_at = static_cast<uint16_t>(at);
+        hal_bridge_write(hal, &out);
+        EXPECT_EQ(TIM3.CCR1, std::max<uint32_t>(at, 510));
+        TIM1.EGR = 0;
+        bridge_begin_period();
+        EXPECT_EQ(TIM1.EGR, TIM_EGR_COMG);
+        EXPECT_EQ(TIM1.CCER, 0x444U); // waits for the instant
+    }
+    out.instants.commutate_at = 0;
+    hal_bridge_write(hal, &out);
+    bridge_begin_period();
+    EXPECT_EQ(TIM3.CCR1, 0U);
+    EXPECT_EQ(TIM1.CCER, 0x555U);
+    out.instants.commutate_at = 4000;
+    hal_bridge_write(hal, &out);
+    bridge_begin_period();
+    out.trip = 1; // ahead of the instant
+    hal_bridge_write(hal, &out);
+    EXPECT_EQ(TIM1.CCER, 0U);
+    bridge_begin_period();
+    EXPECT_EQ(TIM1.CCER, 0U);
+}
+
 TEST_F(Port, DeclaresWhatIsWired)
 {
-    EXPECT_EQ(hal_channels(hal), NEEDS_NEUTRAL | NEEDS_HELD | NEEDS_ONE_SWITCH | PM_BOOTSTRAP);
+    EXPECT_EQ(hal_channels(hal),
+              NEEDS_NEUTRAL | NEEDS_HELD | NEEDS_ONE_SWITCH | NEEDS_COMMUTATE | PM_BOOTSTRAP);
 }
 
 TEST_F(Port, CurrentsAreTurned)
