@@ -516,7 +516,6 @@ TEST(Config, PulsesAreAsLongAsTheirFluxAsks)
     }
 }
 
-// Without dead time there is nothing that the capacitance of a leg could give back.
 TEST(Config, DcLinkPulsesNeedALinkThatShowsThem)
 {
     const auto refused = [](int32_t R_mohm, int32_t C_nF) {
@@ -533,6 +532,24 @@ TEST(Config, DcLinkPulsesNeedALinkThatShowsThem)
     EXPECT_EQ(refused(10000, 1000000000).param, DRIVE_PARAM_dc_capacitance);
 }
 
+TEST(Config, ACarrierThatTheLegsCannotMakeAboutHalfDutyIsRefused)
+{
+    const auto refused = [](int32_t v_injection_mV) {
+        drive_params_t p;
+        drive_params_default(&p);
+        p.start_method = 1;
+        p.position_find = 2;
+        p.polarity = 3;
+        p.injection = 4;
+        p.v_injection = v_injection_mV;
+        drive_config_t c = {};
+        return drive_configure(&c, &p, PM_CHANNELS);
+    };
+    EXPECT_TRUE(refused(100000).ok);
+    EXPECT_EQ(refused(200000).param, DRIVE_PARAM_v_injection);
+}
+
+// Without dead time there is nothing that the capacitance of a leg could give back.
 TEST(Config, CapacitanceOfALegNeedsADeadTime)
 {
     const auto far = [](double dead_time_s) {

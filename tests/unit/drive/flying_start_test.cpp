@@ -404,6 +404,22 @@ TEST(FlyingStart, BrakesToAStandstill)
     }
 }
 
+// Where neither source sees it, a vector along its d-axis goes on with it.
+TEST(FlyingStart, ASlowRotorWithoutInjectionIsHeldByAVector)
+{
+    for (const double speed : {0.06, -0.06}) {
+        drive_params_t p = spm_params();
+        p.L_d = p.L_q; // as told: nothing to inject for
+        p.L_dh_rated = p.L_qh_rated;
+        Catch x(spm(), p, speed * 41.888);
+        x.look();
+        ASSERT_EQ(drive_status(&x.drive())->state, DRIVE_RUNNING) << speed;
+        ASSERT_EQ(x.drive().stage, STAGE_OPEN_LOOP) << speed;
+        EXPECT_LE(std::abs(wrapped(x.truth().theta_e_rad - rad(x.drive().theta_open))), kAngle_rad) << speed;
+        EXPECT_GT(speed * x.drive().omega_open, 0) << speed;
+    }
+}
+
 // --- The drive without a motor ---------------------------------------------------------------------------------------
 
 direct::Drive calibrated(uint32_t channels, drive_mode_t mode)
