@@ -81,10 +81,11 @@ struct drive {
 
     uint16_t state_ms; /* since the state or stage was entered */
     uint16_t stall_ms, lost_ms, sum_ms;
-    uint16_t still_ms; /* standstill while stopping */
-    uint16_t agree_ms; /* observer and imposed angle turn alike */
-    uint16_t wait_ms;  /* for that, where the observer should */
-    uint16_t rest_ms;  /* until the vector turns once more */
+    uint16_t still_ms;  /* standstill while stopping */
+    uint16_t agree_ms;  /* observer and imposed angle turn alike */
+    uint16_t wait_ms;   /* for that, where the observer should */
+    uint16_t rest_ms;   /* until the vector turns once more */
+    uint16_t settle_ms; /* until the voltage shows the rotor again */
     follow_t follow;
     PM_IN_IMAGE(six_step, uint16_t block_ms; /* in STAGE_SIX_STEP */
                 uint8_t block_tries;         /* to find synchronism again */
