@@ -41,6 +41,7 @@ struct drive {
     bool round;   /* the start has found no saliency: without injection until the next one */
     bool tried;   /* open loop: once more, with i_max */
     bool references_ready; /* the command's references are in per-unit */
+    uint8_t settle_ms;     /* open loop: until the voltage shows the rotor again */
     pm_dir_t ahead;        /* one and a half periods of rotation: from the sample to where the voltage acts */
     pm_unit_t v_share;     /* share of v_dc for current control */
     pm_ab_t v_acting;      /* commanded at k-1: acts over [k, k+1) */
@@ -81,11 +82,10 @@ struct drive {
 
     uint16_t state_ms; /* since the state or stage was entered */
     uint16_t stall_ms, lost_ms, sum_ms;
-    uint16_t still_ms;  /* standstill while stopping */
-    uint16_t agree_ms;  /* observer and imposed angle turn alike */
-    uint16_t wait_ms;   /* for that, where the observer should */
-    uint16_t rest_ms;   /* until the vector turns once more */
-    uint16_t settle_ms; /* until the voltage shows the rotor again */
+    uint16_t still_ms; /* standstill while stopping */
+    uint16_t agree_ms; /* observer and imposed angle turn alike */
+    uint16_t wait_ms;  /* for that, where the observer should */
+    uint16_t rest_ms;  /* until the vector turns once more */
     follow_t follow;
     PM_IN_IMAGE(six_step, uint16_t block_ms; /* in STAGE_SIX_STEP */
                 uint8_t block_tries;         /* to find synchronism again */

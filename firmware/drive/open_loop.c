@@ -23,8 +23,8 @@ static void begin(drive_t *drive)
     drive->emf_open = 0;
     drive->agree_ms = 0;
     drive->wait_ms = 0;
-    drive->settle_ms = 0;
     if (PM_HAS(load_current)) {
+        drive->settle_ms = 0;
         drive->rest_ms = 0;
         drive->tried = false;
     }
@@ -70,7 +70,9 @@ void open_loop_resume(drive_t *drive)
                     drive->omega_ramp);
     follow_resume(&drive->follow);
     begin(drive);
-    drive->settle_ms = SETTLE_MS;
+    if (PM_HAS(load_current)) {
+        drive->settle_ms = SETTLE_MS;
+    }
 }
 
 static void hand_over(drive_t *drive)
@@ -166,7 +168,7 @@ static void damp(drive_t *drive)
     const pm_q_t steady = is_fast(drive) ? drive->emf_open : 0; /* what R, L and psi_m are not known to */
     const pm_q_t emf = emf_of_speed(drive) - pm_mul(drive->omega_ramp, c->machine.psi_m);
     const pm_q_t seen = steady + pm_clamp(emf - steady, -v, v);
-    if (drive->settle_ms > 0U) {
+    if (PM_HAS(load_current) && drive->settle_ms > 0U) {
         drive->emf_open = seen;
     }
     const pm_q_t swing = seen - pm_lp1(&drive->emf_open, seen, c->open_loop.k_swing);
@@ -213,7 +215,7 @@ static void watch(drive_t *drive)
                             .i = drive->i_open,
                             .v_dc = drive->status.v_dc,
                             .turn = pm_abs(drive->turn_open) / PER_TURN * (int32_t)c->slow_divider};
-    if (drive->settle_ms > 0U) {
+    if (PM_HAS(load_current) && drive->settle_ms > 0U) {
         drive->settle_ms--;
         follow_settle(&drive->follow, &c->machine, &in);
         return;
