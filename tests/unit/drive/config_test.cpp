@@ -234,7 +234,7 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
         {"h_d_inverse", c.position.injection.pulsating_square.h_d_inverse, 20, I * L_d / flux},
         {"pulse duty", c.pulses.duty, 28, exact / std::round(exact)},
         {"i_zero", c.pulses.i_zero, 28, 5 * 5e-3 / I},
-        {"y_min", c.pulses.y_min, 28, 0.75 * (L_q - L_d) / L_q * 4 / I},
+        {"s_min", c.pulses.s_min, 28, 0.5 * (L_q - L_d) / (L_q + L_d)},
         {"i_noise", c.pulses.i_noise, 28, 5e-3 / I},
         {"i_bridge", c.pulses.i_bridge, 28, 4.0 / 3 * std::round(exact) * 2e-6 * 300 / L_d / I},
         {"open-loop i", c.open_loop.i, 28, 2 / I},
@@ -703,7 +703,7 @@ Names must_be_positive(const drive_config_t &c)
         x.push_back({"pulse periods", c.pulses.periods});
         x.push_back({"pulse duty", c.pulses.duty});
         x.push_back({"pulse timeout beyond the pulse", c.pulses.timeout - c.pulses.periods});
-        x.push_back({"y_min", c.pulses.y_min});
+        x.push_back({"s_min", c.pulses.s_min});
     }
     return x;
 }

@@ -16,6 +16,7 @@ STEPS = 4096    # of the converter
 INJECTION_HZ = 25.0  # of the position by injection: slow enough for the noise of the smallest answer that leads
 LAG = 0.12           # rad that the estimate may be behind an acceleration
 STALL_S = 0.6
+HAND_OVER = 0.08     # of rated speed: without injection, where nothing asks for more
 SPEED_MOST = 0.4     # of rated speed: hand-over of a machine whose EMF is small at any speed
 
 # Why each value is what it is, in a line.
@@ -128,7 +129,7 @@ def _hand_over(x, i_open, leads, tolerance):
     if leads:
         return 0.15 * rated, 0.27 * rated
     seen = (_lost(x) + tolerance / 0.3 * x["R_s"] * i_open) / (x["psi_m"] * x["pole_pairs"])
-    high = min(max(0.08 * rated, seen), SPEED_MOST * rated)
+    high = min(max(HAND_OVER * rated, seen), SPEED_MOST * rated)
     return max(0.04 * rated, 0.5 * high), high
 
 
