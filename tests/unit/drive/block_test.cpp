@@ -206,11 +206,33 @@ TEST(Block, AStopSwitchesOffAtTheLowerLimit)
         x.speed_rel(0.2);
         x.run_s(1.7);
         x.stop();
-        x.run_s(1.5);
+        for (int ms = 0; ms < 1500 && drive_status(&x.drive())->state != DRIVE_OFF; ++ms) {
+            x.run_s(1e-3);
+        }
         EXPECT_EQ(drive_status(&x.drive())->state, DRIVE_OFF);
+        if (acceleration < 100000) {
+            EXPECT_NEAR(x.omega_rel, 0.75 * 30 / kRated_rad_s, 0.01);
+        }
         EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
         EXPECT_FALSE(x.driven());
     }
+}
+
+// Slower than three quarters of six_step_speed is no reason to end while the command wants more.
+TEST(Block, OnceItFollowsItStays)
+{
+    Fan x;
+    x.params().six_step_speed = 100000;
+    x.enable();
+    x.speed_rel(0.4);
+    bool follows = false;
+    for (int ms = 0; ms < 1300; ++ms) {
+        x.run_s(1e-3);
+        const bool six_step = x.drive().stage == STAGE_SIX_STEP;
+        EXPECT_TRUE(six_step || !follows) << ms;
+        follows = follows || six_step;
+    }
+    EXPECT_NEAR(x.omega_rel, 0.4, 0.01);
 }
 
 // With diodes for the off time, where the voltage says nothing of the speed.
@@ -393,6 +415,15 @@ drive_result_t verdict(const drive_params_t &p)
     static drive_config_t c;
     c = {};
     return drive_configure(&c, &p, PM_CHANNELS);
+}
+
+TEST(Block, BlindIsTheTurnInBlankingAndAPeriod)
+{
+    Fan x;
+    drive_config_t c = {};
+    ASSERT_TRUE(drive_configure(&c, &x.params(), PM_CHANNELS).ok);
+    const double base_1_s = c.block.blind / double(PM_ONE) / (16e-6 + 1.0 / 20e3);
+    EXPECT_NEAR(c.block.omega_on / double(PM_ONE) * base_1_s, 4 * 30, 0.1); // electrical
 }
 
 TEST(Block, WhatItCannotDoIsRefused)

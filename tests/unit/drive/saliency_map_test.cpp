@@ -40,6 +40,7 @@ class Bench
     void run_s(double time_s)
     {
         for (int k = 0; k < std::lround(time_s * 1e4) && report().state <= COMMISSIONING_RUNNING; ++k) {
+            EXPECT_LT(report().progress, 100);
             sim_loop_step(&loop);
         }
     }
