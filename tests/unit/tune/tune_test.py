@@ -144,6 +144,16 @@ class Tune(unittest.TestCase):
             line = next(line for line in text.splitlines() if line.strip().startswith("f_pwm_Hz"))
             self.assertIn("60 kHz would have less ripple, but dead time then takes 19 V", line)
 
+    def test_a_swing_below_dead_time_is_damped_less(self):
+        for name in ("hub motor", "60,000 r/min spindle"):
+            tuned = yaml.safe_load(self.tune(motor(name)).stdout)
+            d, b = tuned["drive"], tuned["inverter"]
+            lost = b["v_switch_V"] + b["dead_time_s"] * b["f_pwm_Hz"] * tuned["rated"]["v_dc_V"]
+            frequency = math.sqrt(1.5 * d["pole_pairs"] ** 2 * d["psi_m"] * d["i_open_loop"] / d["J"])
+            share = d["psi_m"] * frequency / lost
+            self.assertEqual(share < 0.4, name != "hub motor")
+            self.assertAlmostEqual(d["open_loop_damping"], 0.7 * min(1, share / 0.4), delta=0.001)
+
     def test_a_field_that_turns_fast_keeps_its_periods(self):
         """13 of a turn at the speed that trips, whatever dead time takes."""
         told = motor("60,000 r/min spindle")
