@@ -22,10 +22,10 @@ pm_procedure_t basic_pulses_step(basic_pulses_t *self, const pulses_config_t *co
     return self->train.pulse < PULSES ? PM_RUNNING : PM_DONE;
 }
 
-/* y of six vectors is 6 I_2 e^{j 2 theta}, here 2 I_2; w is half as much again. */
+/* w is two thirds of that of six vectors. */
 primary_config_t basic_pulses_limits(const pulses_config_t *config)
 {
-    return (primary_config_t){.y_min = config->y_min / 3,
+    return (primary_config_t){.s_min = config->s_min,
                               .pole = {.bridge = pm_mul(PM_Q(2.0 / 3), config->i_bridge),
                                        .noise = pm_max(pm_mul(PM_Q(1.155), config->i_noise), 1),
                                        .reversed = config->reversed}};

@@ -4,8 +4,8 @@
 
 #define NO_SECTOR 6
 #define SECTOR    PM_TURN(1.0 / 12)
-/* X of the machine whose y is |y|, six vectors, and the noise of X. */
-#define X_PER_Y     PM_Q(1.155)
+/* X of the machine whose y is |y|, six vectors, inverse, and the noise of X. */
+#define Y_PER_X     PM_Q(0.866)
 #define X_PER_NOISE PM_Q(3.5)
 
 void boundary_detection_reset(boundary_detection_t *self)
@@ -62,15 +62,17 @@ static pm_procedure_t locate(boundary_detection_t *self, const pulses_config_t *
     responses(&self->pulses.train, x);
     const pm_ab_t vector = pm_clarke((pm_abc_t){.a = x[0], .b = x[1], .c = x[2]});
     const pm_q_t amplitude = pm_hypot(vector.alpha, vector.beta);
-    if (amplitude < pm_mul(X_PER_Y, config->y_min)) {
-        return PM_FAILED_SALIENCY;
+    found->margin = pulses_margin(amplitude, pm_mul(X_PER_NOISE, config->i_noise));
+    const pm_procedure_t result = pulses_salient(pm_mul(Y_PER_X, amplitude), pulses_sum(&self->pulses.train),
+                                                 config->s_min, found->margin);
+    if (result != PM_DONE) {
+        return result;
     }
     const uint32_t sector = sector_of(x);
     if (sector == NO_SECTOR) {
         return PM_FAILED_UNEVEN;
     }
     found->theta = angle(own, sector, x, amplitude);
-    found->margin = pulses_margin(amplitude, pm_mul(X_PER_NOISE, config->i_noise));
     return primary_polarity(self->pulses.difference, &limits, found);
 }
 

@@ -40,7 +40,7 @@ void make_dc_link_pulses(maker_t *m, const pulses_config_t *pulses, dc_link_puls
         mul3(pm_num_div(mul3(real(pulses->duty), R, settled(pm_num_div(length, time))), m->impedance),
              pm_num(repeats), pm_num(1));
     const primary_config_t currents = basic_pulses_limits(pulses);
-    c->limits.y_min = fixed(m, pm_num_mul(k, real(currents.y_min)), Q_BITS, DRIVE_PARAM_dc_link_repeats);
+    c->limits.s_min = currents.s_min;
     c->limits.pole.bridge =
         fixed(m, pm_num_mul(k, real(currents.pole.bridge)), Q_BITS, DRIVE_PARAM_dc_link_repeats);
     /* 0.6 of a step of a 12-bit converter; sqrt(1 + 1/4) of it in a drop, 1.155 of that in y */

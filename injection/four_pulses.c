@@ -82,8 +82,10 @@ static pm_procedure_t locate(four_pulses_t *self, const pulses_config_t *config)
     pulses_found_t *found = &self->train.found;
     self->y = pulses_saliency(&self->train);
     const pm_q_t length = pm_hypot(self->y.alpha, self->y.beta);
-    if (length < config->y_min / 2) {
-        return PM_FAILED_SALIENCY;
+    const pm_sigma_t saliency = pulses_margin(length, pm_mul(PM_Q(2.12), config->i_noise));
+    const pm_procedure_t result = pulses_salient(length, pulses_sum(&self->train), config->s_min, saliency);
+    if (result != PM_DONE) {
+        return result;
     }
     const pm_q_t reverse = pulses_leg(&self->train.i, self->axis);
     self->D = self->train.e[self->axis][self->axis] + reverse - pm_mul(self->train.g[self->axis], reverse);
@@ -99,7 +101,7 @@ static pm_procedure_t locate(four_pulses_t *self, const pulses_config_t *config)
     if (seen.d < pm_abs(seen.q)) {
         return PM_FAILED_POLARITY;
     }
-    found->margin = pm_min(polarity, pulses_margin(length, pm_mul(PM_Q(2.12), config->i_noise)));
+    found->margin = pm_min(polarity, saliency);
     return PM_RUNNING;
 }
 

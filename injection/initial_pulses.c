@@ -31,11 +31,13 @@ static pm_procedure_t locate(initial_pulses_t *self, const pulses_config_t *conf
     pulses_found_t *found = &self->train.found;
     const pm_ab_t y = pulses_saliency(&self->train);
     const pm_q_t length = pm_hypot(y.alpha, y.beta);
-    if (length < config->y_min) {
-        return PM_FAILED_SALIENCY;
+    found->margin = pulses_margin(length, 3 * config->i_noise);
+    const pm_procedure_t result =
+        pulses_salient(length, pulses_sum(&self->train), config->s_min, found->margin);
+    if (result != PM_DONE) {
+        return result;
     }
     found->theta = pm_atan2(y.beta, y.alpha) / 2U;
-    found->margin = pulses_margin(length, 3 * config->i_noise);
     const pulses_pole_t limits = {
         .bridge = config->i_bridge, .noise = 2 * config->i_noise, .reversed = config->reversed};
     return pulses_pole(self->w, &limits, found);

@@ -10,7 +10,7 @@
  * as a component of w has the noise of six currents of 2/3 i_noise^2 each, that of y 1.5 times as much.
  *
  * Call initial_pulses_step() each period until it is not PM_RUNNING; after PM_DONE initial_pulses_find() each
- * millisecond, outside the control interrupt, which gives the position or the reason why there is none: y too
+ * millisecond, outside the control interrupt, which gives the position or the reason why there is none: s too
  * small for this machine, w below five times its noise, or gains that no sensors have. Duration: about
  * 6 (2 n + 5) periods and 5 ms: 15 ms on IPM-1000. Peak of the current: i_pulse and up to half of it by saturation. Movement: 0.05
  * degrees mechanical with IPM-1000, 0.02 with SPM-400, as each pulse is followed by its opposite.

@@ -15,10 +15,12 @@ pm_procedure_t primary_locate(const primary_t *self, const primary_config_t *con
     /* twice 120 degrees are 240, twice 240 are 120 */
     const pm_ab_t y = pm_clarke((pm_abc_t){.a = self->sum[0], .b = self->sum[2], .c = self->sum[1]});
     const pm_q_t length = pm_hypot(y.alpha, y.beta);
-    if (length < config->y_min) {
-        return PM_FAILED_SALIENCY;
-    }
     found->theta = pm_atan2(y.beta, y.alpha) / 2U;
     found->margin = pulses_margin(length, config->pole.noise);
+    const pm_q_t third = self->sum[0] / 3 + self->sum[1] / 3 + self->sum[2] / 3;
+    const pm_procedure_t result = pulses_salient(length, third, config->s_min, found->margin);
+    if (result != PM_DONE) {
+        return result;
+    }
     return primary_polarity(self->difference, config, found);
 }

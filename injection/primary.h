@@ -6,6 +6,7 @@
  *   y = 2/3 sum (P_x+ + P_x-) e^{j 2 g_x} = 2 I_2 e^{j 2 theta}     saliency: the angle, modulo 180 degrees
  *   w = 2/3 sum D_x e^{j g_x}             = I_1 e^{j theta}         first-order saturation: the polarity
  * The third harmonic I_3 is alike in all three axes and leaves w, not so the largest D_x alone.
+ *   s = 3 |y| / sum (P_x+ + P_x-)         pulses.h
  *   margin of saliency = |y| / noise
  *   margin of polarity: pulses_pole() of w
  * noise: 1.155 times that of one value, of both. A gain of one of three sensors is no noise: 1 % of one against the
@@ -26,7 +27,7 @@ typedef struct {
 } primary_t;
 
 typedef struct {
-    pm_q_t y_min;       /* least |y| that counts as a saliency */
+    pm_q_t s_min;       /* pulses.h */
     pulses_pole_t pole; /* its noise is that of y, too */
 } primary_config_t;
 

@@ -126,6 +126,16 @@ pm_sigma_t pulses_margin(pm_q_t length, pm_q_t noise)
     return pm_div(length / 64, noise) / PER_SIGMA;
 }
 
+pm_q_t pulses_sum(const pulses_t *self)
+{
+    return self->e[0][0] + self->e[1][1] + self->e[2][2];
+}
+
+pm_procedure_t pulses_salient(pm_q_t length, pm_q_t sum, pm_q_t s_min, pm_sigma_t margin)
+{
+    return length < pm_mul(s_min, sum) || margin < PULSES_SURE ? PM_FAILED_SALIENCY : PM_DONE;
+}
+
 pm_procedure_t pulses_pole(pm_ab_t w, const pulses_pole_t *limits, pulses_found_t *found)
 {
     const pm_dq_t seen = pm_park(w, pm_dir(found->theta));

@@ -7,7 +7,11 @@
  *
  * Two values or one of each axis stand in e, row x: of + minus -, or of + alone.
  *   y = sum_x e_x e^{j g_x}
- * is the saliency, whose angle is 2 theta.
+ * is the saliency, whose angle is 2 theta. With the sum of what each leg shows of its own pulses, whatever the link's voltage and
+ * the length were,
+ *   s = |y| / sum_x e_xx = (L_q - L_d) / (L_q + L_d)
+ * of the flux that the pulse makes. What is below half of what L_d and L_q of the parameters make of it, or below five times its
+ * noise, is no saliency: injection, whose gain follows it, would be too slow for what it was told.
  *
  * Relative gains of the sensors from the sums of the currents. With gains 1 + g_k what is measured does not
  * sum to zero, though the currents do:
@@ -45,7 +49,7 @@ typedef struct {
     uint16_t timeout; /* periods that the decay may take */
     pm_q_t duty;      /* of the driven leg, 0 ... 1 */
     pm_q_t i_zero;    /* currents below count as zero: noise, and what rings */
-    pm_q_t y_min;     /* least |y| of six pulses that counts as a saliency: a fourth of the machine's */
+    pm_q_t s_min;     /* least saliency: half of what the machine's data say */
     pm_q_t i_noise;   /* of one current */
     pm_q_t i_bridge;  /* what the bridge may add to the currents that show the polarity */
     bool reversed;    /* polarity.h: L_d_falls */
@@ -106,7 +110,13 @@ pm_ab_t pulses_saliency(const pulses_t *self);
 /* Of a length with a noise. */
 pm_sigma_t pulses_margin(pm_q_t length, pm_q_t noise);
 
-/* The same of what shows the polarity, beyond what the bridge may add to it. It is sure from PULSES_SURE on. */
+/* sum_x e_xx */
+pm_q_t pulses_sum(const pulses_t *self);
+
+/* PM_DONE: |y| is s_min of `sum` and sure, `margin` is that of the saliency; PM_FAILED_SALIENCY */
+pm_procedure_t pulses_salient(pm_q_t length, pm_q_t sum, pm_q_t s_min, pm_sigma_t margin);
+
+/* The same of what shows the polarity, beyond what the bridge may add to it. Both are sure from PULSES_SURE on. */
 #define PULSES_SURE (5 * PM_SIGMA_ONE)
 pm_sigma_t pulses_polarity(pm_q_t along, pm_q_t bridge, pm_q_t noise);
 

@@ -22,13 +22,13 @@ PM_APART static bool make_duration(maker_t *m, pm_num_t i_peak, pulses_config_t 
     return true;
 }
 
-/* y of the unsaturated machine is 3 i_pulse (L_q - L_d) / L_q. */
-PM_APART static void make_y_min(maker_t *m, pm_num_t i_peak, pulses_config_t *c)
+/* Half of what L_d and L_q make of it: the data may be off by 15 % each. */
+PM_APART static void make_s_min(maker_t *m, pulses_config_t *c)
 {
+    const pm_num_t L_d = si(m, DRIVE_PARAM_L_d);
     const pm_num_t L_q = si(m, DRIVE_PARAM_L_q);
-    const pm_num_t share = pm_num_div(pm_num_sub(L_q, si(m, DRIVE_PARAM_L_d)), L_q);
-    const pm_num_t i_pulse = pm_num_div(i_peak, m->base.i);
-    c->y_min = fixed(m, mul3(share, i_pulse, pm_num_ratio(3, 4)), Q_BITS, DRIVE_PARAM_i_pulse);
+    const pm_num_t s = pm_num_div(pm_num_sub(L_q, L_d), pm_num_add(L_q, L_d));
+    c->s_min = fixed(m, pm_num_div(s, pm_num(2)), Q_BITS, DRIVE_PARAM_L_q);
 }
 
 /* Currents that noise and bridge make by themselves. What rings with the legs' capacitance between two pulses is no current
@@ -54,7 +54,7 @@ void make_pulses(maker_t *m, pulses_config_t *c)
 {
     const pm_num_t i_peak = pulse_choice_current(m);
     if (make_duration(m, i_peak, c)) {
-        make_y_min(m, i_peak, c);
+        make_s_min(m, c);
         make_errors(m, c);
         c->reversed = m->params->L_d_falls != 0;
     }

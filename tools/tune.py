@@ -47,6 +47,7 @@ LOW_V = 60  # below: MOSFETs
 FAST_HZ = 40e3  # from here on above LOW_V: silicon carbide
 PWM_HZ = (10e3, 20e3, 40e3, 60e3)
 PER_TURN = 20  # periods of a turn of the field at the speed that trips
+LEAST_PER_TURN = 13  # the drive refuses less than 12.6
 PER_RISE = 3  # periods of L / R
 RIPPLE = 6  # of the phase current, peak to peak: v_dc / (6 L f_pwm) at its most
 BELOW = "the motor's; below L_d: i_d = 0 and no injection, which costs less than (L_d - L_q) i / psi_m squared, half"
@@ -91,23 +92,50 @@ def above(value, steps):
     return next(s * 10 ** e for e in (exponent, exponent + 1) for s in steps if s * 10 ** e >= value * (1 - 1e-9))
 
 
+def dead_time(low, f_pwm):
+    """Of a board that switches so often, and what it is."""
+    return (0.5e-6, "MOSFET board") if low or f_pwm >= FAST_HZ else (2e-6, "IGBT module")
+
+
+def pwm(told, L):
+    """Frequency and why. What dead time takes of a leg changes by 2 t_d f_pwm v_dc with its current's sign, and the observer must
+    tell the EMF from it at the hand-over: where it would be more than that EMF, fewer periods are taken for a turn and more ripple,
+    as few as control needs."""
+    v, i = told["rated", "v_dc_V"], told["rated", "i_rated_A"]
+    omega = told["electrical", "pole_pairs"] * told["rated", "speed_rated_rad_s"]
+    low = v <= LOW_V
+    turns_Hz = 1.5 * omega / (2 * math.pi)  # at the speed that trips
+    board = max(20e3 if low else 10e3, PER_RISE * told["electrical", "R_s_ohm"] / L)
+    wanted = max(board, PER_TURN * turns_Hz, v / (RIPPLE * i * L))
+    least = max(board, LEAST_PER_TURN * turns_Hz)
+    emf = tune.HAND_OVER * omega * told["electrical", "psi_m_Wb"]
+
+    def lost(f):
+        return 2 * dead_time(low, f)[0] * f * v
+
+    first, last = (next((f for f in PWM_HZ if f >= x), PWM_HZ[-1]) for x in (least, wanted))
+    able = [f for f in PWM_HZ if first <= f <= last]
+    f = max((f for f in able if lost(f) <= emf), default=min(able, key=lost))
+    if f == last:
+        return f, f"{PER_TURN} periods of a turn of the field, {PER_RISE} of L / R, ripple below rated current"
+    return f, (f"{last / 1e3:g} kHz would have less ripple, but dead time then takes {lost(last):.2g} V, "
+               f"the EMF at the hand-over is {emf:.2g} V")
+
+
 def complete(x):
     """What is not told of torque, inverter, sensors and link: {section: {key: (value, why)}}."""
     told = {(section, key): number("", section, key, x[section][key]) for section, keys in NEEDED.items() for key in keys}
     v, i = told["rated", "v_dc_V"], told["rated", "i_rated_A"]
-    poles, speed = told["electrical", "pole_pairs"], told["rated", "speed_rated_rad_s"]
+    poles = told["electrical", "pole_pairs"]
     low = v <= LOW_V
-    turns_Hz = 1.5 * poles * speed / (2 * math.pi)  # at the speed that trips
-    L = min(inductances(x))
-    least = max(20e3 if low else 10e3, PER_TURN * turns_Hz, PER_RISE * told["electrical", "R_s_ohm"] / L, v / (RIPPLE * i * L))
-    f_pwm = next((f for f in PWM_HZ if f >= least), PWM_HZ[-1])
+    f_pwm, why = pwm(told, min(inductances(x)))
     f_pwm = float(x["inverter"].get("f_pwm_Hz", f_pwm))
     chosen = {
         "rated": {"torque_rated_Nm": (1.5 * poles * told["electrical", "psi_m_Wb"] * i, "1.5 pole_pairs psi_m i_rated")},
         "inverter": {
-            "f_pwm_Hz": (f_pwm, f"{PER_TURN} periods of a turn of the field, {PER_RISE} of L / R, ripple below rated current"),
+            "f_pwm_Hz": (f_pwm, why),
             "timer_counts": (round(TIMER_HZ / (2 * f_pwm)), "170 MHz timer, centre-aligned"),
-            "dead_time_s": (0.5e-6, "MOSFET board") if low or f_pwm >= FAST_HZ else (2e-6, "IGBT module"),
+            "dead_time_s": dead_time(low, f_pwm),
             "c_leg_F": (2e-9 if low else 0.5e-9, "output capacitance of a leg"),
             "v_switch_V": (0.0 if low else 1.0, "resistive" if low else "of a few amperes"),
             "v_diode_V": (0.0 if low else 1.0, "the channel conducts both ways" if low else "of a few amperes"),

@@ -6,6 +6,7 @@ from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 
 from . import worker
 
+WORKERS_WITHIN_S = 60  # of a scheduler that has just been started
 AHEAD = 3  # chunks per core that are handed over before the first of them comes back
 
 
@@ -28,6 +29,11 @@ class Pool:
 
         cloudpickle.register_pickle_by_value(worker)  # scheduler and workers need not have this project
         self.client = Client(scheduler, timeout=10)
+        try:
+            self.client.wait_for_workers(1, timeout=WORKERS_WITHIN_S)
+        except TimeoutError as none:
+            self.client.close()
+            raise OSError(f"{scheduler}: has no worker after {WORKERS_WITHIN_S} s") from none
         self.cores = sum(self.client.nthreads().values())
         self.executor = self.client.get_executor(pure=False)
 

@@ -234,7 +234,7 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
         {"h_d_inverse", c.position.injection.pulsating_square.h_d_inverse, 20, I * L_d / flux},
         {"pulse duty", c.pulses.duty, 28, exact / std::round(exact)},
         {"i_zero", c.pulses.i_zero, 28, 5 * 5e-3 / I},
-        {"y_min", c.pulses.y_min, 28, 0.75 * (L_q - L_d) / L_q * 4 / I},
+        {"s_min", c.pulses.s_min, 28, 0.5 * (L_q - L_d) / (L_q + L_d)},
         {"i_noise", c.pulses.i_noise, 28, 5e-3 / I},
         {"i_bridge", c.pulses.i_bridge, 28, 4.0 / 3 * std::round(exact) * 2e-6 * 300 / L_d / I},
         {"open-loop i", c.open_loop.i, 28, 2 / I},
@@ -516,7 +516,6 @@ TEST(Config, PulsesAreAsLongAsTheirFluxAsks)
     }
 }
 
-// Without dead time there is nothing that the capacitance of a leg could give back.
 TEST(Config, DcLinkPulsesNeedALinkThatShowsThem)
 {
     const auto refused = [](int32_t R_mohm, int32_t C_nF) {
@@ -533,6 +532,24 @@ TEST(Config, DcLinkPulsesNeedALinkThatShowsThem)
     EXPECT_EQ(refused(10000, 1000000000).param, DRIVE_PARAM_dc_capacitance);
 }
 
+TEST(Config, ACarrierThatTheLegsCannotMakeAboutHalfDutyIsRefused)
+{
+    const auto refused = [](int32_t v_injection_mV) {
+        drive_params_t p;
+        drive_params_default(&p);
+        p.start_method = 1;
+        p.position_find = 2;
+        p.polarity = 3;
+        p.injection = 4;
+        p.v_injection = v_injection_mV;
+        drive_config_t c = {};
+        return drive_configure(&c, &p, PM_CHANNELS);
+    };
+    EXPECT_TRUE(refused(100000).ok);
+    EXPECT_EQ(refused(200000).param, DRIVE_PARAM_v_injection);
+}
+
+// Without dead time there is nothing that the capacitance of a leg could give back.
 TEST(Config, CapacitanceOfALegNeedsADeadTime)
 {
     const auto far = [](double dead_time_s) {
@@ -686,7 +703,7 @@ Names must_be_positive(const drive_config_t &c)
         x.push_back({"pulse periods", c.pulses.periods});
         x.push_back({"pulse duty", c.pulses.duty});
         x.push_back({"pulse timeout beyond the pulse", c.pulses.timeout - c.pulses.periods});
-        x.push_back({"y_min", c.pulses.y_min});
+        x.push_back({"s_min", c.pulses.s_min});
     }
     return x;
 }

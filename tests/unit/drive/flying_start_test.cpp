@@ -404,6 +404,37 @@ TEST(FlyingStart, BrakesToAStandstill)
     }
 }
 
+// An EMF beyond 95 % of the link's is weakened at once.
+TEST(FlyingStart, AnEmfAtTheEndOfTheLinkIsWeakened)
+{
+    for (const double speed : {1.1, 1.3}) {
+        Catch x(spm(), spm_params(), speed * 41.888);
+        x.look();
+        ASSERT_EQ(drive_status(&x.drive())->state, DRIVE_RUNNING) << speed;
+        const drive_config_t &c = x.drive().config;
+        const double emf = std::abs(bench::real(x.drive().sequence.omega)) * bench::real(c.machine.psi_m);
+        const double top = 0.95 * bench::real(x.drive().status.v_dc) * c.v_share / 2147483648.0;
+        EXPECT_EQ(x.drive().field_weakening.i_d<0, emf> top) << speed;
+        EXPECT_EQ(speed > 1.2, emf > top) << speed;
+    }
+}
+
+// Where neither source sees it, a vector along its d-axis goes on with it.
+TEST(FlyingStart, ASlowRotorWithoutInjectionIsHeldByAVector)
+{
+    for (const double speed : {0.06, -0.06}) {
+        drive_params_t p = spm_params();
+        p.L_d = p.L_q; // as told: nothing to inject for
+        p.L_dh_rated = p.L_qh_rated;
+        Catch x(spm(), p, speed * 41.888);
+        x.look();
+        ASSERT_EQ(drive_status(&x.drive())->state, DRIVE_RUNNING) << speed;
+        ASSERT_EQ(x.drive().stage, STAGE_OPEN_LOOP) << speed;
+        EXPECT_LE(std::abs(wrapped(x.truth().theta_e_rad - rad(x.drive().theta_open))), kAngle_rad) << speed;
+        EXPECT_GT(speed * x.drive().omega_open, 0) << speed;
+    }
+}
+
 // --- The drive without a motor ---------------------------------------------------------------------------------------
 
 direct::Drive calibrated(uint32_t channels, drive_mode_t mode)

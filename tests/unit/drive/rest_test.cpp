@@ -105,4 +105,50 @@ TEST(Rest, ACurrentThatIsNeededKeepsItOn)
     EXPECT_TRUE(x.d.carrier);
 }
 
+TEST(Rest, InTorqueModeZeroTorqueIsNothing)
+{
+    Resting x;
+    x.command.mode = x.d.command.mode = DRIVE_MODE_TORQUE;
+    drive_command(&x.d, &x.command);
+    drive_slow(&x.d, &x.slow);
+    EXPECT_NEAR(x.until(false, 100), kAfter_ms, 2);
+    x.command.torque_uNm = 500000;
+    drive_command(&x.d, &x.command);
+    EXPECT_LE(x.until(true, 100), 5);
+}
+
+TEST(Rest, ATurningRotorKeepsItOn)
+{
+    Resting x;
+    for (int ms = 0; ms < 200; ++ms) {
+        drive_slow(&x.d, &x.slow);
+        x.d.position.pll.omega = 2 * x.d.config.rest.omega;
+    }
+    EXPECT_TRUE(x.d.carrier);
+}
+
+TEST(Rest, ARampToZeroKeepsItOn)
+{
+    Resting x;
+    for (int ms = 0; ms < 100; ++ms) {
+        x.d.speed.reference = PM_ONE / 8;
+        drive_slow(&x.d, &x.slow);
+        ASSERT_TRUE(x.d.carrier);
+    }
+}
+
+TEST(Rest, AStopKeepsItOn)
+{
+    Resting x;
+    x.d.state = DRIVE_STOPPING;
+    x.command.enable = false;
+    drive_command(&x.d, &x.command);
+    x.command.enable = x.d.command.enable = true;
+    for (int ms = 0; ms < 100 && x.d.state == DRIVE_STOPPING; ++ms) {
+        drive_slow(&x.d, &x.slow);
+        EXPECT_FALSE(x.d.position.rests);
+        x.d.position.pll.omega = 4 * x.d.config.protection.omega_stall;
+    }
+}
+
 } // namespace

@@ -40,6 +40,7 @@ class Bench
     void run_s(double time_s)
     {
         for (int k = 0; k < std::lround(time_s * 1e4) && report().state <= COMMISSIONING_RUNNING; ++k) {
+            EXPECT_LT(report().progress, 100);
             sim_loop_step(&loop);
         }
     }
@@ -57,6 +58,11 @@ class Bench
     bool driven() const
     {
         return loop.app.out.legs != PM_LEGS_OFF;
+    }
+
+    plant_t *plant()
+    {
+        return plant_.get();
     }
 
     sim_loop_t loop = {};
@@ -144,6 +150,72 @@ TEST(SaliencyMap, EndsAtOnceWithTheCommand)
     EXPECT_FALSE(x.driven());
     EXPECT_EQ(x.report().reason, COMMISSIONING_ABORTED);
     EXPECT_EQ(x.map().i, 0);
+}
+
+// With R and L_d as identification has found them the current is led in, though what was told is far off.
+TEST(SaliencyMap, TakesWhatIdentificationHasFound)
+{
+    Bench told(locked()), found(locked());
+    found.loop.app.drive.config.machine.R_s *= 8;
+    found.loop.app.drive.config.machine.L_d /= 16;
+    commissioning_result_t &before = found.loop.app.drive.commissioning_report.result;
+    before.R = told.loop.app.drive.config.machine.R_s;
+    before.L_d = told.loop.app.drive.config.machine.L_d;
+    for (Bench *x : {&told, &found}) {
+        x->command(true);
+        x->run_s(16);
+        ASSERT_EQ(x->report().state, COMMISSIONING_DONE);
+    }
+    EXPECT_NEAR(real(told.map().rated.L_q) / real(found.map().rated.L_q), 1, 0.005);
+}
+
+// The carrier sees its inductance, but no more than a fifth of the link is led into the winding.
+TEST(SaliencyMap, ACurrentThatDoesNotComeIsNoCurrent)
+{
+    plant_config_t c = locked();
+    c.machine.R_s_ohm = 60;
+    Bench x(c);
+    x.command(true);
+    x.run_s(16);
+    EXPECT_EQ(x.report().state, COMMISSIONING_FAILED);
+    EXPECT_EQ(x.report().reason, COMMISSIONING_NO_CURRENT);
+}
+
+TEST(SaliencyMap, ARotorThatHasTurnedIsSaid)
+{
+    for (const double turn_deg : {3.0, -3.0}) {
+        Bench x(locked());
+        x.command(true);
+        x.run_s(8);
+        ASSERT_EQ(x.report().state, COMMISSIONING_RUNNING);
+        plant_turn_rotor(x.plant(), turn_deg * M_PI / 180);
+        x.run_s(8);
+        EXPECT_EQ(x.report().state, COMMISSIONING_FAILED);
+        EXPECT_EQ(x.report().reason, COMMISSIONING_TURNED);
+    }
+}
+
+// Told that L_d rises with the magnet's flux, the drive takes the other pole: d and q of the map change their signs.
+TEST(SaliencyMap, TheOtherPoleIsThatOfAnInverseMachine)
+{
+    Bench as_it_is(locked()), inverse(locked());
+    inverse.loop.app.drive.config.saliency_map.reversed =
+        !as_it_is.loop.app.drive.config.saliency_map.reversed;
+    inverse.loop.app.drive.config.saliency_map.best = false;
+    for (Bench *x : {&as_it_is, &inverse}) {
+        x->command(true);
+        x->run_s(16);
+        ASSERT_EQ(x->report().state, COMMISSIONING_DONE);
+    }
+    for (int row = 0; row < SALIENCY_MAP_SIDE; ++row) {
+        for (int column = 0; column < SALIENCY_MAP_SIDE; ++column) {
+            const saliency_point_t &a = as_it_is.map().point[row][column];
+            const saliency_point_t &b = inverse.map().point[row][SALIENCY_MAP_SIDE - 1 - column];
+            EXPECT_NEAR(real(a.L_d) / real(b.L_d), 1, 0.01);
+            EXPECT_NEAR(real(a.L_dq) * kHenry, -real(b.L_dq) * kHenry, 0.6e-3);
+        }
+    }
+    EXPECT_EQ(inverse.map().rated.L_d, inverse.map().point[4][2].L_d) << "i_d = 0";
 }
 
 } // namespace

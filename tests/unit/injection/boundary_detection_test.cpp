@@ -132,10 +132,15 @@ TEST(BoundaryDetection, RefusesSignsOfNoMachine)
             train->e[x][(x + 1) % 3] = fixed(-0.25 + sign * 0.3, 28);
             train->e[x][(x + 2) % 3] = fixed(-0.25 - sign * 0.3, 28);
         }
-        train->e[0][1] += fixed(0.3, 28); // a saliency, or it would be that which is missing
+        train->e[0][1] += fixed(0.55, 28); // a saliency, or it would be that which is missing
         train->steps = PULSES_BALANCING;
         EXPECT_EQ(find_with(&self, &c, 0), PM_FAILED_UNEVEN) << sign;
     }
+}
+
+TEST(BoundaryDetection, SaliencyIsThatOfTheData)
+{
+    expect_saliency_of_the_data(kSectors, ipm(0.01));
 }
 
 TEST(BoundaryDetection, FailsWithoutSaliencyAndWithoutPolarity)

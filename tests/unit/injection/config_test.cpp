@@ -251,7 +251,7 @@ TEST(InjectionConfig, PulseIsThatOfItsFlux)
         EXPECT_EQ(c.periods, whole) << i_A;
         EXPECT_EQ(c.timeout, 8 * whole + 50) << i_A;
         EXPECT_NEAR(real(c.duty), std::min(1.0, exact / whole), 1e-6) << i_A;
-        EXPECT_NEAR(real(c.y_min), 0.75 * (p.L_q - p.L_d) / p.L_q * i_A / 10, 1e-6) << i_A;
+        EXPECT_NEAR(real(c.s_min), 0.5 * (p.L_q - p.L_d) / (p.L_q + p.L_d), 1e-6) << i_A;
     }
 }
 

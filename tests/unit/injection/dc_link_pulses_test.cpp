@@ -32,7 +32,7 @@ Rig behind(Rig r, double R_ohm, double told_ohm = 1.0, int repeats = 4, double p
     own.duty = c.duty;
     own.wait = static_cast<uint16_t>(5 * told_ohm * kC_F / T_s + 1.5 * c.periods + 5);
     own.pulses = static_cast<uint16_t>(6 * repeats);
-    own.limits.y_min = fixed(k * real(c.y_min) / 3, 28);
+    own.limits.s_min = c.s_min;
     own.limits.pole.bridge = fixed(k * real(c.i_bridge) * 2 / 3, 28);
     own.limits.pole.noise = fixed(0.775 / 4096 * std::sqrt(repeats), 28);
     return r;
@@ -61,13 +61,12 @@ TEST(DcLinkPulses, TwinStiffSupplyIsRefusedWhereAGuessErrs)
     const Grid honest = grid(kLink, r, kFew);
     EXPECT_EQ(honest.wrong_pole, 0);
     EXPECT_LT(honest.done, kFew / 4);
-    own.limits.y_min = 0;
     const Method<dc_link_pulses_t> guess = {
         kLink.step, [](dc_link_pulses_t *self, const pulses_config_t *c) {
             const pm_procedure_t result = kLink.find(self, c);
             const pm_q_t *D = self->response.difference;
             const double x = real(pm_park(pm_clarke({D[0], D[1], D[2]}), pm_dir(self->found.theta)).d);
-            self->found.theta += result == PM_FAILED_POLARITY && x < 0 ? PM_TURN(0.5) : 0U;
+            self->found.theta += result != PM_DONE && x < 0 ? PM_TURN(0.5) : 0U;
             return PM_DONE;
         }};
     const Grid guessed = grid(guess, r, kFew);

@@ -121,7 +121,7 @@ TEST(PulseChoice, TheNoiseIsOneDegreeAtTheShortestPulse)
     for (const double share : {0.4, 0.55, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0}) {
         r.i_pulse_A = share * shortest_A;
         pulses_config_t c = config(r);
-        c.y_min = 0;
+        c.s_min = 0;
         const double now_deg = axis_error_deg(r, c, 120);
         if (before_deg > 1 && now_deg <= 1) {
             const double part = std::log(before_deg) / std::log(before_deg / now_deg);
@@ -150,7 +150,6 @@ TEST(PulseChoice, TheChosenPulseIsNearTheBestOfNine)
                 c.periods = static_cast<uint16_t>(std::max(1.0, std::round(length * pick.periods)));
                 c.duty = static_cast<pm_q_t>(magnitude * pick.duty);
                 const double flux = magnitude * c.periods / pick.periods;
-                c.y_min = static_cast<pm_q_t>(std::min(1.0, flux) * pick.y_min);
                 if (flux > 1.3) { // beyond 1.5 times rated current, with the saturation
                     continue;
                 }

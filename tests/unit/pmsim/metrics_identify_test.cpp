@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "firmware/params/parameters.h"
 #include "tests/contract/bench.h"
 #include "tools/pmsim/setup.h"
 
@@ -79,6 +80,25 @@ TEST(IdentifyMetrics, OfALinearMachineAreTheRatios)
     // i t / V
     EXPECT_NEAR(error("identify_leg_capacitance_F", &rig_identified_t::move_A, 0.03), 0.03 * 2e-6 / 300.0,
                 1e-18);
+}
+
+// V_h T_s / (2 sin(pi / 20)) of flux between two samples of a carrier of f_pwm / 20.
+TEST(IdentifyMetrics, CircleIsThatOfTheCarrier)
+{
+    const pmsim::Setup s = setup_of(0.0);
+    const double flux_Wb = s.params->v_injection * 1e-3 * 1e-4 / (2 * std::sin(3.14159265358979323846 / 20));
+    const double centre_A = flux_Wb * (1 / 40e-3 + 1 / 80e-3) / 2,
+                 radius_A = flux_Wb * (1 / 40e-3 - 1 / 80e-3) / 2;
+    const auto error = [&](double centre, double radius) {
+        return judged(s, "identify_circle_error_rel",
+                      [=](rig_identified_t &x) {
+                          x.circle_centre_A = centre * centre_A;
+                          x.circle_radius_A = radius * radius_A;
+                      })
+            .number;
+    };
+    EXPECT_NEAR(error(1.1, 1), 0.1, kExact);
+    EXPECT_NEAR(error(1, 0.8), 0.2, kExact);
 }
 
 TEST(IdentifyMetrics, FrictionIsJudgedAtRatedSpeed)

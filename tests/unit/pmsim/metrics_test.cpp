@@ -24,11 +24,12 @@ Setup test_setup()
 }
 
 // 1000 periods of 0.1 ms, each as the test describes it.
-template <class Describe> MetricValue gather(const Expectation &expectation, Describe describe)
+template <class Describe>
+MetricValue gather(const Expectation &expectation, Describe describe, int periods = 1000)
 {
     const pmsim::Setup setup = test_setup();
     const std::unique_ptr<Metric> metric = make_metric(expectation, setup);
-    for (int k = 0; k < 1000; ++k) {
+    for (int k = 0; k < periods; ++k) {
         Sample sample{};
         sample.rig.state = RIG_RUNNING;
         sample.rig.truth.t_s = 1e-4 * k;
@@ -38,11 +39,11 @@ template <class Describe> MetricValue gather(const Expectation &expectation, Des
     return metric->value();
 }
 
-template <class Describe> MetricValue gather(const char *name, Describe describe)
+template <class Describe> MetricValue gather(const char *name, Describe describe, int periods = 1000)
 {
     Expectation expectation;
     expectation.metric = name;
-    return gather(expectation, describe);
+    return gather(expectation, describe, periods);
 }
 
 TEST(Metrics, AngleErrorOfAWaveAboutAnOffset)
@@ -218,6 +219,47 @@ TEST(Metrics, OrdersOfThePositionErrorAreByTheAngleOverWholeTurns)
 }
 
 // 20 periods in a turn: fundamental of 100 V of 300 V, a fifth harmonic that turns the other way.
+// No whole turns: the fit takes mean and the other part out.
+TEST(Metrics, HarmonicsOfThePositionErrorAreFitted)
+{
+    const auto wave = [](int order) {
+        return [order](Sample &s, int k) {
+            const double theta = 0.013 * k;
+            s.rig.truth.theta_e_rad = theta;
+            s.rig.angle_error_rad =
+                (1.5 + 0.6 * std::cos(order * theta) - 0.8 * std::sin(order * theta)) * pi / 180;
+        };
+    };
+    EXPECT_NEAR(gather("angle_error_h2_deg", wave(2)).number, 1.0, 1e-6);
+    EXPECT_NEAR(gather("angle_error_h6_deg", wave(6)).number, 1.0, 1e-6);
+    const auto still = [](Sample &s, int) { s.rig.truth.theta_e_rad = 1; };
+    EXPECT_TRUE(std::isnan(gather("angle_error_h2_deg", still, 1).number));
+}
+
+TEST(Metrics, LoudestBandNeedsTwoWindows)
+{
+    const auto sine = [](Sample &s, int k) { s.rig.truth.i_d_A = std::sin(2 * pi * k / 20.0); };
+    EXPECT_TRUE(std::isnan(gather("i_d_loudest_band_A", sine, 300).number)); // of 400
+    EXPECT_FALSE(std::isnan(gather("i_d_loudest_band_A", sine, 500).number));
+}
+
+TEST(Metrics, StartTimeIsThatOfFinding)
+{
+    const auto start = [](Sample &s, int k) {
+        s.rig.state = k < 100 ? RIG_CALIBRATING : k <= 300 ? RIG_FINDING : RIG_RUNNING;
+    };
+    EXPECT_NEAR(gather("start_s", start).number, 200 * 1e-4, exact);
+}
+
+TEST(Metrics, WhatPulsesHaveFoundIsThatOfTheSecondPeriodOfSettling)
+{
+    const auto start = [](Sample &s, int k) {
+        s.rig.settles = k >= 200 && k < 300;
+        s.rig.angle_error_rad = (k == 201 ? 2.0 : 30.0) * pi / 180;
+    };
+    EXPECT_NEAR(std::fabs(gather("pulses_angle_error_deg", start).number), 2.0, exact);
+}
+
 TEST(Metrics, FundamentalOfTheVoltageIsWithoutItsHarmonics)
 {
     const auto turning = [](Sample &s, int k) {

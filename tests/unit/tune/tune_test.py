@@ -131,6 +131,36 @@ class Tune(unittest.TestCase):
                 emf = d["speed_high"] * d["pole_pairs"] * d["psi_m"]
                 self.assertGreater(1.001 * emf, lost + 0.5 * d["R_s"] * d["i_open_loop"], name)
 
+    def test_dead_time_leaves_the_emf_of_the_hand_over_to_be_seen(self):
+        """A spindle of 310 V and 1 A: 60 kHz would have less ripple, dead time would take more than the EMF at 8 % of the speed."""
+        for poles in (1, 2):
+            told = motor("60,000 r/min spindle")
+            told["electrical"].update(L_d0_H=0.6e-3, L_q0_H=0.6e-3, pole_pairs=poles)
+            told["rated"].update(i_rated_A=1.5, speed_rated_rad_s=5300)
+            text = self.tune(told).stdout
+            board = yaml.safe_load(text)["inverter"]
+            self.assertEqual((board["f_pwm_Hz"], board["dead_time_s"]), (40e3, 0.5e-6))
+            self.assertGreaterEqual(board["f_pwm_Hz"], 12.6 * 1.5 * poles * 5300 / (2 * math.pi))  # what the drive asks for
+            line = next(line for line in text.splitlines() if line.strip().startswith("f_pwm_Hz"))
+            self.assertIn("60 kHz would have less ripple, but dead time then takes 19 V", line)
+
+    def test_a_swing_below_dead_time_is_damped_less(self):
+        for name in ("hub motor", "60,000 r/min spindle"):
+            tuned = yaml.safe_load(self.tune(motor(name)).stdout)
+            d, b = tuned["drive"], tuned["inverter"]
+            lost = b["v_switch_V"] + b["dead_time_s"] * b["f_pwm_Hz"] * tuned["rated"]["v_dc_V"]
+            frequency = math.sqrt(1.5 * d["pole_pairs"] ** 2 * d["psi_m"] * d["i_open_loop"] / d["J"])
+            share = d["psi_m"] * frequency / lost
+            self.assertEqual(share < 0.4, name != "hub motor")
+            self.assertAlmostEqual(d["open_loop_damping"], 0.7 * min(1, share / 0.4), delta=0.001)
+
+    def test_a_field_that_turns_fast_keeps_its_periods(self):
+        """13 of a turn at the speed that trips, whatever dead time takes."""
+        told = motor("60,000 r/min spindle")
+        told["electrical"].update(pole_pairs=2, psi_m_Wb=0.004)
+        told["rated"].update(speed_rated_rad_s=6800)
+        self.assertEqual(yaml.safe_load(self.tune(told).stdout)["inverter"]["f_pwm_Hz"], 60e3)
+
     def test_small_currents_are_whole_steps(self):
         told = motor("gimbal")
         told["rated"]["i_rated_A"] = 0.4

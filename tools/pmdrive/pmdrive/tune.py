@@ -16,6 +16,7 @@ STEPS = 4096    # of the converter
 INJECTION_HZ = 25.0  # of the position by injection: slow enough for the noise of the smallest answer that leads
 LAG = 0.12           # rad that the estimate may be behind an acceleration
 STALL_S = 0.6
+HAND_OVER = 0.08     # of rated speed: without injection, where nothing asks for more
 SPEED_MOST = 0.4     # of rated speed: hand-over of a machine whose EMF is small at any speed
 
 # Why each value is what it is, in a line.
@@ -46,6 +47,7 @@ WHY = {
     "start_method": "0: pulses and injection, as the saliency is sure and seen; 2: align and open loop, as it is not",
     "i_open_loop": "0.8 of rated, bears half the rated torque 39 degrees behind; at most psi_m/(2 (L_q - L_d)), or saliency "
                    "turns the rotor away",
+    "open_loop_damping": "0.7; less where dead time and drops take more of a leg than 2.5 times the EMF of a rotor that swings",
     "t_align": "half a second",
     "t_stall": "a fault well within a second of a rotor that does not turn",
     "open_loop_acceleration": "a tenth of rated torque; hands over within 0.6 s where that allows it",
@@ -78,6 +80,13 @@ def _open_loop(x):
     """Current of the vector. Its stiffness is psi_m i - (L_q - L_d) i^2, at its most for psi_m / (2 (L_q - L_d))."""
     i, dL = 0.8 * x["i_rated"], x["L_q"] - x["L_d"]
     return min(i, x["psi_m"] / (2 * dL)) if dL > 0 else i
+
+
+def _damping(x, i_open):
+    """Of the rotor on the vector. It sees the swing by its EMF, psi_m times the swing's frequency at an amplitude of a radian; what
+    dead time and drops leave beside that is noise, which damping would turn into motion."""
+    swing = x["psi_m"] * math.sqrt(1.5 * x["pole_pairs"] ** 2 * x["psi_m"] * i_open / x["J"])
+    return 0.7 * min(1.0, swing / (0.4 * _lost(x))) if _lost(x) > 0 else 0.7
 
 
 def _reach(x):
@@ -128,7 +137,7 @@ def _hand_over(x, i_open, leads, tolerance):
     if leads:
         return 0.15 * rated, 0.27 * rated
     seen = (_lost(x) + tolerance / 0.3 * x["R_s"] * i_open) / (x["psi_m"] * x["pole_pairs"])
-    high = min(max(0.08 * rated, seen), SPEED_MOST * rated)
+    high = min(max(HAND_OVER * rated, seen), SPEED_MOST * rated)
     return max(0.04 * rated, 0.5 * high), high
 
 
@@ -179,6 +188,7 @@ def values(x, bandwidth=None, tolerance=MEASURED):
         "i_pulse": x["i_rated"],
         "start_method": 0 if leads else 2,
         "i_open_loop": i_open,
+        "open_loop_damping": _damping(x, i_open),
         "t_align": 0.5,
         "open_loop_acceleration": min(0.1 * jerk, high / 0.6),
         "t_stall": STALL_S,

@@ -1,0 +1,444 @@
+// Block commutation in the drive, firmware/drive/block.h: start, end, loss and search on the plant of a fan, with switching bridge,
+// dead time, leg capacitance and converter. The plant says where the rotor is.
+#include "firmware/drive/block.h"
+
+#include <cmath>
+#include <memory>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "firmware/drive/drive_parts.h"
+#include "firmware/params/parameters.h"
+#include "hal/sim/sim_loop.h"
+#include "tests/contract/bench.h"
+#include "tools/pmsim/machine_file.h"
+
+namespace
+{
+
+constexpr double kRated_rad_s = 314.16, kRated_Nm = 0.225, kAngle_deg = 1;
+
+class Fan
+{
+  public:
+    explicit Fan(double theta_rad = 1.0)
+        : setup_(pmsim::load_machine_file("sim_plant/machines/bldc_fan.yaml"))
+    {
+        pmsim::derive_board_parameters(setup_);
+        const char *error = nullptr;
+        plant_.reset(plant_create(&setup_.plant, theta_rad, &error));
+        EXPECT_NE(plant_, nullptr) << error;
+    }
+
+    drive_params_t &params()
+    {
+        return *setup_.params;
+    }
+
+    plant_t *plant()
+    {
+        return plant_.get();
+    }
+
+    drive_t &drive()
+    {
+        return loop_.app.drive;
+    }
+
+    drive_fault_t fault()
+    {
+        return drive_status(&drive())->fault;
+    }
+
+    bool driven() const
+    {
+        return loop_.app.out.legs != PM_LEGS_OFF;
+    }
+
+    void enable(drive_mode_t mode = DRIVE_MODE_SPEED)
+    {
+        const drive_result_t result = sim_loop_init(&loop_, plant(), &params());
+        ASSERT_TRUE(result.ok) << result.reason << " (parameter " << result.param << ")";
+        command_.enable = true;
+        command_.mode = mode;
+    }
+
+    void stop()
+    {
+        command_.enable = false;
+        drive_command(&drive(), &command_);
+    }
+
+    void speed_rel(double x)
+    {
+        command_.speed_mrad_s = static_cast<int32_t>(std::lround(1000 * kRated_rad_s * x));
+        drive_command(&drive(), &command_);
+    }
+
+    void torque_rel(double x)
+    {
+        command_.torque_uNm = static_cast<int32_t>(std::lround(1e6 * kRated_Nm * x));
+        drive_command(&drive(), &command_);
+    }
+
+    void current_A(double i)
+    {
+        command_.current_mA = static_cast<int32_t>(std::lround(1000 * i));
+        drive_command(&drive(), &command_);
+    }
+
+    // Periods, of which the worst angle is kept while block commutation has the rotor.
+    void run_s(double time_s)
+    {
+        worst_deg = 0;
+        for (long k = std::lround(time_s * 20e3); k > 0; --k) {
+            plant_truth_t truth;
+            plant_truth(plant(), &truth);
+            sim_loop_step(&loop_);
+            omega_rel = truth.omega_mech_rad_s / kRated_rad_s;
+            if (drive().stage == STAGE_SIX_STEP) {
+                const double error =
+                    bench::wrapped(truth.theta_e_rad - bench::rad(drive_status(&drive())->theta));
+                worst_deg = std::max(worst_deg, std::fabs(error) / bench::kDegree);
+            }
+        }
+    }
+
+    // Until there is a fault: seconds.
+    double until_fault_s(double most_s)
+    {
+        double time_s = 0;
+        for (; time_s < most_s && fault() == DRIVE_FAULT_NONE; time_s += 1e-3) {
+            run_s(1e-3);
+        }
+        return time_s;
+    }
+
+    double worst_deg = 0, omega_rel = 0;
+
+  private:
+    pmsim::Setup setup_;
+    std::unique_ptr<plant_t, decltype(&plant_destroy)> plant_{nullptr, &plant_destroy};
+    sim_loop_t loop_ = {};
+    drive_command_t command_ = {};
+};
+
+TEST(Block, StartsFromRestByTheCrossingsBothWays)
+{
+    for (const double direction : {1.0, -1.0}) {
+        Fan x;
+        x.enable();
+        x.speed_rel(0.4 * direction);
+        x.run_s(1.2);
+        ASSERT_EQ(x.fault(), DRIVE_FAULT_NONE);
+        ASSERT_EQ(x.drive().stage, STAGE_SIX_STEP);
+        x.run_s(0.1);
+        EXPECT_NEAR(x.omega_rel, 0.4 * direction, 0.02 * 0.4);
+        EXPECT_LT(x.worst_deg, kAngle_deg);
+        EXPECT_EQ(x.drive().block_tries, 0);
+        EXPECT_GT(direction * drive_status(&x.drive())->i.q, 0) << "it drives the fan";
+        EXPECT_EQ(drive_status(&x.drive())->quality, PM_ONE);
+    }
+}
+
+// Torque of the fan 1.8e-6 w^2, and its friction.
+TEST(Block, TorqueModeTurnsTheFanAtTheSpeedOfItsTorque)
+{
+    for (const double direction : {1.0, -1.0}) {
+        Fan x;
+        x.enable(DRIVE_MODE_TORQUE);
+        x.torque_rel(0.2 * direction);
+        x.run_s(2.0);
+        const double omega = std::sqrt((0.2 * kRated_Nm - 2e-3) / 1.8e-6);
+        EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+        EXPECT_NEAR(x.omega_rel, direction * omega / kRated_rad_s, 0.03 * 0.492);
+    }
+}
+
+TEST(Block, HoldsTheRotorWhileNoSpeedIsWanted)
+{
+    Fan x;
+    x.enable();
+    x.speed_rel(0);
+    x.run_s(0.8);
+    EXPECT_EQ(x.drive().stage, STAGE_OPEN_LOOP);
+    EXPECT_NEAR(x.omega_rel, 0, 1e-3);
+    EXPECT_TRUE(x.driven());
+    x.speed_rel(0.05); // below three quarters of six_step_speed
+    x.run_s(0.2);
+    EXPECT_EQ(x.drive().stage, STAGE_OPEN_LOOP);
+    x.speed_rel(0.4);
+    x.run_s(0.8);
+    EXPECT_EQ(x.drive().stage, STAGE_SIX_STEP);
+    EXPECT_NEAR(x.omega_rel, 0.4, 0.01);
+}
+
+// Braked slowly enough that crossings tell the speed, it ends at three quarters of six_step_speed; braked fast it is lost below
+// that, and looked for.
+TEST(Block, AReversalEndsItAndBeginsAnew)
+{
+    for (const int32_t acceleration : {60000, 300000}) {
+        Fan x;
+        x.params().acceleration = acceleration;
+        x.enable();
+        x.speed_rel(0.2);
+        x.run_s(1.7);
+        x.speed_rel(-0.2);
+        bool left = false;
+        for (int ms = 0; ms < 2600; ++ms) {
+            x.run_s(1e-3);
+            left = left || x.drive().stage != STAGE_SIX_STEP;
+        }
+        EXPECT_TRUE(left);
+        EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+        EXPECT_EQ(x.drive().stage, STAGE_SIX_STEP);
+        EXPECT_NEAR(x.omega_rel, -0.2, 0.01);
+    }
+}
+
+TEST(Block, AStopSwitchesOffAtTheLowerLimit)
+{
+    for (const int32_t acceleration : {60000, 300000}) {
+        Fan x;
+        x.params().acceleration = acceleration;
+        x.enable();
+        x.speed_rel(0.2);
+        x.run_s(1.7);
+        x.stop();
+        for (int ms = 0; ms < 1500 && drive_status(&x.drive())->state != DRIVE_OFF; ++ms) {
+            x.run_s(1e-3);
+        }
+        EXPECT_EQ(drive_status(&x.drive())->state, DRIVE_OFF);
+        if (acceleration < 100000) {
+            EXPECT_NEAR(x.omega_rel, 0.75 * 30 / kRated_rad_s, 0.01);
+        }
+        EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+        EXPECT_FALSE(x.driven());
+    }
+}
+
+// Slower than three quarters of six_step_speed is no reason to end while the command wants more.
+TEST(Block, OnceItFollowsItStays)
+{
+    Fan x;
+    x.params().six_step_speed = 100000;
+    x.enable();
+    x.speed_rel(0.4);
+    bool follows = false;
+    for (int ms = 0; ms < 1300; ++ms) {
+        x.run_s(1e-3);
+        const bool six_step = x.drive().stage == STAGE_SIX_STEP;
+        EXPECT_TRUE(six_step || !follows) << ms;
+        follows = follows || six_step;
+    }
+    EXPECT_NEAR(x.omega_rel, 0.4, 0.01);
+}
+
+// With diodes for the off time, where the voltage says nothing of the speed.
+TEST(Block, DiodesCarryTheOffTime)
+{
+    Fan x;
+    x.params().pattern = 3;
+    x.params().freewheeling = 0;
+    x.enable();
+    x.speed_rel(0.7);
+    x.run_s(1.3);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    EXPECT_EQ(x.drive().stage, STAGE_SIX_STEP);
+    EXPECT_NEAR(x.omega_rel, 0.7, 0.02);
+}
+
+TEST(Block, ARotorThatIsHeldIsAStallAfterItsTries)
+{
+    double last_s = 0;
+    for (const int32_t tries : {0, 2}) {
+        Fan x;
+        x.params().resync_tries = tries;
+        plant_set_locked(x.plant(), true);
+        x.enable();
+        x.speed_rel(0.4);
+        const double time_s = x.until_fault_s(5);
+        EXPECT_EQ(x.fault(), DRIVE_FAULT_STALL);
+        EXPECT_FALSE(x.driven());
+        EXPECT_EQ(x.drive().block_tries, tries);
+        EXPECT_GT(time_s, last_s + 0.3 * tries) << "each with an align";
+        last_s = time_s;
+    }
+}
+
+TEST(Block, AStartThatIsCalledOffIsNotTriedAgain)
+{
+    Fan x;
+    plant_set_locked(x.plant(), true);
+    x.enable();
+    x.speed_rel(0.4);
+    for (int ms = 0; ms < 2000 && x.drive().stage != STAGE_SIX_STEP; ++ms) {
+        x.run_s(1e-3);
+    }
+    ASSERT_EQ(x.drive().stage, STAGE_SIX_STEP);
+    x.stop();
+    x.run_s(0.5);
+    EXPECT_EQ(drive_status(&x.drive())->state, DRIVE_OFF);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    EXPECT_EQ(x.drive().block_tries, 0);
+}
+
+// Blocked while it runs: the crossings are gone at once.
+TEST(Block, LostSynchronismIsAFaultWithoutTheSearch)
+{
+    Fan x;
+    x.params().flying_start = 0;
+    x.enable();
+    x.speed_rel(0.4);
+    x.run_s(1.2);
+    plant_set_locked(x.plant(), true);
+    EXPECT_LT(x.until_fault_s(1), 0.1);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_POSITION_LOST);
+    EXPECT_FALSE(x.driven());
+}
+
+TEST(Block, ARotorThatIsThrownIsFoundAgain)
+{
+    for (const double speed : {1.0, 0.2}) {
+        Fan x;
+        x.enable();
+        x.speed_rel(0.5);
+        x.run_s(1.1);
+        plant_set_speed(x.plant(), speed * kRated_rad_s);
+        x.run_s(0.05);
+        plant_free_speed(x.plant());
+        x.run_s(1.3);
+        EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE) << speed;
+        EXPECT_EQ(x.drive().stage, STAGE_SIX_STEP) << speed;
+        x.run_s(0.1);
+        EXPECT_NEAR(x.omega_rel, 0.5, 0.01) << speed;
+        EXPECT_LT(x.worst_deg, kAngle_deg) << speed;
+    }
+}
+
+TEST(Block, FromTheVectorAtItsSpeedAndBackAtThreeQuarters)
+{
+    Fan x;
+    x.params().six_step_start = 0;
+    x.params().six_step_speed = 157080; // half of rated speed
+    x.enable();
+    x.speed_rel(0.45);
+    x.run_s(1.5);
+    EXPECT_EQ(x.drive().stage, STAGE_VECTOR);
+    x.speed_rel(0.6);
+    x.run_s(0.7);
+    EXPECT_EQ(x.drive().stage, STAGE_SIX_STEP);
+    x.run_s(0.1);
+    EXPECT_LT(x.worst_deg, kAngle_deg);
+    x.speed_rel(0.42);
+    x.run_s(0.7);
+    EXPECT_EQ(x.drive().stage, STAGE_SIX_STEP) << "above three quarters of it";
+    x.speed_rel(0.34);
+    x.run_s(0.7);
+    EXPECT_EQ(x.drive().stage, STAGE_VECTOR);
+    EXPECT_NEAR(x.omega_rel, 0.34, 0.01);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+}
+
+TEST(Block, CurrentModeIsTheVectors)
+{
+    Fan x;
+    x.enable(DRIVE_MODE_CURRENT);
+    x.current_A(1);
+    x.run_s(0.8);
+    EXPECT_NE(x.drive().stage, STAGE_SIX_STEP);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+}
+
+// At half of the link's voltage the speed cannot be reached: it says so.
+TEST(Block, TheEndOfTheVoltageIsSaid)
+{
+    Fan x;
+    x.enable();
+    x.speed_rel(0.4);
+    x.run_s(1.2);
+    EXPECT_EQ(drive_status(&x.drive())->limits & DRIVE_LIMIT_VOLTAGE, 0U);
+    plant_set_source(x.plant(), 13);
+    x.speed_rel(1.0);
+    uint32_t limits = 0;
+    for (int ms = 0; ms < 1500; ++ms) {
+        x.run_s(1e-3);
+        limits |= drive_status(&x.drive())->limits;
+    }
+    EXPECT_NE(limits & DRIVE_LIMIT_VOLTAGE, 0U);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    EXPECT_LT(x.omega_rel, 0.95);
+}
+
+TEST(Block, WithoutTorqueItIsHeld)
+{
+    Fan x;
+    x.enable(DRIVE_MODE_TORQUE);
+    x.torque_rel(0);
+    x.run_s(0.6);
+    EXPECT_EQ(x.drive().stage, STAGE_OPEN_LOOP);
+    EXPECT_NEAR(x.omega_rel, 0, 1e-3);
+    x.stop();
+    x.run_s(0.2);
+    EXPECT_EQ(drive_status(&x.drive())->state, DRIVE_OFF);
+}
+
+// theta_f + w (t_blank + T) <= 30 degrees: with a slow sample and four times the inductance, as told, less current is left,
+// least where the incoming leg is chopped.
+TEST(Block, TheFreewheelingLimitsTheCurrent)
+{
+    const auto most = [](int32_t pattern, int32_t limit) {
+        Fan x;
+        x.params().pattern = pattern;
+        x.params().freewheeling_limit = limit;
+        x.params().t_blank = 20000;
+        x.params().L_d = x.params().L_q = 4 * x.params().L_d;
+        x.enable(DRIVE_MODE_TORQUE);
+        x.torque_rel(0.2);
+        x.run_s(0.8);
+        x.torque_rel(0.8);
+        x.run_s(0.2);
+        EXPECT_EQ(x.drive().stage, STAGE_SIX_STEP);
+        return x.drive().i_ref.q / double(PM_ONE);
+    };
+    const double all = most(1, 0), high_leg = most(1, 1), last_60 = most(4, 1);
+    EXPECT_NEAR(all, 0.4, 0.01) << "of 10 A, the torque's 4 A";
+    EXPECT_LT(high_leg, 0.9 * all);
+    EXPECT_GT(high_leg, 0);
+    EXPECT_GT(last_60, 0);
+    EXPECT_NE(last_60, high_leg);
+}
+
+drive_result_t verdict(const drive_params_t &p)
+{
+    static drive_config_t c;
+    c = {};
+    return drive_configure(&c, &p, PM_CHANNELS);
+}
+
+TEST(Block, BlindIsTheTurnInBlankingAndAPeriod)
+{
+    Fan x;
+    drive_config_t c = {};
+    ASSERT_TRUE(drive_configure(&c, &x.params(), PM_CHANNELS).ok);
+    const double base_1_s = c.block.blind / double(PM_ONE) / (16e-6 + 1.0 / 20e3);
+    EXPECT_NEAR(c.block.omega_on / double(PM_ONE) * base_1_s, 4 * 30, 0.1); // electrical
+}
+
+TEST(Block, WhatItCannotDoIsRefused)
+{
+    Fan x;
+    ASSERT_TRUE(verdict(x.params()).ok);
+    drive_params_t heavy = x.params();
+    heavy.J *= 4;
+    heavy.i_open_loop = 100; // mA: 0.15 s for 30 degrees
+    EXPECT_EQ(verdict(heavy).param, DRIVE_PARAM_i_open_loop);
+    heavy.six_step_start = 0;
+    heavy.six_step_speed = heavy.speed_high;
+    EXPECT_TRUE(verdict(heavy).ok) << verdict(heavy).reason;
+    heavy.six_step_speed = heavy.speed_high - 1;
+    EXPECT_EQ(verdict(heavy).param, DRIVE_PARAM_six_step_speed);
+}
+
+} // namespace
