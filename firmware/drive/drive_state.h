@@ -41,7 +41,6 @@ struct drive {
     bool round;   /* the start has found no saliency: without injection until the next one */
     bool tried;   /* open loop: once more, with i_max */
     bool references_ready; /* the command's references are in per-unit */
-    uint8_t settle_ms;     /* open loop: until the voltage shows the rotor again */
     pm_dir_t ahead;        /* one and a half periods of rotation: from the sample to where the voltage acts */
     pm_unit_t v_share;     /* share of v_dc for current control */
     pm_ab_t v_acting;      /* commanded at k-1: acts over [k, k+1) */

@@ -4,8 +4,7 @@
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
 
-#define K_MEAN   PM_FRAC(0.05) /* 20 ms */
-#define K_SETTLE PM_FRAC(0.3)  /* 3 ms */
+#define K_MEAN PM_FRAC(0.05) /* 20 ms */
 
 void follow_reset(follow_t *self, const pm_machine_t *machine)
 {
@@ -52,22 +51,13 @@ static bool is_seen(const follow_t *self, pm_q_t omega)
     return across > half || pm_abs(self->along) > half;
 }
 
-static void filter(follow_t *self, const pm_machine_t *m, const follow_in_t *in, pm_frac_t k)
-{
-    const pm_q_t reactance = pm_mul(in->omega, m->L_d / 2 + m->L_q / 2);
-    (void)pm_lp1(&self->along, in->v.d - pm_mul(self->R, in->i), k);
-    (void)pm_lp1(&self->across, in->v.q - pm_mul(reactance, in->i), k);
-    self->emf = pm_mul(pm_abs(in->omega), m->psi_m);
-}
-
-void follow_settle(follow_t *self, const pm_machine_t *machine, const follow_in_t *in)
-{
-    filter(self, machine, in, K_SETTLE);
-}
-
 bool follow_slow(follow_t *self, const pm_machine_t *machine, const follow_in_t *in)
 {
-    filter(self, machine, in, K_MEAN);
+    const pm_machine_t *m = machine;
+    const pm_q_t reactance = pm_mul(in->omega, m->L_d / 2 + m->L_q / 2);
+    (void)pm_lp1(&self->along, in->v.d - pm_mul(self->R, in->i), K_MEAN);
+    (void)pm_lp1(&self->across, in->v.q - pm_mul(reactance, in->i), K_MEAN);
+    self->emf = pm_mul(pm_abs(in->omega), m->psi_m);
     if (PM_HAS(load_current)) {
         self->turned = pm_min(self->turned + in->turn, self->least);
     }

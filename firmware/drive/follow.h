@@ -68,9 +68,6 @@ void follow_resume(follow_t *self);
 void follow_rest(follow_t *self, pm_q_t v_d);
 void follow_rested(follow_t *self, const pm_machine_t *machine, pm_q_t i, pm_q_t v_dc);
 
-/* In its place while the current of a vector that has resumed settles: the lag is found in a few milliseconds, nothing is judged. */
-void follow_settle(follow_t *self, const pm_machine_t *machine, const follow_in_t *in);
-
 /* True: the rotor does not follow. */
 bool follow_slow(follow_t *self, const pm_machine_t *machine, const follow_in_t *in);
 

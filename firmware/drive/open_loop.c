@@ -12,8 +12,6 @@
 #define WAIT_MS  500U /* for it, from speed_high on */
 /* Of an angle, to FOLLOW_TURN. */
 #define PER_TURN (INT32_MAX / (FOLLOW_TURN / 2))
-/* After a resume: the step of the current is no swing, and neither is what R, L and psi_m are not known to. */
-#define SETTLE_MS 10U
 /* With more current, before the vector turns once more. */
 #define REST_MS 100U
 
@@ -24,7 +22,6 @@ static void begin(drive_t *drive)
     drive->agree_ms = 0;
     drive->wait_ms = 0;
     if (PM_HAS(load_current)) {
-        drive->settle_ms = 0;
         drive->rest_ms = 0;
         drive->tried = false;
     }
@@ -70,9 +67,6 @@ void open_loop_resume(drive_t *drive)
                     drive->omega_ramp);
     follow_resume(&drive->follow);
     begin(drive);
-    if (PM_HAS(load_current)) {
-        drive->settle_ms = SETTLE_MS;
-    }
 }
 
 static void hand_over(drive_t *drive)
@@ -168,9 +162,6 @@ static void damp(drive_t *drive)
     const pm_q_t steady = is_fast(drive) ? drive->emf_open : 0; /* what R, L and psi_m are not known to */
     const pm_q_t emf = emf_of_speed(drive) - pm_mul(drive->omega_ramp, c->machine.psi_m);
     const pm_q_t seen = steady + pm_clamp(emf - steady, -v, v);
-    if (PM_HAS(load_current) && drive->settle_ms > 0U) {
-        drive->emf_open = seen;
-    }
     const pm_q_t swing = seen - pm_lp1(&drive->emf_open, seen, c->open_loop.k_swing);
     drive->omega_open = drive->omega_ramp - pm_small_gain(pm_small(swing), c->open_loop.per_swing);
 }
@@ -215,11 +206,6 @@ static void watch(drive_t *drive)
                             .i = drive->i_open,
                             .v_dc = drive->status.v_dc,
                             .turn = pm_abs(drive->turn_open) / PER_TURN * (int32_t)c->slow_divider};
-    if (PM_HAS(load_current) && drive->settle_ms > 0U) {
-        drive->settle_ms--;
-        follow_settle(&drive->follow, &c->machine, &in);
-        return;
-    }
     if (follow_slow(&drive->follow, &c->machine, &in)) {
         try_again(drive);
         return;

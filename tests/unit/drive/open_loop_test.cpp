@@ -359,35 +359,6 @@ TEST(OpenLoop, ResumeKeepsTorqueAndVoltage)
     }
 }
 
-// The step of the current is no swing, and neither is what the EMF differs by from psi_m: the vector goes on at the rotor's
-// speed, and then its lag is known.
-TEST(OpenLoop, ResumeDoesNotKickTheRotor)
-{
-    for (const double way : {1.0, -1.0}) {
-        for (const double share : {0.85, 1.15}) {
-            Drive x = started();
-            x.d.stage = STAGE_VECTOR;
-            x.d.position.pll.omega = x.d.omega_target = bench::fixed(0.1 * way, 28);
-            x.d.status.i = bench::dq({-0.05, 0.1 * way});
-            open_loop_resume(&x.d);
-            const pm_machine_t &m = x.d.config.machine;
-            const double omega = 0.1 * way, i = real(x.d.i_open);
-            const double lag = std::asin(0.1 * way / i);
-            const Complex i_rotor = std::polar(i, lag);
-            const Complex L_i = {real(m.L_d) * i_rotor.real(), real(m.L_q) * i_rotor.imag()};
-            for (int ms = 0; ms < 50; ++ms) {
-                const Complex turning = real(x.d.omega_open) * L_i + omega * share * real(m.psi_m);
-                const Complex steady = (real(m.R_s) * i_rotor + bench::kJ * turning) * std::polar(1.0, -lag);
-                const Complex v = steady + std::pow(-0.3, ms) * Complex{0.1, -0.1}; // L di/dt
-                x.d.status.i = {x.d.i_open, 0};
-                x.d.voltage.v = {bench::fixed(v.real(), PM_WIDE_BITS), bench::fixed(v.imag(), PM_WIDE_BITS)};
-                open_loop_slow(&x.d);
-                EXPECT_NEAR(real(x.d.omega_open), omega, 0.1 * std::abs(omega)) << ms;
-            }
-        }
-    }
-}
-
 // The observer falls back to the open loop only without injection, and when both reference and estimate are below
 // omega_low (0.117 of the base), whichever way they turn.
 TEST(OpenLoop, FallsBackWhenReferenceAndEstimateAreSlow)
