@@ -3,9 +3,12 @@
  *
  * With PM_LEG_PWM the mean voltage of a terminal against the negative rail is, dead time and drops aside,
  *   v = duty v_dc.
- * With the other states a diode, the motor or a closed switch decides. One switch alone has no dead time: to LOWER from
- * UPPER or HIGH, to UPPER from LOWER or LOW, and from LOWER to HIGH a leg goes by a period of OFF or PWM. Tests: tests/contract/hal,
- * tests/unit/drive. */
+ * With the other states a diode, the motor or a closed switch decides. One switch alone has no dead time. These changes
+ * need a period of OFF or PWM between:
+ *   UPPER or HIGH to LOWER
+ *   LOWER or LOW  to UPPER
+ *   LOWER         to HIGH
+ * Tests: tests/contract/hal, tests/unit/drive. */
 #ifndef PM_MATH_LEGS_H
 #define PM_MATH_LEGS_H
 

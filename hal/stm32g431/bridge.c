@@ -8,7 +8,7 @@ enum {
     COUNTS_LEAST = 2125, /* 40 kHz: the control interrupt needs its time */
     COUNTS_SAFE = 4250,  /* in place of a refused value: everything else is timed by this clock */
     DEAD_TIME_LEAST_ns = 300,
-    COMMUTATE_LEAST = 510, /* 3 us: until then the control interrupt has written to what */
+    COMMUTATE_LEAST = 510, /* 3 us: by then the control interrupt has written the states to come */
     BREAK_FILTER = 12,     /* of BKF: 8 samples at 1/16 of the clock, 0.75 us */
     BREAK_LEVEL_MOST = 0x7FFF,
     DETECTOR_2_9_V = 6, /* of PLS: below it the converters' reference is wrong, too */
@@ -182,7 +182,7 @@ static void write_states(uint32_t legs)
     port_hal.written = legs;
 }
 
-/* Of the last period a commutation is over, of this one it is still to come. */
+/* The states of this period take effect now; those behind its commutation wait for TIM3. */
 void bridge_begin_period(void)
 {
     write_states(port_hal.legs);

@@ -1,5 +1,6 @@
 /* Pins of the board. After reset every pin is analog but those of the debugger, so analog ones need nothing:
- * PA0 V bus, PA1 to PA3 amplifier U, PA5 to PA7 amplifier V, PB0 to PB2 amplifier W, PA4, PC4 and PB11 terminals (PB11 or neutral), PB12 dial, PB14 NTC. */
+ * PA0 V bus, PA1 to PA3 amplifier U, PA5 to PA7 amplifier V, PB0 to PB2 amplifier W, PA4, PC4 and PB11
+ * terminals (PB11 or neutral), PB12 dial, PB14 NTC. */
 #include "hal/stm32g431/internal.h"
 #include "hal/stm32g431/registers/gpio.h"
 

@@ -1,9 +1,8 @@
 /* Port for ST's B-G431B-ESC1 (STM32G431CB, 170 MHz): the state that the application allocates.
  *
  * Both halves of a carrier period are equal: compare[leg][0] serves both. New compare values take effect at
- * the centre of the zero vector, a change of the legs' states about 1 us later, in programs
- * with more channels up to 2.1 us. docs/board.md has wiring and
- * bench checks, README.md here the registers that are used. */
+ * the centre of the zero vector, a change of the legs' states about 1 us later, in programs with more channels up to 2.1 us.
+ * docs/board.md has wiring and bench checks, README.md here the registers that are used. */
 #ifndef STM32G431_PORT_H
 #define STM32G431_PORT_H
 

@@ -1,5 +1,5 @@
-// Block commutation in the drive, firmware/drive/block.h: start, end, loss and search on the plant of a fan, with switching bridge,
-// dead time, leg capacitance and converter. The plant says where the rotor is.
+// Block commutation in the drive, firmware/drive/block.h: start, end, loss and search on the plant of a fan, with switching
+// bridge, dead time, leg capacitance and converter. The plant says where the rotor is.
 #include "firmware/drive/block.h"
 
 #include <cmath>
@@ -62,6 +62,15 @@ class Fan
         ASSERT_TRUE(result.ok) << result.reason << " (parameter " << result.param << ")";
         command_.enable = true;
         command_.mode = mode;
+    }
+
+    // A ramp to a fifth of rated speed.
+    void turn(int32_t acceleration_mrad_s2)
+    {
+        params().acceleration = acceleration_mrad_s2;
+        enable();
+        speed_rel(0.2);
+        run_s(1.7);
     }
 
     void stop()
@@ -174,37 +183,29 @@ TEST(Block, HoldsTheRotorWhileNoSpeedIsWanted)
     EXPECT_NEAR(x.omega_rel, 0.4, 0.01);
 }
 
-// Braked slowly enough that crossings tell the speed, it ends at three quarters of six_step_speed; braked fast it is lost below
-// that, and looked for.
 TEST(Block, AReversalEndsItAndBeginsAnew)
 {
-    for (const int32_t acceleration : {60000, 300000}) {
-        Fan x;
-        x.params().acceleration = acceleration;
-        x.enable();
-        x.speed_rel(0.2);
-        x.run_s(1.7);
-        x.speed_rel(-0.2);
-        bool left = false;
-        for (int ms = 0; ms < 2600; ++ms) {
-            x.run_s(1e-3);
-            left = left || x.drive().stage != STAGE_SIX_STEP;
-        }
-        EXPECT_TRUE(left);
-        EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
-        EXPECT_EQ(x.drive().stage, STAGE_SIX_STEP);
-        EXPECT_NEAR(x.omega_rel, -0.2, 0.01);
+    Fan x;
+    x.turn(60000);
+    x.speed_rel(-0.2);
+    bool left = false;
+    for (int ms = 0; ms < 2600; ++ms) {
+        x.run_s(1e-3);
+        left = left || x.drive().stage != STAGE_SIX_STEP;
     }
+    EXPECT_TRUE(left);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    EXPECT_EQ(x.drive().stage, STAGE_SIX_STEP);
+    EXPECT_NEAR(x.omega_rel, -0.2, 0.01);
 }
 
+// Braked slowly enough that crossings tell the speed, it ends at three quarters of six_step_speed; braked fast it is lost below
+// that, which ends it as well.
 TEST(Block, AStopSwitchesOffAtTheLowerLimit)
 {
     for (const int32_t acceleration : {60000, 300000}) {
         Fan x;
-        x.params().acceleration = acceleration;
-        x.enable();
-        x.speed_rel(0.2);
-        x.run_s(1.7);
+        x.turn(acceleration);
         x.stop();
         for (int ms = 0; ms < 1500 && drive_status(&x.drive())->state != DRIVE_OFF; ++ms) {
             x.run_s(1e-3);
@@ -439,6 +440,17 @@ TEST(Block, WhatItCannotDoIsRefused)
     EXPECT_TRUE(verdict(heavy).ok) << verdict(heavy).reason;
     heavy.six_step_speed = heavy.speed_high - 1;
     EXPECT_EQ(verdict(heavy).param, DRIVE_PARAM_six_step_speed);
+}
+
+// The drive board has no samples within the period yet.
+TEST(Block, ABoardWithoutItsChannelsRefusesIt)
+{
+    Fan x;
+    for (const uint32_t channel : {NEEDS_TERMINALS, NEEDS_SECOND_SAMPLE, NEEDS_COMMUTATE}) {
+        drive_config_t c = {};
+        EXPECT_EQ(drive_configure(&c, &x.params(), PM_CHANNELS & ~channel).param, DRIVE_PARAM_commutation)
+            << channel;
+    }
 }
 
 } // namespace

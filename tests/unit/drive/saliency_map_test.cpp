@@ -1,4 +1,4 @@
-// The saliency map by the drive's own functions; on the plants of tests/scenario/saliency_map.yaml with all their effects there.
+// The saliency map by the drive's own functions; with all effects of the plant in tests/scenario/saliency_map.yaml.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -45,6 +45,13 @@ class Bench
         }
     }
 
+    void measure()
+    {
+        command(true);
+        run_s(16);
+        ASSERT_EQ(report().state, COMMISSIONING_DONE);
+    }
+
     const commissioning_report_t &report() const
     {
         return loop.app.drive.commissioning_report;
@@ -83,9 +90,7 @@ TEST(SaliencyMap, FollowsThePoleOfTheRotor)
 {
     Bench north(locked(), 2.0), south(locked(), 2.0 + M_PI);
     for (Bench *x : {&north, &south}) {
-        x->command(true);
-        x->run_s(16);
-        ASSERT_EQ(x->report().state, COMMISSIONING_DONE);
+        x->measure();
         EXPECT_EQ(x->report().progress, 100);
         sim_loop_step(&x->loop);
         EXPECT_FALSE(x->driven());
@@ -162,9 +167,7 @@ TEST(SaliencyMap, TakesWhatIdentificationHasFound)
     before.R = told.loop.app.drive.config.machine.R_s;
     before.L_d = told.loop.app.drive.config.machine.L_d;
     for (Bench *x : {&told, &found}) {
-        x->command(true);
-        x->run_s(16);
-        ASSERT_EQ(x->report().state, COMMISSIONING_DONE);
+        x->measure();
     }
     EXPECT_NEAR(real(told.map().rated.L_q) / real(found.map().rated.L_q), 1, 0.005);
 }
@@ -203,9 +206,7 @@ TEST(SaliencyMap, TheOtherPoleIsThatOfAnInverseMachine)
         !as_it_is.loop.app.drive.config.saliency_map.reversed;
     inverse.loop.app.drive.config.saliency_map.best = false;
     for (Bench *x : {&as_it_is, &inverse}) {
-        x->command(true);
-        x->run_s(16);
-        ASSERT_EQ(x->report().state, COMMISSIONING_DONE);
+        x->measure();
     }
     for (int row = 0; row < SALIENCY_MAP_SIDE; ++row) {
         for (int column = 0; column < SALIENCY_MAP_SIDE; ++column) {
