@@ -1,4 +1,4 @@
-/* Of TIM1: main output, dead time, lock, break. Only tim1.c and tests use it. */
+/* Of TIM1: main output, dead time, lock, break. Only tim1*.c and tests use it. */
 #ifndef BOARD_TIM1_BREAK_H
 #define BOARD_TIM1_BREAK_H
 
