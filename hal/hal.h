@@ -107,7 +107,8 @@ void hal_reset(hal_t *hal); /* thread: bridge off, then restart; does not return
 
 /* control, budget 60 instructions: compare values take effect at the next update event, a change of the
  * legs' states there or within 2.5 us after it; out->trip switches all off at once.
- * A commutation within the period is at its instant, but not before 3 us from the update event on.
+ * A commutation within the period is at its instant, but not before 3 us from the update event on. A further sample is at its
+ * instant, or not taken within 5 us of the period's ends, which pm_measure_t.sampled tells.
  * Without NEEDS_HALVES compare[leg][0] serves both halves. */
 void hal_bridge_write(hal_t *hal, const drive_out_t *out);
 

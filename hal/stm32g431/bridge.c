@@ -9,7 +9,12 @@ enum {
     COUNTS_SAFE = 4250,  /* in place of a refused value: everything else is timed by this clock */
     DEAD_TIME_LEAST_ns = 300,
     COMMUTATE_LEAST = 510, /* 3 us: by then the control interrupt has written the states to come */
-    BREAK_FILTER = 12,     /* of BKF: 8 samples at 1/16 of the clock, 0.75 us */
+    /* Of further samples. The converters are started ahead of the instant, since the currents come first; */
+    SAMPLE_AHEAD = 200,
+    SAMPLE_FIRST = 510 + SAMPLE_AHEAD, /* not before those of the zero vector have been read, */
+    SAMPLE_BEFORE_END = 300,           /* nor so late that they could not be read before the next */
+    SAMPLE_NONE = 85,                  /* the converters are busy then */
+    BREAK_FILTER = 12,                 /* of BKF: 8 samples at 1/16 of the clock, 0.75 us */
     BREAK_LEVEL_MOST = 0x7FFF,
     DETECTOR_2_9_V = 6, /* of PLS: below it the converters' reference is wrong, too */
 };
@@ -50,20 +55,49 @@ static uint32_t modes_34(uint32_t third)
            TIM_CCMR2_OC4PE;
 }
 
+#if PM_CARRIES(NEEDS_COMMUTATE | NEEDS_SECOND_SAMPLE)
+/* Counts from each update event of TIM1 on. Its channel is the trigger output. */
+static void start_counting(tim_t *timer, uint32_t mode)
+{
+    timer->CR2 = reg_field(TIM_CR2_MMS, TIM_MMS_OC1REF);
+    timer->SMCR = reg_field(TIM_SMCR_SMS, TIM_SMS_RESET) | reg_field(TIM_SMCR_TS, TIM_TS_TIM1);
+    timer->CCMR1 = reg_field(TIM_CCMR1_OC1M, mode) | TIM_CCMR1_OC1PE;
+    timer->ARR = UINT16_MAX;
+    timer->CCR1 = 0U;
+    timer->EGR = TIM_EGR_UG;
+    TIM1.CR2 |= reg_field(TIM_CR2_MMS, TIM_MMS_UPDATE);
+}
+#endif
+
 #if PM_CARRIES(NEEDS_COMMUTATE)
-/* Counts from each update event of TIM1. Its channel rises at CCR1, which is a COM event; with 0 it is always high. */
+/* Its channel rises at CCR1, which is a COM event; with 0 it is always high. */
 static void configure_commutation(void)
 {
     RCC.APB1ENR1 |= RCC_APB1ENR1_TIM3EN;
-    TIM3.CR2 = reg_field(TIM_CR2_MMS, TIM_MMS_OC1REF);
-    TIM3.SMCR = reg_field(TIM_SMCR_SMS, TIM_SMS_RESET) | reg_field(TIM_SMCR_TS, TIM_TS_TIM1);
-    TIM3.CCMR1 = reg_field(TIM_CCMR1_OC1M, TIM_OCM_PWM2) | TIM_CCMR1_OC1PE;
-    TIM3.ARR = UINT16_MAX;
-    TIM3.CCR1 = 0U;
-    TIM3.EGR = TIM_EGR_UG;
+    start_counting(&TIM3, TIM_OCM_PWM2);
     TIM3.CR1 = TIM_CR1_CEN;
     TIM1.SMCR = reg_field(TIM_SMCR_TS, TIM_TS_TIM3);
-    TIM1.CR2 |= reg_field(TIM_CR2_MMS, TIM_MMS_UPDATE) | TIM_CR2_CCUS;
+    TIM1.CR2 |= TIM_CR2_CCUS;
+}
+#endif
+
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+/* Its channel rises at the update event and falls at CCR1: both edges start the converters. It is low until the first one. */
+static void configure_samples(uint32_t counts)
+{
+    RCC.APB1ENR1 |= RCC_APB1ENR1_TIM4EN;
+    start_counting(&TIM4, TIM_OCM_PWM1);
+    TIM4.CCR1 = SAMPLE_NONE;
+    port_hal.instants = 2U * counts - (uint32_t)SAMPLE_BEFORE_END - (uint32_t)SAMPLE_FIRST;
+    port_hal.sample.taken = 0U;
+}
+
+/* In the period after the coming update event. */
+static void write_instants(const pm_instants_t *instants)
+{
+    const uint32_t at = instants->sample_at[0];
+    TIM4.CCR1 = at - (uint32_t)SAMPLE_FIRST <= port_hal.instants ? at - (uint32_t)SAMPLE_AHEAD
+                                                                 : (uint32_t)SAMPLE_NONE;
 }
 #endif
 
@@ -84,6 +118,9 @@ static void configure_timer(uint32_t counts)
 #endif
 #if PM_CARRIES(NEEDS_COMMUTATE)
     configure_commutation();
+#endif
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    configure_samples(counts);
 #endif
     TIM1.AF1 = TIM_AF1_BKINE | TIM_AF1_BKCMP1E | TIM_AF1_BKCMP2E | TIM_AF1_BKCMP4E;
     TIM1.RCR = 0U;
@@ -150,6 +187,9 @@ hal_status_t bridge_start(hal_t *hal, const hal_config_t *config)
  * the counter is started. After: the update event is at the overflow, the centre of the zero vector. */
 void bridge_run(void)
 {
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    TIM4.CR1 = TIM_CR1_CEN;
+#endif
     TIM1.CR1 |= TIM_CR1_CEN;
     TIM1.RCR = 1U;
 }
@@ -199,6 +239,9 @@ void hal_bridge_write(hal_t *hal, const drive_out_t *out)
     TIM1.CCR2 = out->compare[1][0];
     TIM1.CCR3 = out->compare[2][0];
     port_hal.legs = out->legs;
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    write_instants(&out->instants);
+#endif
 #if PM_CARRIES(NEEDS_COMMUTATE)
     const uint32_t at = out->instants.commutate_at;
     TIM3.CCR1 = at != 0U && at < COMMUTATE_LEAST ? COMMUTATE_LEAST : at;
@@ -250,6 +293,9 @@ void hal_bridge_write(hal_t *hal, const drive_out_t *out)
     TIM1.CCR2 = on_time(out, 1);
     TIM1.CCR3 = on_time(out, 2);
     port_hal.legs = enables_of(out->legs);
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    write_instants(&out->instants);
+#endif
     if (out->trip != 0U) {
         TIM1.BDTR = port_hal.bridge;
         port_hal.legs = 0U;

@@ -6,6 +6,12 @@
 
 void port_control(void)
 {
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    if (measure_is_within()) {
+        measure_take_sample();
+        return;
+    }
+#endif
 #if PORT_BY_COM
     bridge_begin_period();
 #else

@@ -19,6 +19,15 @@ enum {
     ADC2_TERMINAL_V = 5,
 };
 
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+#define TRIGGERS                                                                                             \
+    (reg_field(ADC_JSQR_JEXTSEL, ADC_JEXTSEL_TIM4_TRGO) | reg_field(ADC_JSQR_JEXTEN, ADC_JEXTEN_BOTH))
+#define STARTED_WITHIN 800U /* 4.7 us: the first sequence has ended for 2 us, and no other before */
+#else
+#define TRIGGERS                                                                                             \
+    (reg_field(ADC_JSQR_JEXTSEL, ADC_JEXTSEL_TIM1_TRGO2) | reg_field(ADC_JSQR_JEXTEN, ADC_JEXTEN_RISING))
+#endif
+
 #define BREAKS (TIM_SR_BIF | TIM_SR_SBIF)
 
 /* Regular conversions take turns, one per ms. */
@@ -40,8 +49,7 @@ static void start_converter(adc_t *adc)
 
 static uint32_t sequence_of(uint32_t first, uint32_t second)
 {
-    return reg_field(ADC_JSQR_JL, 1U) | reg_field(ADC_JSQR_JEXTSEL, ADC_JEXTSEL_TIM1_TRGO2) |
-           reg_field(ADC_JSQR_JEXTEN, ADC_JEXTEN_RISING) | reg_field(ADC_JSQR_JSQ1, first) |
+    return reg_field(ADC_JSQR_JL, 1U) | TRIGGERS | reg_field(ADC_JSQR_JSQ1, first) |
            reg_field(ADC_JSQR_JSQ2, second);
 }
 
@@ -140,6 +148,55 @@ __attribute__((noinline, cold)) static void clear_breaks(uint32_t breaks)
     TIM1.SR = ~breaks;
 }
 
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+bool measure_is_within(void)
+{
+    return TIM4.CNT > STARTED_WITHIN;
+}
+
+/* Before the sequence at the end of the period has a result. */
+void measure_take_sample(void)
+{
+    port_sample_t *sample = &port_hal.sample;
+    ADC1.ISR = ADC_ISR_JEOS;
+    sample->taken = 1U;
+    sample->i[0] = current_code(ADC1.JDR1);
+    sample->i[1] = current_code(ADC2.JDR1);
+    sample->i[2] = current_code(ADC1.JDR2);
+#if PORT_AT_PB11 == NEEDS_TERMINALS
+    sample->v[0] = code_of(ADC2.JDR2 * 16U);
+    sample->v[1] = code_of(ADC2.JDR3 * 16U);
+    sample->v[2] = code_of(ADC1.JDR3 * 16U);
+    sample->v_dc = code_of(ADC1.JDR4 * 16U);
+#endif
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    sample->v_neutral = code_of(ADC1.JDR3 * 16U);
+#endif
+}
+
+static void give_sample(pm_measure_t *more)
+{
+    port_sample_t *sample = &port_hal.sample;
+    more->sampled = sample->taken;
+    if (sample->taken == 0U) {
+        return;
+    }
+    sample->taken = 0U;
+    for (uint32_t leg = 0; leg < PM_LEGS; ++leg) {
+        more->i_sample[0][leg] = sample->i[leg];
+#if PM_CARRIES(NEEDS_TERMINALS)
+        more->v_sample[0][leg] = sample->v[leg];
+#endif
+    }
+#if PM_CARRIES(NEEDS_TERMINALS)
+    more->v_dc_sample[0] = sample->v_dc;
+#endif
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    more->v_neutral_sample[0] = sample->v_neutral;
+#endif
+}
+#endif
+
 void hal_measure(hal_t *hal, drive_in_t *in)
 {
     (void)hal;
@@ -156,6 +213,9 @@ void hal_measure(hal_t *hal, drive_in_t *in)
 #endif
 #if PM_CARRIES(NEEDS_NEUTRAL)
     in->more.v_neutral = code_of(ADC1.JDR3 * 16U);
+#endif
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    give_sample(&in->more);
 #endif
     in->hw_fault = false;
     const uint32_t breaks = TIM1.SR & BREAKS;

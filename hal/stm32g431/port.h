@@ -2,6 +2,8 @@
  *
  * Both halves of a carrier period are equal: compare[leg][0] serves both. New compare values take effect at
  * the centre of the zero vector, a change of the legs' states about 1 us later, in programs with more channels up to 2.1 us.
+ * A further sample is taken at instants from 4.2 us after the update event to 1.8 us before the next; its terminals are held
+ * within 0.4 us of the instant, the currents 1 us earlier.
  * docs/board.md has wiring and bench checks, README.md here the registers that are used. */
 #ifndef STM32G431_PORT_H
 #define STM32G431_PORT_H
@@ -16,9 +18,8 @@
 #define PORT_AT_PB11 NEEDS_NEUTRAL
 #endif
 
-/* As wired and programmed today, beside three leg currents and the DC-link voltage; both halves of a period alike. A
- * second sample is within TIM1 and the converters and not yet programmed. */
-#define PORT_CHANNELS (PORT_AT_PB11 | NEEDS_HELD | NEEDS_ONE_SWITCH | NEEDS_COMMUTATE)
+/* As wired and programmed today, beside three leg currents and the DC-link voltage; both halves of a period alike. */
+#define PORT_CHANNELS (PORT_AT_PB11 | NEEDS_SECOND_SAMPLE | NEEDS_HELD | NEEDS_ONE_SWITCH | NEEDS_COMMUTATE)
 
 /* States of legs are written ahead and change by COM events. */
 #define PORT_BY_COM PM_CARRIES(NEEDS_ONE_SWITCH | NEEDS_COMMUTATE)
@@ -38,6 +39,21 @@ typedef struct {
     volatile uint32_t lost;
 } port_can_t;
 
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+/* Codes of the sample within the last period. */
+typedef struct {
+    uint16_t taken;
+    uint16_t i[PM_LEGS];
+#if PM_CARRIES(NEEDS_TERMINALS)
+    uint16_t v[PM_LEGS];
+    uint16_t v_dc;
+#endif
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    uint16_t v_neutral;
+#endif
+} port_sample_t;
+#endif
+
 enum { PORT_TEMPERATURE, PORT_DIAL, PORT_REFERENCE, PORT_TURNS };
 
 struct hal {
@@ -51,6 +67,10 @@ struct hal {
 #endif
 #if PM_CARRIES(NEEDS_COMMUTATE)
     uint32_t then; /* PM_LEGS_... from the instant of the coming period on, or legs */
+#endif
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    uint32_t instants; /* at which a sample is taken, from the first on */
+    port_sample_t sample;
 #endif
     uint32_t bridge; /* BDTR with everything but the main output enable */
     bool refused;    /* the bridge cannot be armed */

@@ -14,8 +14,8 @@
 #define CONVERSION    12.5
 #define LATENCY       2.125 /* from trigger to sampling */
 #define LATENCY_ABORT 3.125 /* breaking off a regular conversion */
-#define TRGO2         8u
-#define RISING        1u
+#define RISING        1u    /* of JEXTEN */
+#define FALLING       2u
 #define JQDIS         0x80000000u
 #define FLAGS         (ADC_ADRDY | ADC_EOC | ADC_EOS | ADC_JEOC | ADC_JEOS)
 #define CCR           0x08u
@@ -123,11 +123,12 @@ static void plan(adc_t *adc)
     cpu_alarm(adc->chip->cpu, adc, next, due);
 }
 
-static void trigger_one(adc_converter_t *c, uint64_t cycle)
+static void trigger_one(adc_converter_t *c, uint64_t cycle, adc_source_t source, bool rises)
 {
     uint32_t jsqr = c->regs.value[ADC_JSQR / 4];
     bool armed = (c->regs.value[ADC_CR / 4] & ADC_JADSTART) != 0u;
-    if (!armed || !on(c, cycle) || board_field(jsqr, 2, 5) != TRGO2 || board_field(jsqr, 7, 2) != RISING) {
+    if (!armed || !on(c, cycle) || board_field(jsqr, 2, 5) != source ||
+        (board_field(jsqr, 7, 2) & (rises ? RISING : FALLING)) == 0u) {
         return;
     }
     if (c->converted < c->ranks) {
@@ -151,11 +152,11 @@ static void trigger_one(adc_converter_t *c, uint64_t cycle)
     }
 }
 
-void adc_trigger(adc_t *adc, uint64_t cycle)
+void adc_trigger(adc_t *adc, uint64_t cycle, adc_source_t source, bool rises)
 {
     adc_sync(adc, cycle);
     for (int n = 0; n < ADC_CONVERTERS; n++) {
-        trigger_one(&adc->converter[n], cycle);
+        trigger_one(&adc->converter[n], cycle, source, rises);
     }
     plan(adc);
 }
@@ -291,7 +292,7 @@ static void write_cr(adc_converter_t *c, uint32_t before, uint64_t now)
     if ((rises & (ADC_ADSTART | ADC_JADSTART)) != 0u && !on(c, now)) {
         refuse(c, "CR: conversions asked of a converter that is not ready");
     }
-    if ((rises & ADC_JADSTART) != 0u && board_field(c->regs.value[ADC_JSQR / 4], 7, 2) != RISING) {
+    if ((rises & ADC_JADSTART) != 0u && (board_field(c->regs.value[ADC_JSQR / 4], 7, 2) & RISING) == 0u) {
         refuse(c, "JSQR: injected conversions without a rising trigger are not modelled");
     }
     if ((rises & ADC_ADSTART) != 0u) {

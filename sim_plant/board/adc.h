@@ -1,4 +1,4 @@
-/* ADC1 and ADC2: injected sequences by TIM1_TRGO2, one regular conversion by software. RM0440 21.
+/* ADC1 and ADC2: injected sequences by TIM1_TRGO2 or TIM4_TRGO, one regular conversion by software. RM0440 21.
  *
  * An input is sampled at the end of its sampling time: there the plant is looked at. An injected trigger
  * breaks off a regular conversion, which starts anew behind the sequence. Every input that the board does not
@@ -40,8 +40,9 @@ void adc_init(adc_t *adc, board_chip_t *chip);
 void adc_reset(adc_t *adc);
 cpu_device_t adc_device(adc_t *adc); /* both, and what they share */
 
-/* TIM1_TRGO2 has risen. */
-void adc_trigger(adc_t *adc, uint64_t cycle);
+/* A trigger output has risen or fallen: TIM1_TRGO2, TIM4_TRGO. */
+typedef enum { ADC_BY_TIM4 = 5, ADC_BY_TIM1 = 8 } adc_source_t; /* JEXTSEL */
+void adc_trigger(adc_t *adc, uint64_t cycle, adc_source_t source, bool rises);
 
 /* Everything that is sampled and converted up to that cycle. */
 void adc_sync(adc_t *adc, uint64_t cycle);

@@ -47,6 +47,7 @@ static void add_devices(board_chip_t *chip)
     add(chip, tim1_device(&chip->tim1), RCC_APB2ENR, 0x800u);
     add(chip, tim2_device(&chip->tim2), RCC_APB1ENR1, 0x1u);
     add(chip, tim3_device(&chip->tim3), RCC_APB1ENR1, 0x2u);
+    add(chip, tim4_device(&chip->tim4), RCC_APB1ENR1, 0x4u);
     add(chip, adc_device(&chip->adc), RCC_AHB2ENR, 0x2000u);
     add(chip, analog_opamp_device(&chip->analog), RCC_APB2ENR, 0x1u);
     add(chip, analog_comp_device(&chip->analog), RCC_APB2ENR, 0x1u);
@@ -70,6 +71,7 @@ void board_chip_init(board_chip_t *chip, cpu_t *cpu, plant_t *plant)
     tim1_init(&chip->tim1, chip);
     tim2_init(&chip->tim2, chip);
     tim3_init(&chip->tim3, chip);
+    tim4_init(&chip->tim4, chip);
     adc_init(&chip->adc, chip);
     analog_init(&chip->analog, chip);
     fdcan_init(&chip->fdcan, chip);
@@ -92,6 +94,7 @@ void board_chip_reset(board_chip_t *chip, uint32_t cause)
     gpio_reset(&chip->gpio);
     tim2_reset(&chip->tim2);
     tim3_reset(&chip->tim3);
+    tim4_reset(&chip->tim4);
     adc_reset(&chip->adc);
     analog_reset(&chip->analog);
     fdcan_reset(&chip->fdcan);

@@ -14,6 +14,7 @@
 #include "sim_plant/board/tim1.h"
 #include "sim_plant/board/tim2.h"
 #include "sim_plant/board/tim3.h"
+#include "sim_plant/board/tim4.h"
 #include "sim_plant/board/usart.h"
 
 #define BOARD_FIXED_DEVICES 24
@@ -34,6 +35,7 @@ struct board_chip {
     tim1_t tim1;
     tim2_t tim2;
     tim3_t tim3;
+    tim4_t tim4;
     adc_t adc;
     analog_t analog;
     fdcan_t fdcan;

@@ -49,7 +49,7 @@ static const board_register_t list[] = {
     {CICR, "CICR", 0, CSSF, 0},
     {RCC_AHB1ENR, "AHB1ENR", 0x00000100u, 0, 0},
     {RCC_AHB2ENR, "AHB2ENR", 0, 0x00042007u, 0},             /* GPIOA to C, ADC12, DAC3 */
-    {RCC_APB1ENR1, "APB1ENR1", 0x00000400u, 0x12020003u, 0}, /* PWR, FDCAN, USART2, TIM3, TIM2 */
+    {RCC_APB1ENR1, "APB1ENR1", 0x00000400u, 0x12020007u, 0}, /* PWR, FDCAN, USART2, TIM4 to TIM2 */
     {RCC_APB2ENR, "APB2ENR", 0, 0x00000801u, 0},             /* TIM1, SYSCFG */
     {CCIPR, "CCIPR", 0, 0x33000000u, 0},
     {CSR, "CSR", 0, LSION | RMVF, LSIRDY | CAUSES},

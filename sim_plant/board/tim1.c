@@ -124,7 +124,7 @@ static void trigger(void *owner, uint64_t cycle)
 {
     tim1_t *tim = owner;
     if (board_field(tim->regs.value[TIM1_CR2 / 4], 20, 4) == 7u) {
-        adc_trigger(&tim->chip->adc, cycle);
+        adc_trigger(&tim->chip->adc, cycle, ADC_BY_TIM1, true);
     }
     plan_trigger(tim, cycle);
 }
@@ -168,6 +168,7 @@ void tim1_update(tim1_t *tim)
     }
     if (board_field(tim->regs.value[TIM1_CR2 / 4], 4, 3) == UPDATE_IS_OUT) {
         tim3_restart(&tim->chip->tim3, tim->extreme, tim->update);
+        tim4_restart(&tim->chip->tim4, tim->extreme, tim->update);
     }
     if (tim->updates++ == 0u && tim1_main_output(tim)) {
         tim1_check_carrier(tim);

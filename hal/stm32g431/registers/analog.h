@@ -58,8 +58,10 @@ enum {
     ADC_SMP_6_5 = 1,
     ADC_SMP_12_5 = 2,
     ADC_SMP_247_5 = 6,
+    ADC_JEXTSEL_TIM4_TRGO = 5,
     ADC_JEXTSEL_TIM1_TRGO2 = 8,
-    ADC_JEXTEN_RISING = 1
+    ADC_JEXTEN_RISING = 1,
+    ADC_JEXTEN_BOTH = 3
 };
 
 typedef struct {

@@ -49,6 +49,7 @@ typedef struct {
 #define RCC_AHB2ENR_DAC3EN    (1U << 18)
 #define RCC_APB1ENR1_TIM2EN   (1U << 0)
 #define RCC_APB1ENR1_TIM3EN   (1U << 1)
+#define RCC_APB1ENR1_TIM4EN   (1U << 2)
 #define RCC_APB1ENR1_USART2EN (1U << 17)
 #define RCC_APB1ENR1_FDCANEN  (1U << 25)
 #define RCC_APB1ENR1_PWREN    (1U << 28)

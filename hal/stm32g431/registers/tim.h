@@ -1,4 +1,4 @@
-/* Timers: RM0440 28 (TIM1) and 29 (TIM2, TIM3). */
+/* Timers: RM0440 28 (TIM1) and 29 (TIM2 to TIM4). */
 #ifndef REGISTERS_TIM_H
 #define REGISTERS_TIM_H
 
@@ -81,6 +81,6 @@ enum {
 /* of MMS, SMS and TS */
 enum { TIM_MMS_UPDATE = 2, TIM_MMS_OC1REF = 4, TIM_SMS_RESET = 4, TIM_TS_TIM1 = 0, TIM_TS_TIM3 = 2 };
 
-extern tim_t TIM1, TIM2, TIM3;
+extern tim_t TIM1, TIM2, TIM3, TIM4;
 
 #endif

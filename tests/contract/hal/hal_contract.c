@@ -232,19 +232,51 @@ static void check_channels(run_t *run)
 }
 
 #if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+/* The last that a port can have, with all legs low. */
 static void check_samples(run_t *run)
 {
     struct app *app = &the_app;
-    app->out.instants.sample_at[1] = (uint16_t)(run->contract->config.timer_counts + 100U);
+    const uint32_t last = PM_SAMPLES - 1;
+    app->out.instants.sample_at[last] = (uint16_t)(run->contract->config.timer_counts + 100U);
     wait_us(run, 1000);
-    check_code(run, "the sample that was asked for", app->in.more.sampled, 2, 2);
+    check_code(run, "the sample that was asked for", app->in.more.sampled, 1 << last, 1 << last);
     for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
-        check_code(run, "no current is mid-scale in it", app->in.more.i_sample[1][leg] - MID_SCALE, -2000,
+        check_code(run, "no current is mid-scale in it", app->in.more.i_sample[last][leg] - MID_SCALE, -2000,
                    2000);
+#if PM_CARRIES(NEEDS_TERMINALS)
+        check_code(run, "a terminal that is low in it", app->in.more.v_sample[last][leg], 0, 2000);
+#endif
     }
-    app->out.instants.sample_at[1] = 0;
+    app->out.instants.sample_at[last] = 0;
     wait_us(run, 1000);
     check_code(run, "no sample any more", app->in.more.sampled, 0, 0);
+}
+#endif
+
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE) && PM_CARRIES(NEEDS_TERMINALS)
+/* High between the centres of the zero vectors alone: there are pulses in the sample, none in what is measured at t_k. */
+static void check_sample_of_pulses(run_t *run)
+{
+    struct app *app = &the_app;
+    const bool seen = app->in.v_dc > 16000U && (hal_channels(run->hal) & NEEDS_TERMINALS) != 0U;
+    const uint16_t half = run->contract->config.timer_counts / 2U;
+    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        app->out.compare[leg][0] = half;
+        app->out.compare[leg][1] = half;
+    }
+    app->out.instants.sample_at[0] = run->contract->config.timer_counts;
+    wait_us(run, 1000);
+    for (size_t leg = 0; seen && leg < DRIVE_LEGS; leg++) {
+        check_code(run, "a terminal that is high in the sample", app->in.more.v_sample[0][leg], 8000,
+                   UINT16_MAX);
+        check_code(run, "and low at its ends", app->in.more.v_terminal[leg], 0, 2000);
+    }
+    app->out.instants.sample_at[0] = 0;
+    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        app->out.compare[leg][0] = 0;
+        app->out.compare[leg][1] = 0;
+    }
+    wait_us(run, 1000);
 }
 #endif
 
@@ -342,6 +374,9 @@ static void check_legs(run_t *run)
 #if PM_CARRIES(NEEDS_SECOND_SAMPLE)
     if ((channels & NEEDS_SECOND_SAMPLE) != 0U) {
         check_samples(run);
+#if PM_CARRIES(NEEDS_TERMINALS)
+        check_sample_of_pulses(run);
+#endif
     }
 #endif
 #if PM_CARRIES(NEEDS_HELD)

@@ -174,6 +174,48 @@ TEST_F(Adc, Dial)
     EXPECT_EQ(c.read(rig::adc1 + dr), 1024u);
 }
 
+// TIM4 counts from TIM1's update event: one sequence there, one at its count, none where the first is still running.
+TEST_F(Adc, BothEdgesOfTim4Trigger)
+{
+    constexpr uint32_t tim4 = 0x40000800;
+    for (const uint32_t at : {3000u, 85u}) {
+        Chip chip;
+        chip.supply_clocks();
+        chip.clock_170MHz();
+        chip.pins();
+        chip.amplifiers();
+        chip.comparators(0x0F0);
+        chip.gates();
+        chip.set(rig::rcc + 0x58, 4);
+        chip.write(tim4 + 4, 0x40);
+        chip.write(tim4 + 8, 4);
+        chip.write(tim4 + 0x18, 0x68);
+        chip.write(tim4 + 0x34, at);
+        chip.set(rig::tim1 + 4, 0x20);
+        chip.converters(1u | 5u << 2 | 3u << 7);
+        chip.write(tim4, 1);
+        chip.start_timer();
+        chip.run_period();
+        const uint64_t length = latency + 2 * (sampling + conversion);
+        chip.run(length - 1);
+        EXPECT_FALSE(chip.line(irq));
+        chip.run(1);
+        EXPECT_TRUE(chip.line(irq));
+        EXPECT_EQ(chip.read(tim4 + 0x24), length);
+        chip.write(rig::adc1 + isr, jeos);
+        chip.run(at > length ? at - 1 : length);
+        EXPECT_FALSE(chip.line(irq));
+        chip.run(1);
+        EXPECT_EQ(chip.line(irq), at > length);
+        chip.write(rig::adc1 + isr, jeos);
+        chip.run_period();
+        EXPECT_FALSE(chip.line(irq));
+        chip.run(length);
+        EXPECT_TRUE(chip.line(irq)); // again at the start of the next
+        EXPECT_EQ(chip.take_error(), "");
+    }
+}
+
 // The star point against the mean of the terminals; the plant's channel sees the opposite.
 TEST_F(Adc, Neutral)
 {

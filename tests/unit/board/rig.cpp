@@ -253,7 +253,7 @@ void Chip::comparators(uint32_t code)
     }
 }
 
-void Chip::converters()
+void Chip::converters(uint32_t trigger)
 {
     write(adc12 + 8, 3u << 16);
     for (uint32_t adc : {adc1, adc2}) {
@@ -268,8 +268,8 @@ void Chip::converters()
     write(adc1 + 0x14, 1u << 9 | 6u << 15);
     write(adc1 + 0x18, 6u << 3 | 1u << 6);
     write(adc2 + 0x14, 1u << 3 | 1u << 9);
-    write(adc1 + 0x4C, 1u | 8u << 2 | 1u << 7 | 3u << 9 | 12u << 15);
-    write(adc2 + 0x4C, 1u | 8u << 2 | 1u << 7 | 3u << 9 | 1u << 15);
+    write(adc1 + 0x4C, trigger | 3u << 9 | 12u << 15);
+    write(adc2 + 0x4C, trigger | 3u << 9 | 1u << 15);
     write(adc1 + 0x04, 0x40);
     write(adc2 + 0x08, 0x10000008);
     write(adc1 + 0x08, 0x10000008);

@@ -78,7 +78,7 @@ class Chip
     void gates(uint32_t dead_time = 85, uint32_t bkf = 0); // TIM1 as the image has it, not started
     void amplifiers();
     void comparators(uint32_t code);
-    void converters(); // up to armed sequences
+    void converters(uint32_t trigger = 1u | 8u << 2 | 1u << 7); // up to armed sequences; JL, JEXTSEL, JEXTEN
     void start_timer();
     void all(uint32_t comparator_code = 0x0F0);
 

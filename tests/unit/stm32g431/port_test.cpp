@@ -182,10 +182,53 @@ TEST_F(Port, ACommutationHasItsInstantAndItsLegs)
     EXPECT_EQ(TIM1.CCER, 0U);
 }
 
+// The converters start ahead of it, where their sequence ends between those of the zero vectors; else they are busy.
+TEST_F(Port, ASampleHasItsInstant)
+{
+    ASSERT_EQ(bridge_start(hal, &good), HAL_OK);
+    bridge_run();
+    EXPECT_EQ(TIM4.CR1, TIM_CR1_CEN);
+    drive_out_t out = {};
+    const struct {
+        uint16_t at;
+        uint32_t ccr;
+    } rows[] = {{0, 85}, {1, 85}, {709, 85}, {710, 510}, {4250, 4050}, {8200, 8000}, {8201, 85}, {8499, 85}};
+    for (const auto &row : rows) {
+        out.instants.sample_at[0] = row.at;
+        hal_bridge_write(hal, &out);
+        EXPECT_EQ(TIM4.CCR1, row.ccr) << row.at;
+    }
+}
+
+// By the counter the sequence within the period is told from that of its start.
+TEST_F(Port, ASampleIsDeliveredOnce)
+{
+    drive_in_t in = {};
+    TIM4.CNT = 600;
+    EXPECT_FALSE(measure_is_within());
+    TIM4.CNT = 510 + 337;
+    EXPECT_TRUE(measure_is_within());
+    ADC1.JDR1 = 100;
+    ADC2.JDR1 = 200;
+    ADC1.JDR2 = 300;
+    ADC1.JDR3 = 400;
+    measure_take_sample();
+    ADC1.JDR1 = 2048; // of the zero vector
+    hal_measure(hal, &in);
+    EXPECT_TRUE(pm_sampled(&in.more, 0));
+    EXPECT_EQ(in.more.i_sample[0][0], 65535U - 1600U);
+    EXPECT_EQ(in.more.i_sample[0][1], 65535U - 3200U);
+    EXPECT_EQ(in.more.i_sample[0][2], 65535U - 4800U);
+    EXPECT_EQ(in.more.v_neutral_sample[0], 6400U);
+    EXPECT_EQ(in.i_leg[0], 0x7FFFU);
+    hal_measure(hal, &in);
+    EXPECT_EQ(in.more.sampled, 0U);
+}
+
 TEST_F(Port, DeclaresWhatIsWired)
 {
-    EXPECT_EQ(hal_channels(hal),
-              NEEDS_NEUTRAL | NEEDS_HELD | NEEDS_ONE_SWITCH | NEEDS_COMMUTATE | PM_BOOTSTRAP);
+    EXPECT_EQ(hal_channels(hal), NEEDS_NEUTRAL | NEEDS_SECOND_SAMPLE | NEEDS_HELD | NEEDS_ONE_SWITCH |
+                                     NEEDS_COMMUTATE | PM_BOOTSTRAP);
 }
 
 TEST_F(Port, CurrentsAreTurned)

@@ -14,7 +14,7 @@ adc_common_t ADC12_COMMON;
 opamp_t OPAMP1, OPAMP2, OPAMP3;
 comp_t COMP1, COMP2, COMP4;
 dac_t DAC3;
-tim_t TIM1, TIM2, TIM3;
+tim_t TIM1, TIM2, TIM3, TIM4;
 gpio_t GPIOA, GPIOB, GPIOC;
 fdcan_t FDCAN1;
 fdcan_ram_t FDCANRAM1;
