@@ -22,13 +22,12 @@
 #include "firmware/math/image.h"
 
 /* Measured. */
-#define NEEDS_DC_CURRENT 0x0001U /* at t_k; mid-scale = zero, positive from the link into the legs */
-#define NEEDS_TERMINALS  0x0002U /* at t_k, against the negative rail; 0 = zero */
-#define NEEDS_NEUTRAL    0x0004U /* at t_k, star point minus mean of the terminals; mid-scale = zero */
-#define NEEDS_SECOND_SAMPLE                                                                                  \
-    0x0008U /* currents, and of the other channels the voltages, at instants of the method's choice */
-#define NEEDS_CAPTURES     0x0010U /* comparator edges of the terminals with their instants */
-#define NEEDS_CURRENT_MASK 0x0020U /* a current that cannot be measured in this period is marked */
+#define NEEDS_DC_CURRENT    0x0001U /* at t_k; mid-scale = zero, positive from the link into the legs */
+#define NEEDS_TERMINALS     0x0002U /* at t_k, against the negative rail; 0 = zero */
+#define NEEDS_NEUTRAL       0x0004U /* at t_k, star point minus mean of the terminals; mid-scale = zero */
+#define NEEDS_SECOND_SAMPLE 0x0008U /* currents and voltages of these channels, at chosen instants */
+#define NEEDS_CAPTURES      0x0010U /* comparator edges of the terminals with their instants */
+#define NEEDS_CURRENT_MASK  0x0020U /* a current that cannot be measured in this period is marked */
 /* Done by the timer. */
 #define NEEDS_HALVES     0x0100U /* compare values of their own for the two halves of a period */
 #define NEEDS_HELD       0x0200U /* a leg held high or low */
