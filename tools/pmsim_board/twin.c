@@ -114,6 +114,11 @@ static size_t control(void *before, const void *memory, bool event[FIGURE_EVENTS
 {
     drive_t *drive = before;
     const memory_t *image = memory;
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    if (image->drive.period == drive->period) { /* the end of a further sample: nothing is controlled */
+        return difference(drive, &image->out, image);
+    }
+#endif
     drive_out_t out = image->out;
     const bool current = drive->voltage.limited;
     const int32_t modulator = drive->modulator.limited;
