@@ -19,7 +19,7 @@
  * The second is within 0.05 degrees of the exact one, lag = RC (1 - exp(-lag / RC) / cosh(t_60 / 2 RC)). With an RC beyond
  * t_60 the channel integrates, and what crosses is the flux, at the instants of commutation (lag = t_60 / 2).
  *
- * third_harmonic_step(): one sample a period, 25 instructions, 45 with a division where it finds a crossing. At least two
+ * third_harmonic_step(): one sample a period, a division where it finds a crossing. At least two
  * samples in a sector. third_harmonic_slow(): 1 kHz, two divisions.
  * Tests: tests/unit/bldc/third_harmonic_test.cpp, tests/scenario/six_step_third.yaml. */
 #ifndef BLDC_THIRD_HARMONIC_H
