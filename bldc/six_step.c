@@ -24,6 +24,10 @@ void six_step_slow(six_step_t *self, const six_step_config_t *config)
 {
     const uint32_t t_60 = self->expected.t_60;
     const bool sure = self->commutation.young == 0U && t_60 < 2U * SAMPLES * config->pattern.half_period;
+    if (config->crossings == CROSSINGS_third_harmonic) {
+        third_harmonic_slow(&self->third, &config->third, t_60, zero_crossing_swing(&config->crossing, t_60));
+        return;
+    }
     self->expected.seen = sure ? 0 : zero_crossing_swing(&config->crossing, t_60) / 8;
 }
 
@@ -35,6 +39,7 @@ static void begin(six_step_t *self, const six_step_config_t *config, uint32_t se
     follow(self);
     six_step_slow(self, config);
     open(self, sector, now);
+    third_harmonic_open(&self->third, now);
     self->crossing.found = true;
     self->commutated = now;
     self->legs = pattern_states(&config->pattern, sector, self->reverse);
@@ -111,6 +116,30 @@ static void look(six_step_t *self, const six_step_config_t *config, const six_st
     }
 }
 
+/* The third harmonic crosses by the rotor alone: where a filter delays it, behind the commutation that it was for. */
+static void look_third(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in)
+{
+    commutation_t *c = &self->commutation;
+    const bool rising = sector_rising(sector_next(c->crossed));
+    if (third_harmonic_step(&self->third, &config->third, in->v_zero, in->now, rising)) {
+        commutation_crossed(c, self->third.crossing);
+        follow(self);
+        return;
+    }
+    const uint32_t at = in->now - self->third.lag;
+    const int32_t late = (int32_t)(at - self->expected.at);
+    if (sector_distance(c->crossed, self->plan[1].sector) >= 2U &&
+        late > (int32_t)(self->expected.t_60 / 2U)) {
+        commutation_missed(c);
+        follow(self);
+        third_harmonic_skip(&self->third);
+    } else if (self->third.y < 0 && (int32_t)(at - c->crossing) > 0) {
+        commutation_ahead(c, at);
+    } else {
+        /* past a crossing that was found, or not yet beyond it */
+    }
+}
+
 /* A commutation ahead of the sample moves it to where the next sector has its own, if that is still to come. */
 static void plan_sample(six_step_plan_t *plan, const pattern_config_t *pattern, pm_q_t u)
 {
@@ -129,8 +158,13 @@ void six_step_step(six_step_t *self, const six_step_config_t *config, const six_
     const int32_t period = 2 * (int32_t)config->pattern.half_period;
     const uint32_t ended = in->now - (uint32_t)period, coming = in->now + (uint32_t)period;
     commutation_t *c = &self->commutation;
-    if (in->sampled) {
+    const bool third = config->crossings == CROSSINGS_third_harmonic;
+    if (third) {
+        look_third(self, config, in);
+    } else if (in->sampled) {
         look(self, config, in, ended);
+    } else {
+        /* nothing new */
     }
     self->lost = self->lost || commutation_state(c, &config->commutation) == COMMUTATION_LOST;
     if (self->plan[0].commutate_at != 0U) {
@@ -140,6 +174,7 @@ void six_step_step(six_step_t *self, const six_step_config_t *config, const six_
     six_step_plan_t *plan = &self->plan[1];
     plan->sector = c->sector;
     plan->commutate_at = 0;
+    plan->sample_at = 0;
     pattern_duties(&config->pattern, c->sector, self->reverse, in->u, &out->legs);
     out->legs.legs = self->legs;
     const int32_t due = (int32_t)(commutation_due(c, &config->commutation) - coming);
@@ -148,7 +183,9 @@ void six_step_step(six_step_t *self, const six_step_config_t *config, const six_
         c->sector = (uint8_t)sector_next(c->sector);
         self->legs = pattern_states(&config->pattern, c->sector, self->reverse);
     }
-    plan_sample(plan, &config->pattern, in->u);
+    if (!third) {
+        plan_sample(plan, &config->pattern, in->u);
+    }
     out->then = self->legs;
     out->commutate_at = plan->commutate_at;
     out->sample_at = plan->sample_at;

@@ -1,5 +1,6 @@
 /* Block commutation without a sensor: what the legs do in the coming period, from samples of the terminals
- * (METHODS.md 10.2.3). Puts zero_crossing.h, thresholds.h, commutation.h and patterns.h together.
+ * (METHODS.md 10.2.3), or of the third harmonic at the star point (11.3). Puts zero_crossing.h or third_harmonic.h, thresholds.h,
+ * commutation.h and patterns.h together. crossings.def says which.
  *
  * Called at the start t_k of each period. What a call asks for is done in [t_k+1, t_k+2) and delivered with the call at
  * t_k+2, as measure.h has it:
@@ -23,6 +24,7 @@
 
 #include "bldc/commutation.h"
 #include "bldc/patterns.h"
+#include "bldc/third_harmonic.h"
 #include "bldc/thresholds.h"
 #include "bldc/zero_crossing.h"
 #include "firmware/params/types.h"
@@ -31,9 +33,18 @@
 extern "C" {
 #endif
 
+typedef enum {
+#define PM_METHOD(name, help, traits, needs) CROSSINGS_##name,
+#include "bldc/crossings.def"
+#undef PM_METHOD
+    CROSSINGS_COUNT
+} crossings_id_t;
+
 typedef struct {
+    crossings_id_t crossings;
     pattern_config_t pattern;
-    zero_crossing_config_t crossing;
+    zero_crossing_config_t crossing; /* its swing is that of e_0 with the third harmonic */
+    third_harmonic_config_t third;
     commutation_config_t commutation;
     thresholds_config_t thresholds;
 } six_step_config_t;
@@ -42,7 +53,8 @@ typedef struct {
     uint32_t now; /* counts at t_k */
     bool sampled; /* the sample asked for two calls ago is here: */
     zero_sample_t sample;
-    pm_q_t u; /* patterns.h */
+    pm_q_t u;      /* patterns.h */
+    pm_q_t v_zero; /* at t_k, drive/neutral.h; CROSSINGS_third_harmonic only */
 } six_step_in_t;
 
 typedef struct {
@@ -62,6 +74,7 @@ typedef struct {
 typedef struct {
     commutation_t commutation;
     zero_crossing_t crossing;
+    third_harmonic_t third;
     thresholds_t thresholds;
     zero_expected_t expected;
     six_step_plan_t plan[2]; /* [1] of the period that begins now, [0] of the one that has ended */
@@ -100,7 +113,7 @@ void six_step_begin(six_step_t *self, const six_step_config_t *config, pm_angle_
 void six_step_step(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in,
                    six_step_out_t *out);
 
-/* At 1 kHz: what a sector must show of its swing, an eighth, for its crossing to be one. Without the call a rotor that has
+/* At 1 kHz: lag of the third harmonic, and what a sector must show of its swing, an eighth, for its crossing to be one. Without the call a rotor that has
  * stopped may pass for one that turns. */
 void six_step_slow(six_step_t *self, const six_step_config_t *config);
 

@@ -26,18 +26,55 @@ static void make_pattern(maker_t *m, pattern_config_t *c)
 }
 
 /* What the open terminal rises by, per psi_m w and rad, times pi / 3. */
-static pm_num_t swing_of(const maker_t *m)
+static pm_num_t swing_of_terminal(const maker_t *m)
 {
     const pm_num_t pi_third = pm_num_mul(PM_NUM_TWO_PI, pm_num_ratio(1, 6));
     const pm_num_t sine = pm_num_ratio(3, 2), trapezoid = pm_num_mul(PM_NUM_TWO_PI, pm_num_ratio(1, 4));
     const pm_num_t slope = pm_num_mul(m->params->emf_shape == 0 ? sine : trapezoid, pi_third);
-    return m->params->zero_reference == 0 ? slope : pm_num_mul(slope, pm_num_ratio(2, 3));
+    return m->params->zero_reference == CROSSINGS_open_terminal ? slope
+                                                                : pm_num_mul(slope, pm_num_ratio(2, 3));
+}
+
+/* What the signal of the crossings rises by in 60 degrees at the slope of its crossing, V s. */
+static pm_num_t swing_of(const maker_t *m)
+{
+    if (m->params->zero_reference != CROSSINGS_third_harmonic) {
+        return pm_num_mul(swing_of_terminal(m), si(m, DRIVE_PARAM_psi_m));
+    }
+    if (m->params->emf_shape == 0) { /* 9 psi_3 pi / 3 */
+        const pm_num_t psi_3 = pm_num_sqrt(square(si(m, DRIVE_PARAM_psi_3)));
+        return pm_num_mul(pm_num_mul(PM_NUM_TWO_PI, pm_num_ratio(3, 2)), psi_3);
+    }
+    return mul3(square(PM_NUM_TWO_PI), pm_num_ratio(1, 72), si(m, DRIVE_PARAM_psi_m));
+}
+
+static void make_third_crossings_of(maker_t *m, third_harmonic_config_t *c)
+{
+    const drive_params_t *p = m->params;
+    if (p->emf_shape == 0 && p->psi_3 == 0) {
+        refuse(m, DRIVE_PARAM_psi_3, "the third harmonic is not known, or the machine has none");
+    }
+    const pm_num_t per_s = pm_num_mul(pm_num(2 * p->timer_counts), si(m, DRIVE_PARAM_f_pwm));
+    const pm_num_t pi = pm_num_mul(PM_NUM_TWO_PI, pm_num_ratio(1, 2));
+    c->pi_rc = fixed(m, mul3(pi, si(m, DRIVE_PARAM_neutral_filter), per_s), 0, DRIVE_PARAM_neutral_filter);
+    c->trapezoid = p->emf_shape != 0;
+    c->negative = p->psi_3 < 0;
+}
+
+static uint32_t needs_of(int32_t id)
+{
+    static const uint16_t of[] = {
+#define PM_METHOD(name, help, traits, needs) needs,
+#include "bldc/crossings.def"
+#undef PM_METHOD
+    };
+    return of[id];
 }
 
 static void make_crossing(maker_t *m, uint32_t turn_base, zero_crossing_config_t *c)
 {
-    const pm_num_t swing = mul3(swing_of(m), si(m, DRIVE_PARAM_psi_m), m->base.omega);
-    c->reference = m->params->zero_reference == 0 ? ZERO_LINK : ZERO_TERMINALS;
+    const pm_num_t swing = pm_num_mul(swing_of(m), m->base.omega);
+    c->reference = m->params->zero_reference == CROSSINGS_open_terminal ? ZERO_LINK : ZERO_TERMINALS;
     c->rail = fixed(m, pm_num_div(pm_num_dec(RAIL_mV, -3), m->base.v), Q_BITS, DRIVE_PARAM_v_full_scale);
     c->blank = counts(m, DRIVE_PARAM_t_blank);
     c->swing = gain(m, pm_num_div(swing, m->base.v), Q_BITS, DRIVE_PARAM_psi_m);
@@ -57,6 +94,11 @@ void make_six_step(maker_t *m, six_step_config_t *c)
     c->commutation.delay = 0;
     c->commutation.strikes = (uint8_t)p->missed_crossings;
     make_pattern(m, &c->pattern);
+    c->crossings = (crossings_id_t)p->zero_reference;
+    require(m, needs_of(p->zero_reference), DRIVE_PARAM_zero_reference);
+    if (m->result.ok && c->crossings == CROSSINGS_third_harmonic) {
+        make_third_crossings_of(m, &c->third);
+    }
     make_crossing(m, c->commutation.turn_base, &c->crossing);
     const pm_num_t vertical = pm_num_mul(pm_num_ratio(3, 2), si(m, DRIVE_PARAM_learn_vertical));
     c->thresholds.k_V = fixed(m, vertical, FRAC_BITS, DRIVE_PARAM_learn_vertical);

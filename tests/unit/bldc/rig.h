@@ -114,6 +114,8 @@ struct Options {
     double advance_deg = 0;
     double k_V = 0, k_H = 0; // of thresholds.h
     double blank_s = 3e-6, lead_s = 1e-6, least_s = 6e-6;
+    bool third = false;      // crossings of the third harmonic,
+    bool told_filter = true; // with the lag of the channel's RC taken off
     bool reverse = false;
     int strikes = 6;
 };
@@ -121,6 +123,11 @@ struct Options {
 inline double base_rad_s(const Machine &m)
 {
     return m.trapezoid ? 1256.6 : 8377.6;
+}
+
+inline double psi_3_Wb(const Machine &m)
+{
+    return m.plant.winding.emf[0].order == 3 ? m.plant.winding.emf[0].amplitude : 0;
 }
 
 inline six_step_config_t make(const Machine &m, const Options &o)
@@ -147,6 +154,16 @@ inline six_step_config_t make(const Machine &m, const Options &o)
     c.thresholds.k_H = fixed(o.k_H, 32);
     c.thresholds.most = fixed(2.0 / kBase_V, PM_Q_BITS);
     c.crossing.t_60 = (c.commutation.turn_base + 3) / 6;
+    if (o.third) {
+        c.crossings = CROSSINGS_third_harmonic;
+        c.third.trapezoid = m.trapezoid;
+        c.third.negative = psi_3_Wb(m) < 0;
+        c.third.pi_rc = static_cast<int32_t>(
+            std::lround(o.told_filter ? kPi * m.plant.sensor.v_zero_filter_s / count_s : 0));
+        const double rise_Vs = m.trapezoid ? 2 * m.peak_Vs() / 3 : 3 * kPi * std::abs(psi_3_Wb(m));
+        c.crossing.swing = fixed(rise_Vs * base_rad_s(m) / kBase_V, PM_Q_BITS);
+        return c;
+    }
     c.crossing.swing = fixed(shape * m.slope_Vs() * base_rad_s(m) * kPi / 3 / kBase_V, PM_Q_BITS);
     return c;
 }
@@ -237,6 +254,11 @@ class Rig
         in.sample.v_neutral -= (in.sample.v[0] + in.sample.v[1] + in.sample.v[2]) / 3;
         in.sample.v_dc =
             fixed(adc_.v_dc / 65536.0 * machine.plant.sensor.v_full_scale_V / kBase_V, PM_Q_BITS);
+        plant_adc_t edge;
+        plant_sample(plant_.get(), &edge);
+        in.v_zero =
+            fixed((edge.v_zero[0] - 32768) / 32768.0 * machine.plant.sensor.v_zero_full_scale_V / kBase_V,
+                  PM_Q_BITS);
         six_step_out_t out;
         const bool before = six_step.crossing.found;
         const uint32_t sector = six_step.crossing.sector;
@@ -250,8 +272,6 @@ class Rig
             first_past.add(crossing_deg + static_cast<double>(looked_ - six_step.crossing.at) * count_s_ *
                                               omega_e() / kDegree);
         }
-        plant_adc_t edge;
-        plant_sample(plant_.get(), &edge);
         write(out);
         run(asked_, sector_);
         sector_ = next_sector_;
