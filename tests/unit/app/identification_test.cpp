@@ -1,4 +1,5 @@
 // Identification as a master sees it.
+#include "tests/contract/bench.h"
 #include "tests/unit/app/bench.h"
 
 using app_test::Bench;
@@ -93,6 +94,20 @@ TEST(BusIdentification, AnUnknownMachineIsIdentifiedAndNothingElse)
     enable(3);
     x.run_ms(50);
     EXPECT_TRUE(x.loop.hal.armed);
+}
+
+TEST(BusIdentification, TheSaliencyMapIsInAmperesAndHenries)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_ms(5);
+    saliency_map_result_t &map = x.loop.app.drive.saliency_map;
+    map.centre = PM_ONE / 32;
+    map.radius = PM_ONE / 128;
+    const double base_A = bench::kIpmBase.i_A;
+    EXPECT_NEAR(x.get(0x3000, 23), base_A / 32 * 1e6, 2);
+    EXPECT_NEAR(x.get(0x3000, 24), base_A / 128 * 1e6, 2);
 }
 
 } // namespace

@@ -190,4 +190,25 @@ TEST(Follow, TheLoadIsJudgedByTheLag)
     EXPECT_EQ(follow_load(&x.self), 0);
 }
 
+// One millisecond in which the EMF is there is no proof yet; a vector that slows down below where it shows begins again.
+TEST(Follow, FollowsAfterItsTimeAndIsForgottenBelow)
+{
+    Rig x;
+    x.rest();
+    int ms = 0;
+    for (; ms < 100 && x.self.follows_ms == 0U; ++ms) {
+        x.step(0.1, 30);
+        ASSERT_FALSE(x.self.follows);
+    }
+    for (int more = 1; more < FOLLOW_FOLLOWS_MS; ++more) {
+        EXPECT_FALSE(x.self.follows) << more;
+        EXPECT_EQ(x.self.follows_ms, more);
+        x.step(0.1, 30);
+    }
+    EXPECT_TRUE(x.self.follows);
+    x.step(0.5 * kSeen, 30);
+    EXPECT_FALSE(x.self.follows);
+    EXPECT_EQ(x.self.follows_ms, 0U);
+}
+
 } // namespace

@@ -272,7 +272,7 @@ TEST(Protection, CurrentIsDeratedByTemperatureAndVoltage)
                 x.d.temperature_dC = dC;
                 x.d.status.v_dc = bench::fixed(v / 450, 28);
                 x.d.position.pll.omega = bench::fixed(omega, 28);
-                x.d.status.limits = 0;
+                x.d.status.limits = DRIVE_LIMIT_SPEED; // of the same millisecond: stays
                 pm_q_t i_min, i_most;
                 protection_current_limits(&x.d, &i_min, &i_most);
                 const double hot = std::clamp((1100.0 - dC) / 200, 0.0, 1.0);
@@ -283,6 +283,7 @@ TEST(Protection, CurrentIsDeratedByTemperatureAndVoltage)
                 EXPECT_NEAR(real(i_min), omega > 0 ? -brakes : -drives, 1e-4) << dC << ' ' << v;
                 EXPECT_EQ((x.d.status.limits & DRIVE_LIMIT_TEMPERATURE) != 0, dC > 900);
                 EXPECT_EQ((x.d.status.limits & DRIVE_LIMIT_DC_VOLTAGE) != 0, v > 380);
+                EXPECT_NE(x.d.status.limits & DRIVE_LIMIT_SPEED, 0U);
             }
         }
     }

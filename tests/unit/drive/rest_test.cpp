@@ -151,4 +151,26 @@ TEST(Rest, AStopKeepsItOn)
     }
 }
 
+// The mean is of the EMF while it rests and of the current while it does not: awake, it begins with none.
+TEST(Rest, WhatTheEmfWasIsNoCurrent)
+{
+    Resting x;
+    drive_slow(&x.d, &x.slow);
+    ASSERT_LT(x.until(false, 100), 100);
+    x.d.voltage.v.q = pm_widen(2 * x.d.config.rest.emf);
+    ASSERT_LE(x.until(true, REST_LOOK_MS), 15);
+    EXPECT_EQ(x.d.rest.mean.q, 0);
+}
+
+TEST(Rest, AnObserverThatLeadsHasNoCarrierToRest)
+{
+    Resting x;
+    for (int ms = 0; ms < 3 * kAfter_ms; ++ms) {
+        x.d.position.inject = false;
+        rest_slow(&x.d);
+        EXPECT_EQ(x.d.rest.ms, 0);
+    }
+    EXPECT_FALSE(x.d.position.rests);
+}
+
 } // namespace

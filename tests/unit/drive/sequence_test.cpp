@@ -286,4 +286,25 @@ TEST(Sequence, OverCurrentOpensTheBridgeUnlessNothingIsKnownOfIt)
     });
 }
 
+// The rotating voltage drives the legs, at which nothing else would show without a motor.
+TEST(Sequence, TheRotatingVoltageIsAtTheLegs)
+{
+    drive_params_t p = direct::params(1);
+    p.position_find = 2;
+    Drive x(p);
+    x.enable(true);
+    for (int ms = 0; ms < 120 && x.d.sequence.procedure != PROCEDURE_three_phase_hf; ++ms) {
+        x.run_ms(1);
+    }
+    ASSERT_EQ(x.d.sequence.procedure, PROCEDURE_three_phase_hf);
+    bool driven = false, apart = false;
+    for (int k = 0; k < 100; ++k) {
+        x.step();
+        driven = driven || x.driven();
+        apart = apart || (x.driven() && x.out.compare[0][0] != x.out.compare[1][0]);
+    }
+    EXPECT_TRUE(driven);
+    EXPECT_TRUE(apart);
+}
+
 } // namespace

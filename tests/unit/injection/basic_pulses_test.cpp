@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
+
 #include "tests/unit/injection/pulse_rig.h"
 
 namespace
@@ -32,6 +34,15 @@ TEST(BasicPulses, TwinWithEqualGainsIsExact)
 {
     expect_grid(kBasic, spm(0), kSpmEqual_deg, 9);
     EXPECT_GE(grid(kBasic, spm(kGain)).mean_deg, 3);
+}
+
+TEST(BasicPulses, AResetForgetsAll)
+{
+    basic_pulses_t self;
+    std::memset(&self, 0x55, sizeof self);
+    basic_pulses_reset(&self);
+    const basic_pulses_t none = {};
+    EXPECT_EQ(std::memcmp(&self, &none, sizeof self), 0);
 }
 
 } // namespace

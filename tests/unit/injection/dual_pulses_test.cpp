@@ -187,4 +187,23 @@ TEST(DualPulses, AreMirrorImagesWithoutAMean)
     EXPECT_EQ(minus, 4 * c.periods);
 }
 
+// The current that was there is the mean of all four peaks.
+TEST(DualPulses, EachPeakCountsForTheCurrent)
+{
+    for (int order = 0; order < 2; ++order) {
+        for (int peak = 0; peak < 2; ++peak) {
+            dual_pulses_config_t c = {};
+            c.noise = 1;
+            const pm_q_t i = PM_ONE / 8;
+            c.i_least = i - i / 8; // of four peaks
+            dual_pulses_t self = {};
+            self.order[0].peak[0] = self.order[1].peak[1] = i;
+            self.order[0].peak[1] = self.order[1].peak[0] = -i;
+            EXPECT_NE(dual_pulses_find(&self, &c), PM_FAILED_NO_CURRENT);
+            self.order[order].peak[peak] = 0;
+            EXPECT_EQ(dual_pulses_find(&self, &c), PM_FAILED_NO_CURRENT) << order << peak;
+        }
+    }
+}
+
 } // namespace

@@ -172,4 +172,21 @@ TEST(InjectionStages, LowPassHasItsCorner)
     }
 }
 
+TEST(InjectionStages, LearnsBothPartsAlikeAndForgetsTheErrorAtAReset)
+{
+    const drive_config_t whole = configured({{&drive_params_t::asymmetry_learning, 1}});
+    const injection_stages_config_t &c = whole.position.injection.stages;
+    injection_stages_t self = {};
+    self.eps = PM_ONE / 4;
+    injection_stages_reset(&self, &c);
+    EXPECT_EQ(self.eps, 0);
+    self.c = bench::fixed(0.03, 28);
+    obs_in_t slow = {};
+    slow.dir = direction(22.5 * kDegree); // 2 theta where both are as large
+    slow.omega = PM_ONE / 4;
+    injection_stages_slow(&self, &c, &slow, bench::fixed(0.04, 28));
+    EXPECT_GT(self.as_a, 0);
+    EXPECT_NEAR(self.as_a, self.as_b, 16);
+}
+
 } // namespace

@@ -171,4 +171,16 @@ TEST(RotatingSine, TheSameCarrierAfterEveryTurn)
     }
 }
 
+TEST(RotatingSine, AResetForgetsTheNegativeSequence)
+{
+    const injection_config_t c = config(6, false);
+    obs_in_t in = {};
+    in.dir = bench::direction(0);
+    rotating_sine_t self = {};
+    self.negative = {PM_ONE, PM_ONE};
+    rotating_sine_reset(&self, &c.rotating_sine, &in);
+    EXPECT_EQ(self.negative.d, 0);
+    EXPECT_EQ(self.negative.q, 0);
+}
+
 } // namespace

@@ -265,4 +265,49 @@ TEST(ZeroSequence, RefusesWhatGivesNoAnswer)
               DRIVE_PARAM_injection_bandwidth);
 }
 
+// A told dL_0 at which the neutral answers with 7.8 and 8.2 thousandths of an eighth of the base voltage.
+TEST(ZeroSequence, TheAnswerAtTheNeutralHasALeast)
+{
+    const Machine &m = bench::kIpmLinear;
+    const double ratio = (m.L_d0_H + m.L_q0_H) / 2 / (m.L_d0_H * m.L_q0_H);
+    const double least_H = 8e-3 / 8 * rig::kBase.v_V / (70.0 * ratio / 2);
+    const auto result = [&](double share) {
+        return refused(kAll[0], [&](drive_params_t &p) {
+            p.v_injection = 70000;
+            p.dL_0 = static_cast<int32_t>(std::lround(share * least_H * 1e9));
+        });
+    };
+    EXPECT_TRUE(result(1.03).ok) << result(1.03).reason;
+    EXPECT_EQ(result(0.97).param, DRIVE_PARAM_dL_0);
+}
+
+// The current of the reset, turned by 2 theta, is where the first change is counted from.
+TEST(ZeroSequence, AResetBeginsWithTheCurrentThatFlows)
+{
+    const zero_config_t &c = config(kAll[0]).zero_anti_rotating;
+    for (const double theta : {0.0, 0.7, 2.5}) {
+        obs_in_t in = {};
+        in.dir = bench::direction(theta);
+        const Complex i = {0.1, -0.2};
+        in.i = bench::ab(i);
+        zero_t self;
+        zero_reset(&self, &c, &in);
+        const Complex u = i * std::polar(1.0, 2 * theta) / 4.0; // half directions, the upper word
+        const double scale = std::abs(u) / std::hypot(bench::real(self.u.alpha), bench::real(self.u.beta));
+        EXPECT_NEAR(bench::real(self.u.alpha) * scale, u.real(), 1e-5) << theta;
+        EXPECT_NEAR(bench::real(self.u.beta) * scale, u.imag(), 1e-5) << theta;
+    }
+}
+
+// The rotating carrier in the told form; without resistance, which turns what it is told of.
+TEST(ZeroSequence, TheRotatingCarrierIsToldItsSecondPart)
+{
+    for (const double theta : {0.1, 0.26, 0.4, 0.9}) {
+        rig::Run run(config({INJECTION_zero_rotating, 500, ZERO_TOLD}));
+        run.theta = theta;
+        run.R_ohm = 1e-3;
+        EXPECT_NEAR(run.after(kSettled).eps / kDegree, 0, kTold_deg) << theta;
+    }
+}
+
 } // namespace
