@@ -11,7 +11,8 @@
  *
  * Whether L_d falls with the magnetising or, where the magnet's own flux holds bridges saturated, with the
  * demagnetising current, nothing that is measured at rest can tell: the parameter L_d_falls says it, and the
- * opposite of the truth gives the opposite pole with a good margin. The EMF finds that later (drive/slip.h).
+ * opposite of the truth gives the opposite pole with a good margin. The EMF finds that later (drive/slip.h). What is seen at
+ * the neutral goes by dL_0 / di_d, too, and has a parameter of its own, zero_falls.
  *
  * n a power of two, at most 256; |x| < 0.125. polarity_noise() about 400 instructions, at 1 kHz.
  * Tests: tests/unit/injection/polarity_test.cpp. */
@@ -20,7 +21,6 @@
 
 #include "firmware/params/types.h"
 #include "injection/pulses.h"
-#include "injection/sine.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -32,12 +32,13 @@ typedef struct {
 } polarity_mean_t;
 
 typedef struct {
-    pm_q_t i_d;        /* d_current: in either direction */
-    pm_q_t noise;      /* of one value, by that of the currents */
-    pm_q_t h_d;        /* expected answer of the carrier, as the source gives it */
+    pm_q_t i_d;   /* d_current: in either direction */
+    pm_q_t noise; /* of one value, by that of the converter */
+    pm_q_t
+        h_d; /* expected answer of the carrier, as the source gives it: current, or voltage at the neutral */
     uint16_t block_ms; /* so long lie values apart that have nothing in common */
     uint16_t values;   /* of secondary_current, half of them of each direction of d_current: a power of two */
-    bool reversed;     /* L_d falls with the demagnetising current */
+    bool reversed;     /* the answer falls with the magnetising current */
 } polarity_config_t;
 
 void polarity_add(polarity_mean_t *self, pm_q_t x);
@@ -51,8 +52,19 @@ pm_q_t polarity_rest(pm_q_t noise, uint32_t count);
 pm_procedure_t polarity_judge(const polarity_config_t *config, pm_q_t mean, pm_q_t allowance, pm_q_t noise,
                               pm_sigma_t *margin, bool *north);
 
-/* sine: of a source that injects one; NULL: of pulsating_square. */
-void make_polarity(maker_t *m, const sine_config_t *sine, pm_q_t h_d, polarity_config_t *c);
+/* What it looks at. */
+typedef struct {
+    uint32_t periods; /* after which a value has nothing in common with the one before: a carrier's, or 1 */
+    pm_q_t noise;     /* of one value, in the unit of h_d */
+    pm_q_t h_d;
+    bool reversed;
+} polarity_carrier_t;
+
+/* A carrier along d whose answer is a current: of n samples, of which a window gives the amplitude, or 1, the difference
+ * of two. */
+polarity_carrier_t polarity_by_current(maker_t *m, uint32_t n, pm_q_t h_d);
+
+void make_polarity(maker_t *m, const polarity_carrier_t *carrier, polarity_config_t *c);
 
 #ifdef __cplusplus
 }

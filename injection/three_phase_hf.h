@@ -34,6 +34,7 @@
 #define INJECTION_THREE_PHASE_HF_H
 
 #include "injection/polarity.h"
+#include "injection/sine.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -2,6 +2,11 @@
 
 #if PM_CARRIES(NEEDS_NEUTRAL)
 
+#include "firmware/math/window.h"
+
+/* Periods from a command to the sample that ends with its voltage. */
+#define SINCE 2U
+
 static pm_dir_t direction(const zero_t *self, const zero_config_t *config)
 {
     const pm_dir_t phi = pm_dir((pm_angle_t)self->at * config->step);
@@ -14,7 +19,7 @@ static zero_sequence_sample_t told(zero_t *self, const zero_config_t *config, co
                                    pm_q_t x)
 {
     const pm_half_dir_t twice = pm_dir_sum(in->dir, in->dir);
-    const pm_dir_t phi = pm_dir((pm_angle_t)self->at * config->step - 2U * config->step);
+    const pm_dir_t phi = pm_dir(((pm_angle_t)self->at - SINCE) * config->step);
     const pm_q_t cos =
         pm_shl(pm_mulh2(twice.cos, phi.cos, -twice.sin, phi.sin), 2) * self->sign; /* of q, Q31 */
     const pm_q_t sin = pm_shl(pm_mulh2(twice.sin, phi.cos, twice.cos, phi.sin), 2) * self->sign;
@@ -26,15 +31,42 @@ static zero_sequence_sample_t told(zero_t *self, const zero_config_t *config, co
     return sample;
 }
 
+void zero_rotating_reset(zero_rotating_t *self, const zero_rotating_config_t *config, const obs_in_t *in)
+{
+    zero_reset(&self->zero, config, in);
+    for (uint32_t n = 0; n < 2U * ZERO_HALF_MOST; n++) {
+        self->x[n] = 0;
+    }
+}
+
 void zero_rotating_step(zero_rotating_t *self, const zero_rotating_config_t *config, const injection_in_t *in,
                         injection_out_t *out)
 {
-    const pm_q_t x = zero_voltage(self, config, in);
-    const pm_dir_t axis = direction(self, config);
+    zero_t *zero = &self->zero;
+    const pm_q_t x = zero_voltage(zero, config, in);
+    const pm_dir_t axis = direction(zero, config);
     const zero_sequence_sample_t sample =
-        self->measured != 0U ? zero_measured(self, config, in, x) : told(self, config, in, x);
-    zero_close(self, config, in, sample, out);
+        zero->measured != 0U ? zero_measured(zero, config, in, x) : told(zero, config, in, x);
+    self->x[zero->at + (zero->sign < 0 ? config->half : 0U)] = x;
+    zero_close(zero, config, in, sample, out);
     out->carrier = excitation_of(carrier_along(pm_mulh(config->v_h, PM_FRAC(0.125)), axis));
+}
+
+/* 2/N sum x cos(angle + turn n), n = 0 in the period whose voltage has the phase 0; 1/N, Q32, is the step of the phase. */
+static pm_q_t harmonic(const zero_rotating_t *self, const zero_rotating_config_t *config, pm_angle_t turn,
+                       pm_angle_t angle)
+{
+    int64_t sum = 0;
+    for (uint32_t n = 0; n < 2U * config->half; n++) {
+        sum += (int64_t)(self->x[n] >> 4) * pm_dir(angle + turn * (n - SINCE)).cos;
+    }
+    return 2 * window_amplitude(sum, (pm_frac_t)config->step);
+}
+
+pm_q_t zero_rotating_along(const zero_rotating_t *self, const zero_rotating_config_t *config,
+                           pm_angle_t theta)
+{
+    return -harmonic(self, config, config->step, 2U * theta);
 }
 
 #endif

@@ -7,11 +7,18 @@
  * position errs, 4.5 degrees on IPM-1000 at 500 Hz without load, and spoil the decoupling. So the source begins
  * with the measured form.
  *
+ * What tells the poles apart looks at the voltage itself. x holds the last period of the carrier, N samples, whose harmonics
+ * of it are free of each other and of the EMF:
+ *   along   -2/N sum x_k cos q                A [1 + kappa cos(6 theta + theta_m)]: polarity by d-current
+ * at 1 kHz, 500 instructions with N = 20. A period may come between two of the samples and renew one: it is of the same
+ * phase.
+ *
  * Forms, eps, misfit, delay: zero_sequence.h. Functions as injection.h says.
  * Tests: tests/unit/injection/zero_sequence_test.cpp, tests/scenario/zero_rotating.yaml. */
 #ifndef INJECTION_ZERO_ROTATING_H
 #define INJECTION_ZERO_ROTATING_H
 
+#include "injection/polarity.h"
 #include "injection/zero_sequence.h"
 
 #ifdef __cplusplus
@@ -19,27 +26,34 @@ extern "C" {
 #endif
 
 typedef zero_config_t zero_rotating_config_t;
-typedef zero_t zero_rotating_t;
+
+typedef struct {
+    zero_t zero;
+    pm_q_t x[2U * ZERO_HALF_MOST]; /* by the phase of the voltage that is commanded when they come */
+} zero_rotating_t;
 
 void zero_rotating_step(zero_rotating_t *self, const zero_rotating_config_t *config, const injection_in_t *in,
                         injection_out_t *out);
 
-static inline void zero_rotating_reset(zero_rotating_t *self, const zero_rotating_config_t *config,
-                                       const obs_in_t *in)
-{
-    zero_reset(self, config, in);
-}
+void zero_rotating_reset(zero_rotating_t *self, const zero_rotating_config_t *config, const obs_in_t *in);
 
 static inline void zero_rotating_slow(zero_rotating_t *self, const zero_rotating_config_t *config,
                                       const obs_in_t *in)
 {
-    zero_slow(self, config, in);
+    zero_slow(&self->zero, config, in);
 }
 
 static inline obs_out_t zero_rotating_last(const zero_rotating_t *self, const zero_rotating_config_t *config)
 {
-    return zero_last(self, config);
+    return zero_last(&self->zero, config);
 }
+
+/* In phase with the carrier as the position theta shows it at the neutral, per unit as x. */
+pm_q_t zero_rotating_along(const zero_rotating_t *self, const zero_rotating_config_t *config,
+                           pm_angle_t theta);
+
+/* Of the maker's configuration, for polarity by d-current. */
+polarity_carrier_t zero_rotating_polarity(maker_t *m, const zero_rotating_config_t *c);
 
 void make_zero_rotating(maker_t *m, zero_rotating_config_t *c);
 

@@ -6,6 +6,8 @@
 
 #if PM_CARRIES(NEEDS_NEUTRAL)
 
+#define V_BITS 22
+
 /* h: the nearest whole number of periods to half a carrier. */
 static int32_t half_of(const maker_t *m)
 {
@@ -61,8 +63,8 @@ static void make_channel(maker_t *m, zero_config_t *c, pm_num_t unit)
     }
     const pm_num_t a = decay(x);
     const pm_num_t now = pm_num_div(m->base.v, pm_num_mul(unit, pm_num_sub(pm_num(1), a)));
-    c->v_now = fixed(m, now, 22, DRIVE_PARAM_dL_0);
-    c->v_past = fixed(m, pm_num_mul(now, a), 22, DRIVE_PARAM_dL_0);
+    c->v_now = fixed(m, now, V_BITS, DRIVE_PARAM_dL_0);
+    c->v_past = fixed(m, pm_num_mul(now, a), V_BITS, DRIVE_PARAM_dL_0);
 }
 
 /* c / T_s of a current per unit, in `unit`. */
@@ -144,6 +146,20 @@ void make_zero_rotating(maker_t *m, zero_rotating_config_t *c)
                "a rotating carrier needs at least eight periods: an eighth of f_pwm");
     }
     c->told_first = c->told_first && c->form != (uint8_t)ZERO_BEGINS_TOLD;
+}
+
+/* Half a step of the converter and what rounding adds, of an amplitude; A is 1/8. */
+polarity_carrier_t zero_rotating_polarity(maker_t *m, const zero_rotating_config_t *c)
+{
+    const uint32_t n = 2U * c->half;
+    const pm_num_t one = pm_num_mul(pm_num_div(si(m, DRIVE_PARAM_neutral_full_scale), m->base.v),
+                                    pm_num_from_fixed(c->v_now, V_BITS));
+    const pm_num_t share = pm_num_mul(pm_num_sqrt(pm_num_ratio(2, (int32_t)n)), pm_num_ratio(10, 35500));
+    return (polarity_carrier_t){.periods = n,
+                                .noise =
+                                    fixed(m, pm_num_mul(one, share), Q_BITS, DRIVE_PARAM_neutral_full_scale),
+                                .h_d = PM_Q(0.125),
+                                .reversed = m->params->zero_falls != 0};
 }
 
 /* eps is h periods old; 0.3 rad of phase, as sine.h. The current is h / 2 periods old. */

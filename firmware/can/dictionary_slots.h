@@ -309,7 +309,7 @@ enum {
     OD_PARAMETER_DC_CAPACITANCE,
     OD_PARAMETER_DC_LINK_REPEATS,
 #endif
-#if PM_HAS(dual_pulses) || PM_HAS(three_phase_hf)
+#if PM_HAS(dual_pulses) || PM_HAS(three_phase_hf) || PM_HAS(zero_rotating)
     OD_PARAMETER_POSITION_FIND,
     OD_PARAMETER_POLARITY,
     OD_PARAMETER_I_POLARITY,
@@ -327,6 +327,7 @@ enum {
 #if PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating)
     OD_PARAMETER_ZERO_L_C0,
     OD_PARAMETER_ZERO_FORM,
+    OD_PARAMETER_ZERO_FALLS,
 #endif
 #if PM_HAS(counted_carrier)
     OD_PARAMETER_INJECTION_PRE_COMP,

@@ -82,8 +82,8 @@ typedef struct {
     PM_IN_IMAGE(saliency_map, saliency_map_config_t saliency_map;)
 #if SEQUENCE_HAS_POLARITY
     polarity_config_t polarity;
-    dual_pulses_config_t dual_pulses;
-    three_phase_hf_config_t three_phase_hf;
+    PM_IN_IMAGE(dual_pulses, dual_pulses_config_t dual_pulses;)
+    PM_IN_IMAGE(three_phase_hf, three_phase_hf_config_t three_phase_hf;)
 #endif
     open_loop_config_t open_loop;
     fault_short_config_t fault_short;

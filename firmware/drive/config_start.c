@@ -56,43 +56,71 @@ static uint8_t pole_of(const drive_params_t *params)
     return poles[params->polarity];
 }
 
+#if PM_HAS(pulsating_sine)
 /* Dead time bends a carrier that it takes more of than a quarter into a second harmonic as large as that of the poles. */
 PM_APART static void check_second_harmonic(maker_t *m)
 {
     const pm_num_t lost =
         mul3(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm), si(m, DRIVE_PARAM_v_dc_nominal));
-    if (pm_num_cmp(pm_num_mul(lost, pm_num(4)), si(m, DRIVE_PARAM_v_injection)) > 0) {
+    if (m->params->polarity == 3 &&
+        pm_num_cmp(pm_num_mul(lost, pm_num(4)), si(m, DRIVE_PARAM_v_injection)) > 0) {
         refuse(m, DRIVE_PARAM_v_injection, "polarity 3 needs four times what dead time takes");
     }
 }
+#endif
 
 /* What of the carrier the steps of polarity look at, and whether there is one that they can look at. */
 static void make_carrier(maker_t *m, drive_config_t *config)
 {
     const injection_config_t *c = &config->position.injection;
-    const drive_params_t *p = m->params;
-    const sine_config_t *sine = NULL;
-    pm_q_t h_d = c->pulsating_square.h_d;
-    if (c->id == INJECTION_pulsating_sine) {
-        sine = &c->pulsating_sine.sine;
-        h_d = c->pulsating_sine.h_d;
-    } else if (p->polarity == 3 || (p->polarity == 2 && c->id != INJECTION_pulsating_square)) {
-        refuse(m, DRIVE_PARAM_polarity,
-               p->polarity == 3 ? "needs injection 4, a sine along d"
-                                : "needs injection 0 or 4, a carrier along d");
-    } else {
-        /* no step looks at the carrier, or one at the square wave */
-    }
-    if (p->polarity == 3) {
+    const int32_t by = m->params->polarity;
+    polarity_carrier_t carrier = {.periods = 1};
+    bool seen = false;
+    switch (c->id) {
+    case INJECTION_pulsating_square:
+        carrier = polarity_by_current(m, 1, c->pulsating_square.h_d);
+        seen = by == 2;
+        break;
+#if PM_HAS(pulsating_sine)
+    case INJECTION_pulsating_sine:
+        carrier = polarity_by_current(m, c->pulsating_sine.sine.n, c->pulsating_sine.h_d);
+        seen = true;
         check_second_harmonic(m);
+        break;
+#endif
+#if PM_HAS(zero_rotating)
+    case INJECTION_zero_rotating:
+        carrier = zero_rotating_polarity(m, &c->zero_rotating);
+        seen = by == 2;
+        break;
+#endif
+    default:
+        break;
     }
-    make_polarity(m, sine, h_d, &config->polarity);
+    make_polarity(m, &carrier, &config->polarity);
+    if (!seen) {
+        refuse(m, DRIVE_PARAM_polarity,
+               by == 3 ? "needs injection 4, a sine along d"
+                       : "needs injection 0 or 4, a carrier along d, or 8 at the neutral");
+    }
 }
 
-/* How the start finds angle and pole. */
-static void make_pole(maker_t *m, drive_config_t *config)
+/* Whether it can be done at all. */
+static void check_pole(maker_t *m, const drive_config_t *config)
 {
+    static const bool in_image[PROCEDURE_COUNT] = {
+        true,
+#define PM_METHOD(name, help, traits, needs) PM_HAS(name) != 0,
+#include "firmware/drive/procedures/procedures.def"
+#undef PM_METHOD
+    };
     const drive_params_t *p = m->params;
+    if (!in_image[config->find]) {
+        refuse(m, DRIVE_PARAM_position_find, "is not in this image");
+    }
+    if (!in_image[config->pole]) {
+        refuse(m, DRIVE_PARAM_polarity, "is not in this image");
+    }
     if (p->position_find == 1 && (config->position.traits & SOURCE_STATOR) != 0U) {
         refuse(m, DRIVE_PARAM_position_find, "needs a carrier in the estimated frame: injection 0, 1 or 4");
     } else if (p->position_find == 1 && p->polarity == 0) {
@@ -100,15 +128,19 @@ static void make_pole(maker_t *m, drive_config_t *config)
     } else {
         /* both are found */
     }
-    if (p->position_find == 2) {
-        make_three_phase_hf(m, &config->three_phase_hf);
-    }
-    if (p->polarity == 1) {
-        make_dual_pulses(m, &config->dual_pulses);
-    } else if (p->polarity != 0) {
+}
+
+/* How the start finds angle and pole. */
+static void make_pole(maker_t *m, drive_config_t *config)
+{
+    const drive_params_t *p = m->params;
+    check_pole(m, config);
+    PM_IN_IMAGE(
+        three_phase_hf, if (p->position_find == 2) { make_three_phase_hf(m, &config->three_phase_hf); })
+    PM_IN_IMAGE(
+        dual_pulses, if (p->polarity == 1) { make_dual_pulses(m, &config->dual_pulses); })
+    if (p->polarity > 1) {
         make_carrier(m, config);
-    } else {
-        /* what finds the angle finds the pole */
     }
 }
 #endif

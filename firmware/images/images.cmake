@@ -18,7 +18,7 @@ set(PM_IMAGE_foc_DRIVE_STEP_INJECTION 312)
 # third harmonic and zero-sequence voltage, for motors whose star point is led out
 set(PM_IMAGE_neutral_BOARD stm32g431)
 set(PM_IMAGE_neutral_PROGRAM pmdrive_neutral)
-set(PM_IMAGE_neutral_METHODS active_flux third_integration third_sogi third_crossings pulsating_square synchronous_pi calibrate initial_pulses align identify charge flying_start neutral zero_anti_rotating zero_rotating zero_pulsating)
+set(PM_IMAGE_neutral_METHODS active_flux third_integration third_sogi third_crossings pulsating_square synchronous_pi calibrate initial_pulses align identify charge flying_start neutral zero_anti_rotating zero_rotating zero_pulsating d_current)
 set(PM_IMAGE_neutral_IN_FLASH fault_short_stage fault_short_step procedure_identify_step pulses_step pulses_add pulses_saliency)
 set(PM_IMAGE_neutral_FLASH 81920)
 set(PM_IMAGE_neutral_RAM 14336)

@@ -17,7 +17,6 @@
 #define PM_WITHOUT_boundary_detection 1
 #define PM_WITHOUT_dc_link_pulses 1
 #define PM_WITHOUT_lock 1
-#define PM_WITHOUT_d_current 1
 #define PM_WITHOUT_secondary_current 1
 #define PM_WITHOUT_dual_pulses 1
 #define PM_WITHOUT_three_phase_hf 1

@@ -23,6 +23,13 @@ void procedure_d_current_begin(drive_t *drive)
 
 static pm_q_t answer(const drive_t *drive)
 {
+#if PM_HAS(zero_rotating)
+    if (drive->config.position.injection.id == INJECTION_zero_rotating) {
+        return zero_rotating_along(&drive->position.injection.zero_rotating,
+                                   &drive->config.position.injection.zero_rotating,
+                                   drive->position.pll.theta);
+    }
+#endif
     const obs_out_t last = injection_last(&drive->position.injection, &drive->config.position.injection);
     return last.vector.d;
 }

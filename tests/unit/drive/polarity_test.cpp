@@ -22,6 +22,7 @@ using bench::wrapped;
 constexpr double kRatioIpm = 1.15, kRatioSpm = 1.05, kSigma94 = 50;
 constexpr double kSigma96 = 3.5; // 35 V, 500 Hz, after 50 ms; a step there goes on until five sigma
 constexpr double kPhaseTwin = 0.15;
+constexpr double kRatioAlong = 1.23, kRatioAcross = 1.077, kRatioWithin = 0.02; // D (e), row 95
 constexpr int kMs94 = 150, kMs96 = 66;
 // What the carrier and the step of a period make of a continuous current and voltage.
 constexpr double kJump_A = 0.1;
@@ -210,6 +211,56 @@ TEST(DCurrent, AmplitudesDifferAsTheMachineSaturates)
     expect_ratio(spm(), sine_of_spm(2), kRatioSpm);
 }
 
+plant_config_t with_neutral()
+{
+    plant_config_t c = ipm();
+    c.winding.dL_0_H = 2e-3;
+    c.sensor.v_zero_full_scale_V = 10;
+    c.sensor.v_zero_filter_s = 100e-6;
+    c.sensor.v_zero_noise_lsb = 0.5;
+    return c;
+}
+
+drive_params_t rotating()
+{
+    drive_params_t p = sine(2);
+    p.position_find = 0;
+    p.injection = INJECTION_zero_rotating;
+    p.dL_0 = 2000000;
+    p.neutral_full_scale = 10000;
+    p.neutral_filter = 100000;
+    p.injection_bandwidth = 20000;
+    p.speed_bandwidth = 3000;
+    return p;
+}
+
+// Greater over smaller voltage at the neutral, and whether the greater is that with the magnetising current.
+double ratio_at_the_neutral(double theta_rad)
+{
+    Start x(with_neutral(), rotating(), theta_rad);
+    x.run_to(PROCEDURE_d_current);
+    d_current_t last = {};
+    const int periods = x.run([&last](const drive_t &d) {
+        const bool ended = d.sequence.procedure != PROCEDURE_d_current;
+        last = ended ? last : d.beside.d_current;
+        return ended;
+    });
+    EXPECT_LE(periods, 10 * kMs94);
+    EXPECT_LE(std::abs(x.error_rad()), 5 * kDegree);
+    const double first = last.first;
+    return (first + polarity_mean(&last.h[0])) / (first + polarity_mean(&last.h[1]));
+}
+
+// 1 / L_dh shows where cos 6 theta = 1, 1 / L_qh where it is -1.
+TEST(DCurrent, VoltagesAtTheNeutralDifferAsTheMachineSaturates)
+{
+    for (int k = 0; k < 6; ++k) {
+        EXPECT_NEAR(ratio_at_the_neutral(60 * k * kDegree), kRatioAlong, kRatioWithin * kRatioAlong) << k;
+        EXPECT_NEAR(ratio_at_the_neutral((60 * k + 30) * kDegree), kRatioAcross, kRatioWithin * kRatioAcross)
+            << k;
+    }
+}
+
 // The mean and its noise when the first number of values is there.
 struct Second {
     double mean = 0, noise = 0;
@@ -378,6 +429,14 @@ TEST(Polarity, AParameterThatCannotBeIsRefusedByName)
                   p.injection = INJECTION_stationary_square;
               }),
               DRIVE_PARAM_polarity);
+    for (const injection_id_t blind : {INJECTION_zero_anti_rotating, INJECTION_zero_pulsating}) {
+        drive_params_t p = rotating();
+        p.injection = blind; // no voltage at the neutral where it locks, or not at standstill
+        drive_config_t c = {};
+        const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
+        EXPECT_FALSE(r.ok);
+        EXPECT_EQ(r.param, DRIVE_PARAM_polarity);
+    }
     EXPECT_EQ(refused([](drive_params_t &p) {
                   p.position_find = 1;
                   p.polarity = 1;
