@@ -58,7 +58,7 @@ static pm_q_t harmonic(const zero_rotating_t *self, const zero_rotating_config_t
 {
     int64_t sum = 0;
     for (uint32_t n = 0; n < 2U * config->half; n++) {
-        sum += (int64_t)(self->x[n] >> 4) * pm_dir(angle + turn * (n - SINCE)).cos;
+        sum += (int64_t)pm_mulh(self->x[n], PM_FRAC(1.0 / 16)) * pm_dir(angle + turn * (n - SINCE)).cos;
     }
     return 2 * window_amplitude(sum, (pm_frac_t)config->step);
 }

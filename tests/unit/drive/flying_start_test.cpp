@@ -506,7 +506,8 @@ TEST(FlyingStart, ChargesTheUpperSwitchesInPulses)
     EXPECT_EQ(driven, 20);
 }
 
-// Devices take from each leg's current towards zero; a leg within its noise has lost nothing.
+// Devices take from each leg's current towards zero; one that they take wholly is what is left of the error: 3.5 degrees, without
+// what is given back 5.2 and more.
 TEST(FlyingStart, WhatTheDevicesTookIsGivenBack)
 {
     const double drop = 0.02;
@@ -533,7 +534,7 @@ TEST(FlyingStart, WhatTheDevicesTookIsGivenBack)
         }
         ASSERT_EQ(flying_start_find(&self, &c, &machine, INT32_C(1) << 30), PM_DONE);
         const double theta = rad(self.theta) - 90 * kDegree;
-        EXPECT_LE(std::abs(wrapped(theta - (at + 20) * kDegree)), 8 * kDegree) << at;
+        EXPECT_LE(std::abs(wrapped(theta - (at + 20) * kDegree)), 4.5 * kDegree) << at;
     }
 }
 
