@@ -1,5 +1,6 @@
 #include "bldc/six_step.h"
 
+#include "firmware/math/compiler.h"
 #include "firmware/math/root.h"
 
 #define SIXTH PM_TURN(1.0 / 6)
@@ -117,7 +118,7 @@ static void look(six_step_t *self, const six_step_config_t *config, const six_st
 }
 
 /* The third harmonic crosses by the rotor alone: where a filter delays it, behind the commutation that it was for. */
-static void look_third(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in)
+PM_APART static void look_third(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in)
 {
     commutation_t *c = &self->commutation;
     const bool rising = sector_rising(sector_next(c->crossed));
@@ -158,11 +159,10 @@ void six_step_step(six_step_t *self, const six_step_config_t *config, const six_
     const int32_t period = 2 * (int32_t)config->pattern.half_period;
     const uint32_t ended = in->now - (uint32_t)period, coming = in->now + (uint32_t)period;
     commutation_t *c = &self->commutation;
-    const bool third = config->crossings == CROSSINGS_third_harmonic;
-    if (third) {
-        look_third(self, config, in);
-    } else if (in->sampled) {
+    if (in->sampled) {
         look(self, config, in, ended);
+    } else if (pm_rarely(config->crossings == CROSSINGS_third_harmonic)) {
+        look_third(self, config, in);
     } else {
         /* nothing new */
     }
@@ -174,7 +174,6 @@ void six_step_step(six_step_t *self, const six_step_config_t *config, const six_
     six_step_plan_t *plan = &self->plan[1];
     plan->sector = c->sector;
     plan->commutate_at = 0;
-    plan->sample_at = 0;
     pattern_duties(&config->pattern, c->sector, self->reverse, in->u, &out->legs);
     out->legs.legs = self->legs;
     const int32_t due = (int32_t)(commutation_due(c, &config->commutation) - coming);
@@ -183,9 +182,7 @@ void six_step_step(six_step_t *self, const six_step_config_t *config, const six_
         c->sector = (uint8_t)sector_next(c->sector);
         self->legs = pattern_states(&config->pattern, c->sector, self->reverse);
     }
-    if (!third) {
-        plan_sample(plan, &config->pattern, in->u);
-    }
+    plan_sample(plan, &config->pattern, in->u);
     out->then = self->legs;
     out->commutate_at = plan->commutate_at;
     out->sample_at = plan->sample_at;

@@ -41,17 +41,18 @@ typedef enum {
 } crossings_id_t;
 
 typedef struct {
-    crossings_id_t crossings;
     pattern_config_t pattern;
     zero_crossing_config_t crossing; /* its swing is that of e_0 with the third harmonic */
-    third_harmonic_config_t third;
     commutation_config_t commutation;
     thresholds_config_t thresholds;
+    third_harmonic_config_t third;
+    crossings_id_t crossings;
 } six_step_config_t;
 
 typedef struct {
     uint32_t now; /* counts at t_k */
-    bool sampled; /* the sample asked for two calls ago is here: */
+    bool
+        sampled; /* the sample asked for two calls ago is here; never with CROSSINGS_third_harmonic, which has v_zero */
     zero_sample_t sample;
     pm_q_t u;      /* patterns.h */
     pm_q_t v_zero; /* at t_k, drive/neutral.h; CROSSINGS_third_harmonic only */
@@ -74,7 +75,6 @@ typedef struct {
 typedef struct {
     commutation_t commutation;
     zero_crossing_t crossing;
-    third_harmonic_t third;
     thresholds_t thresholds;
     zero_expected_t expected;
     six_step_plan_t plan[2]; /* [1] of the period that begins now, [0] of the one that has ended */
@@ -83,6 +83,7 @@ typedef struct {
     bool learn;              /* from the last crossing */
     bool reverse;
     bool lost;
+    third_harmonic_t third;
 } six_step_t;
 
 /* theta at `now`; omega: electrical, per-unit, negative for the other direction; six sectors take less than 2^29 counts.
@@ -113,8 +114,8 @@ void six_step_begin(six_step_t *self, const six_step_config_t *config, pm_angle_
 void six_step_step(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in,
                    six_step_out_t *out);
 
-/* At 1 kHz: lag of the third harmonic, and what a sector must show of its swing, an eighth, for its crossing to be one. Without the call a rotor that has
- * stopped may pass for one that turns. */
+/* At 1 kHz: lag of the third harmonic, and what a sector must show of its swing, an eighth, for its crossing to be one. Without
+ * the call a rotor that has stopped may pass for one that turns. */
 void six_step_slow(six_step_t *self, const six_step_config_t *config);
 
 void make_six_step(maker_t *m, six_step_config_t *c);

@@ -40,12 +40,13 @@ void block_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
     line_current_step(&self->current, &c->current, self->i, drive->status.v_dc);
 
     six_step_in_t seen = {.now = self->now, .sampled = pm_sampled(&in->more, 0), .u = self->current.u};
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    seen.sampled = seen.sampled && c->six_step.crossings != CROSSINGS_third_harmonic;
+    seen.v_zero = neutral_signal(&drive->neutral, &drive->config.neutral, in->more.v_neutral);
+#endif
     if (seen.sampled) {
         take_sample(drive, in, &seen.sample);
     }
-#if PM_CARRIES(NEEDS_NEUTRAL)
-    seen.v_zero = neutral_signal(&drive->neutral, &drive->config.neutral, in->more.v_neutral);
-#endif
     six_step_out_t next;
     six_step_step(&self->six_step, &c->six_step, &seen, &next);
     for (uint32_t leg = 0; leg < PM_LEGS; leg++) {

@@ -246,7 +246,7 @@ class Rig
         six_step_in_t in = {};
         in.now = now_;
         in.u = fixed(u, PM_Q_BITS);
-        in.sampled = sampled_;
+        in.sampled = sampled_ && config.crossings != CROSSINGS_third_harmonic;
         for (int k = 0; k < 3; ++k) {
             in.sample.v[k] = fixed(adc_.v_leg[k] / 65536.0 + wrong_reference_V / kBase_V, PM_Q_BITS);
         }
