@@ -195,6 +195,14 @@ static bool is_wrong(block_t *self, const block_config_t *c, pm_q_t v_dc)
     return self->wrong_ms > WRONG_MS;
 }
 
+/* A rotor that is held shows no EMF: noise may make the crossings of a start, but not for longer than is_wrong() takes. */
+static block_result_t lost(const drive_t *drive)
+{
+    const bool starts = drive->block.six_step.commutation.young != 0U ||
+                        (drive->config.block.from_rest && drive->block_ms < 2U * WRONG_MS);
+    return starts ? BLOCK_STALLED : BLOCK_LOST;
+}
+
 block_result_t block_slow(drive_t *drive)
 {
     const block_config_t *c = &drive->config.block;
@@ -202,7 +210,7 @@ block_result_t block_slow(drive_t *drive)
     const bool young = self->six_step.commutation.young != 0U;
     drive->thresholds = self->six_step.thresholds;
     if (self->six_step.lost) {
-        return young ? BLOCK_STALLED : BLOCK_LOST;
+        return lost(drive);
     }
     six_step_slow(&self->six_step, &c->six_step);
     look(self, c);
@@ -217,7 +225,7 @@ block_result_t block_slow(drive_t *drive)
         return BLOCK_SLOW;
     }
     if (is_wrong(self, c, drive->status.v_dc)) {
-        return BLOCK_LOST;
+        return lost(drive);
     }
     if (drive->block_ms < BLOCK_SETTLED_MS) {
         drive->block_ms++;

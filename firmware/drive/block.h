@@ -16,7 +16,8 @@
  *
  * A turn whose crossings are not where they belong ends it (missed_crossings): all legs off in the same period. With
  * flying_start the rotor is looked for, caught by the vector path and given back; without, or after resync_tries, the fault
- * is POSITION_LOST. A start whose crossings do not come is tried again, as often, and then the fault is STALL.
+ * is POSITION_LOST. A start whose crossings do not come, or are believed for no longer than 40 ms as those that noise makes of
+ * a held rotor, is tried again, as often, and then the fault is STALL.
  *
  * Current limit: i_max, derated as the vector's, and with freewheeling_limit what leaves the crossing to be seen:
  *   theta_f(i) + w (t_blank + T) <= 30 degrees             (freewheeling.h)
