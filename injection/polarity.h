@@ -32,10 +32,9 @@ typedef struct {
 } polarity_mean_t;
 
 typedef struct {
-    pm_q_t i_d;   /* d_current: in either direction */
-    pm_q_t noise; /* of one value, by that of the converter */
-    pm_q_t
-        h_d; /* expected answer of the carrier, as the source gives it: current, or voltage at the neutral */
+    pm_q_t i_d;        /* d_current: in either direction */
+    pm_q_t noise;      /* of one value, by that of the converter */
+    pm_q_t h_d;        /* expected answer of the carrier, a current or a voltage at the neutral */
     uint16_t block_ms; /* so long lie values apart that have nothing in common */
     uint16_t values;   /* of secondary_current, half of them of each direction of d_current: a power of two */
     bool reversed;     /* the answer falls with the magnetising current */
