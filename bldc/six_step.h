@@ -51,8 +51,7 @@ typedef struct {
 
 typedef struct {
     uint32_t now; /* counts at t_k */
-    bool
-        sampled; /* the sample asked for two calls ago is here; never with CROSSINGS_third_harmonic, which has v_zero */
+    bool sampled; /* what was asked for two calls ago is here; not with the third harmonic */
     zero_sample_t sample;
     pm_q_t u;      /* patterns.h */
     pm_q_t v_zero; /* at t_k, drive/neutral.h; CROSSINGS_third_harmonic only */

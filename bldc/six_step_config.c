@@ -42,13 +42,13 @@ static pm_num_t swing_of(const maker_t *m)
         return pm_num_mul(swing_of_terminal(m), si(m, DRIVE_PARAM_psi_m));
     }
     if (m->params->emf_shape == 0) { /* 9 psi_3 pi / 3 */
-        const pm_num_t psi_3 = pm_num_sqrt(square(si(m, DRIVE_PARAM_psi_3)));
-        return pm_num_mul(pm_num_mul(PM_NUM_TWO_PI, pm_num_ratio(3, 2)), psi_3);
+        const pm_num_t psi_3 = si(m, DRIVE_PARAM_psi_3);
+        return mul3(PM_NUM_TWO_PI, pm_num_ratio(3, 2), m->params->psi_3 < 0 ? pm_num_neg(psi_3) : psi_3);
     }
     return mul3(square(PM_NUM_TWO_PI), pm_num_ratio(1, 72), si(m, DRIVE_PARAM_psi_m));
 }
 
-static void make_third_crossings_of(maker_t *m, third_harmonic_config_t *c)
+static void make_third_harmonic(maker_t *m, third_harmonic_config_t *c)
 {
     const drive_params_t *p = m->params;
     if (p->emf_shape == 0 && p->psi_3 == 0) {
@@ -97,7 +97,7 @@ void make_six_step(maker_t *m, six_step_config_t *c)
     c->crossings = (crossings_id_t)p->zero_reference;
     require(m, needs_of(p->zero_reference), DRIVE_PARAM_zero_reference);
     if (m->result.ok && c->crossings == CROSSINGS_third_harmonic) {
-        make_third_crossings_of(m, &c->third);
+        make_third_harmonic(m, &c->third);
     }
     make_crossing(m, c->commutation.turn_base, &c->crossing);
     const pm_num_t vertical = pm_num_mul(pm_num_ratio(3, 2), si(m, DRIVE_PARAM_learn_vertical));

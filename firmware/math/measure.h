@@ -98,8 +98,8 @@ const char *pm_need_text(uint32_t missing);
 #endif
 
 #define PM_LEGS 3
-#define PM_SAMPLES                                                                                           \
-    (PM_CARRIES(NEEDS_HALVES) ? 2 : 1) /* further samples in a period; with halves one in each */
+/* Further samples in a period; with halves one in each. */
+#define PM_SAMPLES  (PM_CARRIES(NEEDS_HALVES) ? 2 : 1)
 #define PM_CAPTURES 8 /* edges: a floating terminal rings across its threshold more than once */
 
 /* An edge of a terminal's comparator in the period that ended at t_k. */

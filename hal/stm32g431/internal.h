@@ -43,8 +43,8 @@ void bridge_run(void);
 void bridge_begin_period(void); /* in programs with PORT_BY_COM */
 void measure_start(void);
 void measure_run(hal_t *hal);
-bool measure_is_within(
-    void); /* the sequence that has ended was started within the period, not at its start */
+/* The sequence that has ended was started within the period, not at its start. */
+bool measure_is_within(void);
 void measure_take_sample(void);
 hal_status_t can_start(const hal_config_t *config);
 void can_take_element(port_can_t *can, const fdcan_element_t *element); /* into the ring */

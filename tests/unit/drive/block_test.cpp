@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -265,6 +266,26 @@ TEST(Block, ARotorThatIsHeldIsAStallAfterItsTries)
         EXPECT_EQ(x.drive().block_tries, tries);
         EXPECT_GT(time_s, last_s + 0.3 * tries) << "each with an align";
         last_s = time_s;
+    }
+}
+
+// A held rotor whose noise was taken for crossings: lost so soon it never turned, later it has.
+TEST(Block, LostWithin40MillisecondsOfItsStartIsAStall)
+{
+    for (const auto &[ms, fault] : {std::pair{38, DRIVE_FAULT_STALL}, {45, DRIVE_FAULT_POSITION_LOST}}) {
+        Fan x;
+        x.params().resync_tries = 0;
+        x.params().flying_start = 0;
+        x.enable();
+        x.speed_rel(0.4);
+        x.run_s(1.3);
+        ASSERT_EQ(x.fault(), DRIVE_FAULT_NONE);
+        ASSERT_EQ(x.drive().stage, STAGE_SIX_STEP);
+        x.drive().block_ms = static_cast<uint16_t>(ms);
+        x.drive().block.six_step.lost = true;
+        x.run_s(0.002);
+        EXPECT_EQ(x.fault(), fault) << ms;
+        EXPECT_FALSE(x.driven());
     }
 }
 
