@@ -461,6 +461,13 @@ TEST(Polarity, AParameterThatCannotBeIsRefusedByName)
                   p.v_injection = 23000;
               }),
               DRIVE_PARAM_v_injection);
+    EXPECT_EQ(refused([](drive_params_t &p) { // 15 periods of the PWM in one of the carrier
+                  p.polarity = 3;
+                  p.injection = INJECTION_pulsating_sine;
+                  p.injection_bandwidth = 7000;
+                  p.f_injection = 10000000 / 15;
+              }),
+              DRIVE_PARAM_f_injection);
     EXPECT_EQ(refused([](drive_params_t &p) {
                   p.position_find = 2;
                   p.v_injection = 200000;
