@@ -184,6 +184,22 @@ TEST(Lock, RefusesAMachineWithoutSaliency)
     }
 }
 
+// What turns is the estimate: no over-speed of the rotor, which is at rest.
+TEST(Lock, ALoopThatRunsAwayIsRefused)
+{
+    drive_params_t p = sine(1);
+    p.start_fallback = 0;
+    Start x(ipm(), p, 1.0);
+    x.run([](const drive_t &d) { return d.sequence.procedure == PROCEDURE_lock && !lock_looks(&d.beside.lock); });
+    x.drive().position.pll.omega = PM_Q(0.7);
+    for (int k = 0; k < 20; ++k) {
+        x.period();
+    }
+    EXPECT_EQ(drive_status(&x.drive())->refusal.procedure, PROCEDURE_lock);
+    EXPECT_EQ(drive_status(&x.drive())->refusal.reason, PM_FAILED_SALIENCY);
+    EXPECT_EQ(drive_status(&x.drive())->fault, DRIVE_FAULT_POSITION_NOT_FOUND);
+}
+
 // 1.237 and 1.082 in double precision.
 void expect_ratio(const plant_config_t &plant, const drive_params_t &p, double ratio)
 {
