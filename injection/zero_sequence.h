@@ -187,6 +187,9 @@ void make_zero_sequence(maker_t *m, zero_config_t *c);
 injection_limits_t zero_limits(const maker_t *m);
 pm_num_t zero_answer(const maker_t *m);
 
+/* 8 A, the unit of x, V; of the sign of dL_0. */
+pm_num_t zero_unit(const maker_t *m);
+
 #ifdef __cplusplus
 }
 #endif

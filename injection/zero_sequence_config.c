@@ -31,6 +31,11 @@ static pm_num_t amplitude(const maker_t *m)
                       pm_num_ratio(1, 2));
 }
 
+pm_num_t zero_unit(const maker_t *m)
+{
+    return pm_num_mul(pm_num(8), amplitude(m));
+}
+
 static pm_num_t magnitude(pm_num_t x)
 {
     return pm_num_cmp(x, pm_num(0)) < 0 ? pm_num_neg(x) : x;
@@ -104,7 +109,7 @@ static void make_carrier(maker_t *m, zero_config_t *c)
 
 void make_zero_sequence(maker_t *m, zero_config_t *c)
 {
-    const pm_num_t unit = pm_num_mul(pm_num(8), amplitude(m));
+    const pm_num_t unit = zero_unit(m);
     if (pm_num_cmp(magnitude(unit), pm_num_mul(m->base.v, pm_num_ratio(8, 1000))) < 0) {
         refuse(m, DRIVE_PARAM_dL_0, "leaves no answer at the neutral");
         return;

@@ -26,6 +26,7 @@
 #include "injection/dual_pulses.h"
 #include "injection/pulses.h"
 #include "injection/three_phase_hf.h"
+#include "injection/zero_second.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -83,6 +84,7 @@ typedef struct {
 #if SEQUENCE_HAS_POLARITY
     polarity_config_t polarity;
     PM_IN_IMAGE(dual_pulses, dual_pulses_config_t dual_pulses;)
+    PM_IN_IMAGE(secondary_voltage, zero_second_config_t zero_second;)
     PM_IN_IMAGE(three_phase_hf, three_phase_hf_config_t three_phase_hf;)
 #endif
     open_loop_config_t open_loop;

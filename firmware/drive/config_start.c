@@ -52,19 +52,19 @@ static uint8_t find_of(const drive_params_t *params)
 static uint8_t pole_of(const drive_params_t *params)
 {
     static const uint8_t poles[] = {PROCEDURE_NONE, PROCEDURE_dual_pulses, PROCEDURE_d_current,
-                                    PROCEDURE_secondary_current};
+                                    PROCEDURE_secondary_current, PROCEDURE_secondary_voltage};
     return poles[params->polarity];
 }
 
-#if PM_HAS(pulsating_sine)
+#if PM_HAS(pulsating_sine) || PM_HAS(secondary_voltage)
 /* Dead time bends a carrier that it takes more of than a quarter into a second harmonic as large as that of the poles. */
 PM_APART static void check_second_harmonic(maker_t *m)
 {
     const pm_num_t lost =
         mul3(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm), si(m, DRIVE_PARAM_v_dc_nominal));
-    if (m->params->polarity == 3 &&
+    if (m->params->polarity >= 3 &&
         pm_num_cmp(pm_num_mul(lost, pm_num(4)), si(m, DRIVE_PARAM_v_injection)) > 0) {
-        refuse(m, DRIVE_PARAM_v_injection, "polarity 3 needs four times what dead time takes");
+        refuse(m, DRIVE_PARAM_v_injection, "polarity 3 and 4 need four times what dead time takes");
     }
 }
 #endif
@@ -84,7 +84,7 @@ static void make_carrier(maker_t *m, drive_config_t *config)
 #if PM_HAS(pulsating_sine)
     case INJECTION_pulsating_sine:
         carrier = polarity_by_current(m, c->pulsating_sine.sine.n, c->pulsating_sine.h_d);
-        seen = true;
+        seen = by != 4;
         check_second_harmonic(m);
         break;
 #endif
@@ -92,6 +92,13 @@ static void make_carrier(maker_t *m, drive_config_t *config)
     case INJECTION_zero_rotating:
         carrier = zero_rotating_polarity(m, &c->zero_rotating);
         seen = by == 2;
+        PM_IN_IMAGE(
+            secondary_voltage, if (by == 4) {
+                carrier.reversed = false; /* the constants know */
+                seen = true;
+                check_second_harmonic(m);
+                make_zero_second(m, &config->zero_second);
+            })
         break;
 #endif
     default:
@@ -99,9 +106,10 @@ static void make_carrier(maker_t *m, drive_config_t *config)
     }
     make_polarity(m, &carrier, &config->polarity);
     if (!seen) {
-        refuse(m, DRIVE_PARAM_polarity,
-               by == 3 ? "needs injection 4, a sine along d"
-                       : "needs injection 0 or 4, a carrier along d, or 8 at the neutral");
+        static const char *const needs[] = {"needs injection 0 or 4, a carrier along d, or 8 at the neutral",
+                                            "needs injection 4, a sine along d",
+                                            "needs injection 8, a rotating carrier at the neutral"};
+        refuse(m, DRIVE_PARAM_polarity, needs[by - 2]);
     }
 }
 
