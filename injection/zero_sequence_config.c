@@ -57,10 +57,21 @@ static pm_num_t decay(pm_num_t x)
     return square(square(square(pm_num_div(pm_num_sub(even, odd), pm_num_add(even, odd)))));
 }
 
-static void make_channel(maker_t *m, zero_config_t *c, pm_num_t unit)
+static pm_num_t periods_of_filter(const maker_t *m)
 {
     const pm_num_t rc = si(m, DRIVE_PARAM_neutral_filter);
-    const pm_num_t x = rc.m > 0 ? pm_num_div(m->base.t_s, rc) : pm_num(0);
+    return rc.m > 0 ? pm_num_div(m->base.t_s, rc) : pm_num(0);
+}
+
+pm_num_t zero_decay(const maker_t *m)
+{
+    const pm_num_t x = periods_of_filter(m);
+    return x.m > 0 ? decay(x) : pm_num(0);
+}
+
+static void make_channel(maker_t *m, zero_config_t *c, pm_num_t unit)
+{
+    const pm_num_t x = periods_of_filter(m);
     if (pm_num_cmp(x, pm_num_ratio(49, 100)) < 0 || pm_num_cmp(x, pm_num_ratio(201, 100)) > 0) {
         refuse(m, DRIVE_PARAM_neutral_filter,
                "the zero-sequence voltage needs an RC of half a PWM period to two");
