@@ -64,10 +64,18 @@ PM_APART static void check_second_harmonic(maker_t *m)
         mul3(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm), si(m, DRIVE_PARAM_v_dc_nominal));
     if (m->params->polarity >= 3 &&
         pm_num_cmp(pm_num_mul(lost, pm_num(4)), si(m, DRIVE_PARAM_v_injection)) > 0) {
-        refuse(m, DRIVE_PARAM_v_injection, "polarity 3 and 4 need four times what dead time takes");
+        refuse(m, DRIVE_PARAM_v_injection, "below four times what dead time takes");
     }
 }
 #endif
+
+static const char *carrier_of(int32_t polarity)
+{
+    if (PM_HAS(secondary_voltage) && polarity == 4) {
+        return "needs injection 8";
+    }
+    return polarity == 3 ? "needs injection 4" : "needs injection 0, 4 or 8";
+}
 
 /* What of the carrier the steps of polarity look at, and whether there is one that they can look at. */
 static void make_carrier(maker_t *m, drive_config_t *config)
@@ -84,7 +92,7 @@ static void make_carrier(maker_t *m, drive_config_t *config)
 #if PM_HAS(pulsating_sine)
     case INJECTION_pulsating_sine:
         carrier = polarity_by_current(m, c->pulsating_sine.sine.n, c->pulsating_sine.h_d);
-        seen = by != 4;
+        seen = !PM_HAS(secondary_voltage) || by != 4;
         check_second_harmonic(m);
         break;
 #endif
@@ -106,10 +114,7 @@ static void make_carrier(maker_t *m, drive_config_t *config)
     }
     make_polarity(m, &carrier, &config->polarity);
     if (!seen) {
-        static const char *const needs[] = {"needs injection 0 or 4, a carrier along d, or 8 at the neutral",
-                                            "needs injection 4, a sine along d",
-                                            "needs injection 8, a rotating carrier at the neutral"};
-        refuse(m, DRIVE_PARAM_polarity, needs[by - 2]);
+        refuse(m, DRIVE_PARAM_polarity, carrier_of(by));
     }
 }
 
@@ -166,6 +171,7 @@ void choose_start(maker_t *m, drive_config_t *config, uint32_t channels)
                 config->flying_start.charge =
                     (uint32_t)config->charge_periods * (uint32_t)FLYING_START_PARTS;)
     PM_IN_IMAGE(saliency_map, make_saliency_map(m, &config->saliency_map);)
+    PM_IN_IMAGE(zero_inductance, make_zero_inductance(m, &config->zero_inductance);)
     require(m, sequence_needs((sequence_id_t)config->start, config->find, config_pole(config)),
             DRIVE_PARAM_start_method);
 }

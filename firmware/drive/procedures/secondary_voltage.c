@@ -23,8 +23,8 @@ static void add_value(drive_t *drive)
     secondary_voltage_t *self = &drive->beside.secondary_voltage;
     const zero_second_config_t *config = &drive->config.zero_second;
     const pm_angle_t theta = drive->position.pll.theta;
-    const pm_ab_t odd = zero_second_odd(config, theta);
-    const pm_ab_t even = zero_second_even(config, theta);
+    const pm_ab_t odd = zero_second_of_pole(config, theta);
+    const pm_ab_t even = zero_second_of_either(config, theta);
     const int32_t count = self->count;
     const pm_ab_t w = {self->sum.alpha / count - even.alpha, self->sum.beta / count - even.beta};
     self->r = pm_hypot(odd.alpha, odd.beta);

@@ -3,8 +3,8 @@
  *
  * On top of position control by injection with zero_rotating, at i_dq = 0. z of zero_second.h over a whole number of the carrier's
  * periods, in the direction in which the magnet's north would have it:
- *   r      = odd(theta^)
- *   x + jy = (z - even(theta^)) r* / |r|
+ *   r      = of_pole(theta^)
+ *   x + jy = (z - of_either(theta^)) r* / |r|
  *   margin = (|mean x| - max(|r| / 2, |mean y|)) / sigma            polarity.h, of 8 values of 24 ms
  * x is |r| at the north and -|r| at the south, and y nothing. A linear machine leaves neither: it is half of what was found
  * that must be seen, and what stands across, which saturation does not make, counts against it. Compensation of dead time by the

@@ -26,6 +26,11 @@ Complex value(pm_ab_t x)
     return {std::ldexp(x.alpha, -28), std::ldexp(x.beta, -28)};
 }
 
+Complex value(pm_dq_t x)
+{
+    return {std::ldexp(x.d, -28), std::ldexp(x.q, -28)};
+}
+
 pm_dq_t fixed(Complex x)
 {
     return {static_cast<pm_q_t>(std::lround(std::ldexp(x.real(), 28))),
@@ -34,15 +39,15 @@ pm_dq_t fixed(Complex x)
 
 TEST(ZeroSecond, EachPartTurnsAsItsOrderSays)
 {
-    const Complex z_1(-0.012, 0.021), z_5(0.005, -0.0064), z_2(-0.0066, -0.004), z_4(0.001, 0.0021);
-    const zero_second_config_t c = {fixed(z_1), fixed(z_5), fixed(z_2), fixed(z_4)};
+    const Complex z_1(-0.012, 0.021), z_5(0.005, -0.0064), z_2(-0.0066, -0.004);
+    const zero_second_config_t c = {fixed(z_1), fixed(z_5), fixed(z_2)};
     for (int k = 0; k < 48; ++k) {
         const double theta = k * kPi / 24;
         const pm_angle_t at = static_cast<pm_angle_t>(k) * (UINT32_C(0x80000000) / 24U);
         const Complex odd = z_1 * std::polar(1.0, theta) + z_5 * std::polar(1.0, -5 * theta);
-        const Complex even = z_2 * std::polar(1.0, -2 * theta) + z_4 * std::polar(1.0, 4 * theta);
-        EXPECT_LE(std::abs(value(zero_second_odd(&c, at)) - odd), kTurn) << k;
-        EXPECT_LE(std::abs(value(zero_second_even(&c, at)) - even), kTurn) << k;
+        const Complex even = z_2 * std::polar(1.0, -2 * theta);
+        EXPECT_LE(std::abs(value(zero_second_of_pole(&c, at)) - odd), kTurn) << k;
+        EXPECT_LE(std::abs(value(zero_second_of_either(&c, at)) - even), kTurn) << k;
     }
 }
 
@@ -74,17 +79,16 @@ drive_params_t parameters()
     p.start_method = 1;
     p.injection = INJECTION_zero_rotating;
     p.polarity = 4;
-    p.v_injection = p.zero_second_v = 70000;
-    p.f_injection = p.zero_second_f = 250000;
+    p.v_injection = 70000;
+    p.f_injection = 250000;
     p.dL_0 = 2000000;
     p.neutral_full_scale = 10000;
     p.neutral_filter = 100000;
     p.injection_bandwidth = 15000;
     p.speed_bandwidth = 3000;
-    p.zero_second_1_im = 20000;
-    p.zero_second_5_re = -5000;
-    p.zero_second_2_re = -7000;
-    p.zero_second_4_im = 1000;
+    p.zero_second = 33000;
+    p.zero_second_phase = 500000;
+    p.zero_second_even = 6000;
     return p;
 }
 
@@ -98,15 +102,12 @@ TEST(ZeroSecond, ConstantsAreInTheUnitOfTheSource)
         const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
         ASSERT_TRUE(r.ok) << drive_param_table[r.param].name << ' ' << r.reason;
         const double L_d = 1e-9 * p.L_d, L_q = 1e-9 * p.L_q;
-        const double unit_V = 8 * sign * 2e-3 * 70 * (L_d + L_q) / 2 / (2 * L_d * L_q);
-        EXPECT_NEAR(std::ldexp(c.zero_second.z_1.q, -28), 20e-3 / unit_V, 1e-7);
-        EXPECT_NEAR(std::ldexp(c.zero_second.z_5.d, -28), -5e-3 / unit_V, 1e-7);
-        EXPECT_NEAR(std::ldexp(c.zero_second.z_2.d, -28), -7e-3 / unit_V, 1e-7);
-        EXPECT_NEAR(std::ldexp(c.zero_second.z_4.q, -28), 1e-3 / unit_V, 1e-7);
-        EXPECT_EQ(c.zero_second.z_1.d, 0);
-        EXPECT_EQ(c.zero_second.z_5.q, 0);
-        EXPECT_EQ(c.zero_second.z_2.q, 0);
-        EXPECT_EQ(c.zero_second.z_4.d, 0);
+        const double A_V = 2e-3 * 70 * (L_d + L_q) / 2 / (2 * L_d * L_q); // an eighth of the unit
+        const double F = 70 / (2 * kPi * 250), Z_1_V = 2e-3 * F * F * 2 * kPi * 250 / 8 * 33;
+        const Complex phase = std::polar(1.0, kPi / 2 + 0.5);
+        EXPECT_LE(std::abs(value(c.zero_second.z_1) - Z_1_V / (8 * A_V) * phase), 1e-7);
+        EXPECT_LE(std::abs(value(c.zero_second.z_5) - Z_1_V / (24 * A_V) * phase), 1e-7);
+        EXPECT_LE(std::abs(value(c.zero_second.z_2) - 0.006 / 8 * Complex(0, 1) * phase), 1e-7);
         EXPECT_FALSE(c.polarity.reversed);
     }
 }
@@ -121,14 +122,18 @@ drive_param_id_t refused(void (*change)(drive_params_t &))
     return r.param;
 }
 
-TEST(ZeroSecond, AnotherCarrierOrAWeakOneIsRefusedByName)
+TEST(ZeroSecond, AWeakCarrierIsRefusedByName)
 {
-    EXPECT_EQ(refused([](drive_params_t &p) { p.zero_second_v -= 1; }), DRIVE_PARAM_polarity);
-    EXPECT_EQ(refused([](drive_params_t &p) { p.zero_second_f += 1; }), DRIVE_PARAM_polarity);
-    EXPECT_EQ(refused([](drive_params_t &p) { p.zero_second_4_im = 8001; }), DRIVE_PARAM_v_injection);
-    EXPECT_EQ(refused([](drive_params_t &p) { p.zero_second_1_im = 12999; }), DRIVE_PARAM_v_injection);
+    EXPECT_EQ(refused([](drive_params_t &p) { p.zero_second = 0; }), DRIVE_PARAM_polarity);
+    EXPECT_EQ(refused([](drive_params_t &p) { p.zero_second_even = 15000; }), DRIVE_PARAM_v_injection);
+    EXPECT_EQ(refused([](drive_params_t &p) { p.zero_second_even = -15000; }), DRIVE_PARAM_v_injection);
+    EXPECT_EQ(refused([](drive_params_t &p) {
+                  p.v_injection = 35000;
+                  p.f_injection = 500000;
+              }),
+              DRIVE_PARAM_v_injection);
     EXPECT_EQ(refused([](drive_params_t &p) { // 2 us at 10 kHz of 300 V are 6 V
-                  p.v_injection = p.zero_second_v = 23000;
+                  p.v_injection = 23000;
                   p.dL_0 = 4000000;
               }),
               DRIVE_PARAM_v_injection);
