@@ -69,4 +69,10 @@ pm_q_t zero_rotating_along(const zero_rotating_t *self, const zero_rotating_conf
     return -harmonic(self, config, config->step, 2U * theta);
 }
 
+pm_ab_t zero_rotating_second(const zero_rotating_t *self, const zero_rotating_config_t *config)
+{
+    const pm_angle_t twice = 2U * config->step;
+    return (pm_ab_t){harmonic(self, config, twice, 0), harmonic(self, config, twice, PM_TURN(0.25))};
+}
+
 #endif

@@ -10,7 +10,8 @@
  * What tells the poles apart looks at the voltage itself. x holds the last period of the carrier, N samples, whose harmonics
  * of it are free of each other and of the EMF:
  *   along   -2/N sum x_k cos q                A [1 + kappa cos(6 theta + theta_m)]: polarity by d-current
- * at 1 kHz, 500 instructions with N = 20. A period may come between two of the samples and renew one: it is of the same
+ *   second   2/N sum x_k e^{-j 2 phi_k-2}     z of zero_second.h: polarity by the second harmonic
+ * at 1 kHz, 500 instructions with N = 20, the second twice that. A period may come between two of the samples and renew one: it is of the same
  * phase.
  *
  * Forms, eps, misfit, delay: zero_sequence.h. Functions as injection.h says.
@@ -52,7 +53,10 @@ static inline obs_out_t zero_rotating_last(const zero_rotating_t *self, const ze
 pm_q_t zero_rotating_along(const zero_rotating_t *self, const zero_rotating_config_t *config,
                            pm_angle_t theta);
 
-/* Of the maker's configuration, for polarity by d-current. */
+/* The second harmonic: alpha in phase with twice the carrier, beta a quarter of a turn ahead. */
+pm_ab_t zero_rotating_second(const zero_rotating_t *self, const zero_rotating_config_t *config);
+
+/* Of the maker's configuration, for polarity. */
 polarity_carrier_t zero_rotating_polarity(maker_t *m, const zero_rotating_config_t *c);
 
 void make_zero_rotating(maker_t *m, zero_rotating_config_t *c);

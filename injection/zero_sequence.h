@@ -1,5 +1,5 @@
 /* Position from the voltage that an injected carrier makes between the star point and the mean of the
- * terminals (METHODS.md 6.1 to 6.4; rows 71 to 77): what zero_rotating.h, zero_pulsating.h and
+ * terminals (METHODS.md 6.1 to 6.4; rows 71 to 78): what zero_rotating.h, zero_pulsating.h and
  * zero_anti_rotating.h have in common.
  *
  * Where the mutual inductances of the phases change with the position otherwise than their own,
@@ -27,6 +27,8 @@
  *
  * `zero_form` chooses: from told to measured when eps has stayed below 0.1 rad for 20 ms, and back when its mean is
  * beyond 0.5 rad; or one alone.
+ * Against a sine whose answer is a current (docs/results/injection.md), the noise of the position is that of the samples by
+ *   2 K / (omega_h dL_0 L_sa)
  * Signals are per unit of 8 |A| without load, which must be at least 0.1 % of the base of voltages.
  * Only in programs that carry the neutral. State 500 bytes. Tests: tests/unit/injection/zero_sequence_test.cpp. */
 #ifndef INJECTION_ZERO_SEQUENCE_H
@@ -186,6 +188,12 @@ obs_out_t zero_last(const zero_t *self, const zero_config_t *config);
 void make_zero_sequence(maker_t *m, zero_config_t *c);
 injection_limits_t zero_limits(const maker_t *m);
 pm_num_t zero_answer(const maker_t *m);
+
+/* 8 A, the unit of x, V; of the sign of dL_0. */
+pm_num_t zero_unit(const maker_t *m);
+
+/* a of the channel's filter; 0 without one. */
+pm_num_t zero_decay(const maker_t *m);
 
 #ifdef __cplusplus
 }

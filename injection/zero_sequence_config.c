@@ -31,6 +31,11 @@ static pm_num_t amplitude(const maker_t *m)
                       pm_num_ratio(1, 2));
 }
 
+pm_num_t zero_unit(const maker_t *m)
+{
+    return pm_num_mul(pm_num(8), amplitude(m));
+}
+
 static pm_num_t magnitude(pm_num_t x)
 {
     return pm_num_cmp(x, pm_num(0)) < 0 ? pm_num_neg(x) : x;
@@ -52,10 +57,21 @@ static pm_num_t decay(pm_num_t x)
     return square(square(square(pm_num_div(pm_num_sub(even, odd), pm_num_add(even, odd)))));
 }
 
-static void make_channel(maker_t *m, zero_config_t *c, pm_num_t unit)
+static pm_num_t periods_of_filter(const maker_t *m)
 {
     const pm_num_t rc = si(m, DRIVE_PARAM_neutral_filter);
-    const pm_num_t x = rc.m > 0 ? pm_num_div(m->base.t_s, rc) : pm_num(0);
+    return rc.m > 0 ? pm_num_div(m->base.t_s, rc) : pm_num(0);
+}
+
+pm_num_t zero_decay(const maker_t *m)
+{
+    const pm_num_t x = periods_of_filter(m);
+    return x.m > 0 ? decay(x) : pm_num(0);
+}
+
+static void make_channel(maker_t *m, zero_config_t *c, pm_num_t unit)
+{
+    const pm_num_t x = periods_of_filter(m);
     if (pm_num_cmp(x, pm_num_ratio(49, 100)) < 0 || pm_num_cmp(x, pm_num_ratio(201, 100)) > 0) {
         refuse(m, DRIVE_PARAM_neutral_filter,
                "the zero-sequence voltage needs an RC of half a PWM period to two");
@@ -104,7 +120,7 @@ static void make_carrier(maker_t *m, zero_config_t *c)
 
 void make_zero_sequence(maker_t *m, zero_config_t *c)
 {
-    const pm_num_t unit = pm_num_mul(pm_num(8), amplitude(m));
+    const pm_num_t unit = zero_unit(m);
     if (pm_num_cmp(magnitude(unit), pm_num_mul(m->base.v, pm_num_ratio(8, 1000))) < 0) {
         refuse(m, DRIVE_PARAM_dL_0, "leaves no answer at the neutral");
         return;

@@ -2,7 +2,8 @@
 """Writes docs/results/injection.md: one set of scenarios over all low-speed position sources of injection/injections.def,
 with the settings that the file of each says under `compare`; a plot beside it.
 
-usage: injection_report.py [--machines N] [--only NAME...] [--out DIR] [--scheduler ADDRESS] | --check
+usage: injection_report.py [--machines N] [--only NAME...] [--neutral] [--out DIR] [--scheduler ADDRESS] | --check
+--neutral measures again what looks at the star point alone, and leaves the rest of the page as it is.
 """
 import argparse
 import csv
@@ -15,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import observer_report as common
+import zero_report
 from campaigns import worker
 from campaigns.draw import factors
 from campaigns.pool import Pool
@@ -28,6 +30,7 @@ TURNS = [1, -1]
 C_LEG = 0.5e-9
 NOISE = 0.5  # LSB
 SPEED = 0.05
+NEUTRAL_MACHINES = 100  # random ones, of each source in the section on the star point
 CARRIER_S = 0.2  # the current of the carrier is taken from so much of a trace
 TRAITS = {"SOURCE_HALF_TURN": "poles half a turn apart look alike", "SOURCE_THIRD_TURN": "poles a third of a turn apart "
           "look alike", "SOURCE_EVENTS": "speaks on events only", "SOURCE_ONE_WAY": "carrier turns one way",
@@ -311,17 +314,18 @@ def page(rows, results, plot_name, values, bytes_of):
 
 
 def probe_page(names, path):
-    """Half load at slow speed, forwards, every source."""
+    """Half load at slow speed, forwards, every source; and the section on the neutral."""
     number = place_in_list()
     common.check(path, [("free rotor under speed control", "50 %", f"`{name}`, forwards",
                          slow(), (number[name], [f"{key}={value}" for key, value in settings(name).items()], "0.5 1"))
-                        for name in names])
+                        for name in names] + zero_report.probes())
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--machines", type=int, default=20)
     parser.add_argument("--only", nargs="*")
+    parser.add_argument("--neutral", action="store_true", help="only the section on the voltage at the neutral")
     parser.add_argument("--out", type=Path, default=ROOT / "docs/results")
     parser.add_argument("--check", action="store_true", help="write nothing; fail when the page is not up to date")
     options = common.with_scheduler(parser)
@@ -337,11 +341,19 @@ def main():
     if options.machines < 1:
         fail("--machines is 1 or more")
     options.out.mkdir(parents=True, exist_ok=True)
+    file = options.out / "injection.md"
+    if options.neutral:
+        with Pool(options.scheduler) as pool:
+            section = zero_report.section(zero_report.measure(pool, NEUTRAL_MACHINES), NEUTRAL_MACHINES)
+        before = file.read_text(encoding="utf-8").split(zero_report.HEADING)[0].rstrip()
+        file.write_text(before + "\n\n" + section)
+        return
     with Pool(options.scheduler) as pool:
         results = measure(pool, rows, chosen, options.machines)
+        section = zero_report.section(zero_report.measure(pool, NEUTRAL_MACHINES), NEUTRAL_MACHINES)
     plot_name = f"injection_{MACHINE.lower()}.png"
     plot(results, options.out / plot_name)
-    (options.out / "injection.md").write_text(page(rows, results, plot_name, defaults(), sizes(names)))
+    file.write_text(page(rows, results, plot_name, defaults(), sizes(names)).rstrip() + "\n\n" + section)
 
 
 if __name__ == "__main__":

@@ -135,8 +135,33 @@ static bool map_value(const app_t *app, uint16_t slot, int32_t *value)
 }
 #endif
 
+#if PM_HAS(zero_inductance)
+static bool zero_value(const app_t *app, uint16_t slot, int32_t *value)
+{
+    const zero_inductance_result_t *r = &app->drive.zero_inductance;
+    switch (slot) {
+    case OD_LIVE_IDENTIFICATION_DL_0:
+        *value = app_in_units(r->dL_0, base_of(&app->drive.config, IN_HENRY), 9);
+        return true;
+    case OD_LIVE_IDENTIFICATION_ZERO_L_C0:
+        *value = app_in_units(r->L_c0, base_of(&app->drive.config, IN_HENRY), 9);
+        return true;
+    case OD_LIVE_IDENTIFICATION_ZERO_FALLS:
+        *value = r->margin == 0 ? 2 : (int32_t)r->falls;
+        return true;
+    default:
+        return false;
+    }
+}
+#endif
+
 bool app_identify_value(const app_t *app, uint16_t slot, int32_t *value)
 {
+#if PM_HAS(zero_inductance)
+    if (zero_value(app, slot, value)) {
+        return true;
+    }
+#endif
 #if PM_HAS(saliency_map)
     if (map_value(app, slot, value)) {
         return true;
@@ -188,7 +213,9 @@ bool app_identify_put(app_t *app, uint16_t slot, int32_t value)
         return true;
     }
 #endif
-    if (slot != (uint16_t)OD_LIVE_IDENTIFICATION_COMMAND || (map && PM_HAS(saliency_map) == 0)) {
+    const bool neutral = value == (int32_t)COMMISSIONING_NEUTRAL;
+    if (slot != (uint16_t)OD_LIVE_IDENTIFICATION_COMMAND || (map && PM_HAS(saliency_map) == 0) ||
+        (neutral && PM_HAS(zero_inductance) == 0)) {
         return false;
     }
     commissioning_report_t *report =

@@ -17,6 +17,7 @@
 #include "firmware/drive/procedures/flying_start.h"
 #include "firmware/drive/procedures/saliency_map.h"
 #include "firmware/drive/procedures/sequence.h"
+#include "firmware/drive/procedures/zero_inductance.h"
 #include "firmware/drive/rest.h"
 #include "firmware/math/image.h"
 #include "firmware/math/num.h"
@@ -26,6 +27,7 @@
 #include "injection/dual_pulses.h"
 #include "injection/pulses.h"
 #include "injection/three_phase_hf.h"
+#include "injection/zero_second.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -80,9 +82,11 @@ typedef struct {
     PM_IN_IMAGE(carrier_rest, rest_config_t rest;)
     PM_IN_IMAGE(flying_start, flying_start_config_t flying_start;)
     PM_IN_IMAGE(saliency_map, saliency_map_config_t saliency_map;)
+    PM_IN_IMAGE(zero_inductance, zero_inductance_config_t zero_inductance;)
 #if SEQUENCE_HAS_POLARITY
     polarity_config_t polarity;
     PM_IN_IMAGE(dual_pulses, dual_pulses_config_t dual_pulses;)
+    PM_IN_IMAGE(secondary_voltage, zero_second_config_t zero_second;)
     PM_IN_IMAGE(three_phase_hf, three_phase_hf_config_t three_phase_hf;)
 #endif
     open_loop_config_t open_loop;

@@ -54,27 +54,35 @@ static uint8_t find_of(const drive_params_t *params)
 static uint8_t pole_of(const drive_params_t *params)
 {
     static const uint8_t poles[] = {PROCEDURE_NONE, PROCEDURE_dual_pulses, PROCEDURE_d_current,
-                                    PROCEDURE_secondary_current};
+                                    PROCEDURE_secondary_current, PROCEDURE_secondary_voltage};
     return poles[params->polarity];
 }
 
-#if PM_HAS(pulsating_sine)
+#if PM_HAS(pulsating_sine) || PM_HAS(secondary_voltage)
 /* Dead time bends a carrier that it takes more of than a quarter into a second harmonic as large as that of the poles. So
  * it does to one of few periods: it takes from a current at its rising edge, from the opposite one at the falling edge half
  * a period later, so that half cycles are not alike. */
 PM_APART static void check_second_harmonic(maker_t *m, uint32_t n)
 {
-    if (m->params->polarity != 3) {
+    if (m->params->polarity < 3) {
         return;
     }
     if (pm_num_cmp(pm_num_mul(dead_voltage(m), pm_num(4)), si(m, DRIVE_PARAM_v_injection)) > 0) {
-        refuse(m, DRIVE_PARAM_v_injection, "polarity 3 needs four times what dead time takes");
+        refuse(m, DRIVE_PARAM_v_injection, "below four times what dead time takes");
     }
     if (n < PERIODS_LEAST) {
-        refuse(m, DRIVE_PARAM_f_injection, "polarity 3 needs 16 periods of the PWM in one of the carrier");
+        refuse(m, DRIVE_PARAM_f_injection, "needs 16 periods of the PWM in one of the carrier");
     }
 }
 #endif
+
+static const char *carrier_of(int32_t polarity)
+{
+    if (PM_HAS(secondary_voltage) && polarity == 4) {
+        return "needs injection 8";
+    }
+    return polarity == 3 ? "needs injection 4" : "needs injection 0, 4 or 8";
+}
 
 /* What of the carrier the steps of polarity look at, and whether there is one that they can look at. */
 static void make_carrier(maker_t *m, drive_config_t *config)
@@ -91,7 +99,7 @@ static void make_carrier(maker_t *m, drive_config_t *config)
 #if PM_HAS(pulsating_sine)
     case INJECTION_pulsating_sine:
         carrier = polarity_by_current(m, c->pulsating_sine.sine.n, c->pulsating_sine.h_d);
-        seen = true;
+        seen = !PM_HAS(secondary_voltage) || by != 4;
         check_second_harmonic(m, c->pulsating_sine.sine.n);
         break;
 #endif
@@ -99,6 +107,13 @@ static void make_carrier(maker_t *m, drive_config_t *config)
     case INJECTION_zero_rotating:
         carrier = zero_rotating_polarity(m, &c->zero_rotating);
         seen = by == 2;
+        PM_IN_IMAGE(
+            secondary_voltage, if (by == 4) {
+                carrier.reversed = false; /* the constants know */
+                seen = true;
+                check_second_harmonic(m, 2U * c->zero_rotating.half);
+                make_zero_second(m, &config->zero_second);
+            })
         break;
 #endif
     default:
@@ -106,9 +121,7 @@ static void make_carrier(maker_t *m, drive_config_t *config)
     }
     make_polarity(m, &carrier, &config->polarity);
     if (!seen) {
-        refuse(m, DRIVE_PARAM_polarity,
-               by == 3 ? "needs injection 4, a sine along d"
-                       : "needs injection 0 or 4, a carrier along d, or 8 at the neutral");
+        refuse(m, DRIVE_PARAM_polarity, carrier_of(by));
     }
 }
 
@@ -165,6 +178,7 @@ void choose_start(maker_t *m, drive_config_t *config, uint32_t channels)
                 config->flying_start.charge =
                     (uint32_t)config->charge_periods * (uint32_t)FLYING_START_PARTS;)
     PM_IN_IMAGE(saliency_map, make_saliency_map(m, &config->saliency_map);)
+    PM_IN_IMAGE(zero_inductance, make_zero_inductance(m, &config->zero_inductance);)
     require(m, sequence_needs((sequence_id_t)config->start, config->find, config_pole(config)),
             DRIVE_PARAM_start_method);
 }

@@ -104,6 +104,7 @@ struct drive {
     drive_fault_record_t record;
     commissioning_report_t commissioning_report;
     PM_IN_IMAGE(saliency_map, saliency_map_result_t saliency_map;)
+    PM_IN_IMAGE(zero_inductance, zero_inductance_result_t zero_inductance;)
     sequence_t sequence;
     procedure_beside_t beside;
 };

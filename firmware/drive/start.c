@@ -26,6 +26,11 @@ PM_RARE static void begin_procedure(drive_t *drive)
         id = PROCEDURE_saliency_map;
     }
 #endif
+#if PM_HAS(zero_inductance)
+    if (id == PROCEDURE_identify && drive->command.routines == (uint8_t)COMMISSIONING_NEUTRAL) {
+        id = PROCEDURE_zero_inductance;
+    }
+#endif
     procedure_begin(drive, id);
 }
 

@@ -11,6 +11,8 @@
 #define PM_WITHOUT_finite_set 1
 #define PM_WITHOUT_six_step 1
 #define PM_WITHOUT_saliency_map 1
+#define PM_WITHOUT_secondary_voltage 1
+#define PM_WITHOUT_zero_inductance 1
 #define PM_WITHOUT_counted_carrier 1
 #define PM_WITHOUT_carrier_rest 1
 #define PM_WITHOUT_neutral 1

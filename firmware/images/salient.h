@@ -15,6 +15,8 @@
 #define PM_WITHOUT_boundary_detection 1
 #define PM_WITHOUT_dc_link_pulses 1
 #define PM_WITHOUT_flying_start 1
+#define PM_WITHOUT_secondary_voltage 1
+#define PM_WITHOUT_zero_inductance 1
 #define PM_WITHOUT_mismatch 1
 #define PM_WITHOUT_neutral 1
 #define PM_WITHOUT_back_emf 1

@@ -204,6 +204,15 @@ class Identified : public Metric
         if (kind_ == "identify_table_error_rel") {
             return table_error();
         }
+        if (kind_ == "identify_dL_0_error_rel") {
+            return relative(last_.dL_0_H, setup_.plant.winding.dL_0_H);
+        }
+        if (kind_ == "identify_L_c0_error_rel") { // of dL_0
+            return (last_.L_c0_H - setup_.plant.winding.L_c0_H) / setup_.plant.winding.dL_0_H;
+        }
+        if (kind_ == "identify_zero_falls") {
+            return last_.zero_falls;
+        }
         if (kind_ == "identify_leg_capacitance_F") {
             return last_.move_A * inverter.dead_time_s / setup_.plant.dclink.v_source_V;
         }
@@ -248,6 +257,9 @@ std::vector<SpecialMetric> identify_metrics()
                "larger error of centre and radius of the saliency circle without current"),
         number("identify_table_error_rel",
                "largest error of the inductances at half and all of the map's current, drive's i_d"),
+        number("identify_dL_0_error_rel", "dL_0 found against the plant's"),
+        number("identify_L_c0_error_rel", "error of L_c0, of dL_0"),
+        number("identify_zero_falls", "what was found of zero_falls; 2: not known"),
         number("identify_psi_m_error_rel", "magnet flux found against the plant's"),
         number("identify_J_error_rel", "inertia found against the plant's"),
         number("identify_friction_error_rel", "error of the friction at rated speed, of rated torque"),

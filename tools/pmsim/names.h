@@ -17,7 +17,8 @@ inline const std::vector<std::string> &state_names()
 
 inline const std::vector<std::string> &mode_names()
 {
-    static const std::vector<std::string> names = {"speed", "torque", "current", "identify", "saliency"};
+    static const std::vector<std::string> names = {"speed",    "torque",   "current",
+                                                   "identify", "saliency", "neutral"};
     return names;
 }
 

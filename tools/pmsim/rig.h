@@ -23,6 +23,7 @@ enum {
     RIG_CURRENT,
     RIG_IDENTIFY,
     RIG_SALIENCY,
+    RIG_NEUTRAL,
     RIG_MODES
 }; /* the last: identify, its map */
 
@@ -51,6 +52,8 @@ typedef struct {
     rig_saliency_t map[RIG_MAP_SIDE][RIG_MAP_SIDE]; /* [i_q][i_d], procedures/saliency_map.h */
     rig_saliency_t half, rated;                     /* with the drive's i_d */
     double map_current_A, circle_centre_A, circle_radius_A;
+    double dL_0_H, L_c0_H; /* procedures/zero_inductance.h */
+    int zero_falls;        /* 2: not known */
 } rig_identified_t;
 
 typedef struct {

@@ -43,11 +43,12 @@ int32_t rig_whole(double value)
 
 drive_command_t rig_drive_command(const rig_command_t *command)
 {
-    const bool map = command->mode == RIG_SALIENCY;
+    const uint8_t alone[] = {COMMISSIONING_SALIENCY, COMMISSIONING_NEUTRAL}; /* RIG_SALIENCY and the next */
+    const bool is_alone = command->mode >= RIG_SALIENCY;
     return (drive_command_t){
         .enable = command->enable,
-        .mode = map ? DRIVE_MODE_IDENTIFY : (drive_mode_t)command->mode,
-        .routines = map ? (uint8_t)COMMISSIONING_SALIENCY : 0U,
+        .mode = is_alone ? DRIVE_MODE_IDENTIFY : (drive_mode_t)command->mode,
+        .routines = is_alone ? alone[command->mode - RIG_SALIENCY] : (uint8_t)0,
         .speed_mrad_s = rig_whole(1e3 * command->speed_rad_s),
         .torque_uNm = rig_whole(1e6 * command->torque_Nm),
         .current_mA = rig_whole(1e3 * command->current_A),
@@ -85,6 +86,16 @@ static void add_map(const rig_scale_t *scale, const saliency_map_result_t *map, 
     found->map_current_A = scale->i_A * map->i;
     found->circle_centre_A = scale->i_A * map->centre;
     found->circle_radius_A = scale->i_A * map->radius;
+}
+#endif
+
+#if PM_HAS(zero_inductance)
+static void add_neutral(const rig_scale_t *scale, const zero_inductance_result_t *r, rig_identified_t *found)
+{
+    const double L_H = scale->psi_Wb / scale->i_A / PM_ONE;
+    found->dL_0_H = L_H * r->dL_0;
+    found->L_c0_H = L_H * r->L_c0;
+    found->zero_falls = r->margin == 0 ? 2 : r->falls;
 }
 #endif
 
@@ -138,6 +149,7 @@ void rig_fill_sample(rig_scale_t *scale, const drive_t *drive, const drive_out_t
     sample->driven = out->legs != PM_LEGS_OFF;
     sample->identified = identified(scale, &drive->commissioning_report);
     PM_IN_IMAGE(saliency_map, add_map(scale, &drive->saliency_map, &sample->identified);)
+    PM_IN_IMAGE(zero_inductance, add_neutral(scale, &drive->zero_inductance, &sample->identified);)
 }
 
 void rig_record_legs(const drive_in_t *in, const drive_out_t *out, record_period_t *record)

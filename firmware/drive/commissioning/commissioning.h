@@ -29,6 +29,7 @@ enum {
     COMMISSIONING_MECHANICS = 8,
     COMMISSIONING_ALL = 15,
     COMMISSIONING_SALIENCY = 16, /* alone, with the rotor locked: procedures/saliency_map.h */
+    COMMISSIONING_NEUTRAL = 32,  /* alone, with the rotor free: procedures/zero_inductance.h */
 };
 
 typedef enum {
@@ -45,7 +46,7 @@ typedef enum {
     COMMISSIONING_IMPLAUSIBLE, /* a result that no machine has */
     COMMISSIONING_NOT_TURNING, /* the rotor did not follow the vector: locked, or the current is too small */
     COMMISSIONING_ABORTED,     /* enable was withdrawn, or a fault occurred */
-    COMMISSIONING_ROUND,       /* no saliency, so no axis */
+    COMMISSIONING_ROUND,       /* no saliency, so no axis; nothing at the neutral */
     COMMISSIONING_TURNED,      /* the rotor must be locked for this */
 } commissioning_reason_t;
 
@@ -64,6 +65,13 @@ typedef struct {
 } commissioning_result_t;
 
 #define COMMISSIONING_J_STEPS 1024
+
+/* Of a current that is held beside a carrier. */
+typedef struct {
+    pm_ab_t v;
+    pm_ab_t integral; /* of it */
+    uint16_t still;   /* ms in which the current was within 1/32 of that of the test */
+} commissioning_hold_t;
 
 /* Incremental L_q at of_16/16 of the square of the test current; an estimate:
  *   psi / i   = L_q + (L_q_rated - L_q) (i / i_rated)^2

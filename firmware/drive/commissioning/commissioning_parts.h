@@ -54,6 +54,9 @@ phase_result_t rotation_full(drive_t *drive);
 phase_result_t rotation_less(drive_t *drive);
 phase_result_t rotation_down(drive_t *drive);
 
+/* hold.c: the voltage v that keeps the mean current i, stationary frame, at `ref`; 1 kHz. R and L_d as found, else as told. */
+void commissioning_hold(drive_t *drive, commissioning_hold_t *self, pm_ab_t ref, pm_dq_t i, pm_q_t omega);
+
 /* The current of the test; a period in radians of the base speed. */
 pm_q_t commissioning_current(const drive_t *drive);
 pm_q_t commissioning_period(const drive_t *drive);

@@ -33,7 +33,9 @@ static drive_state_t state_of(procedure_id_t id)
 static bool goes_on(const drive_t *drive, procedure_id_t id)
 {
 #if SEQUENCE_HAS_POLARITY
-    return drive->stage == STAGE_VECTOR && (id == PROCEDURE_d_current || id == PROCEDURE_secondary_current);
+    const bool by_voltage = PM_HAS(secondary_voltage) && id == PROCEDURE_secondary_voltage;
+    return drive->stage == STAGE_VECTOR &&
+           (id == PROCEDURE_d_current || id == PROCEDURE_secondary_current || by_voltage);
 #else
     (void)drive;
     (void)id;
@@ -81,7 +83,8 @@ pm_procedure_t procedure_slow(drive_t *drive)
 bool procedure_without_current(const drive_t *drive)
 {
     const uint8_t id = drive->sequence.procedure;
-    return id == (uint8_t)PROCEDURE_lock || id == (uint8_t)PROCEDURE_secondary_current;
+    const bool by_voltage = PM_HAS(secondary_voltage) && id == (uint8_t)PROCEDURE_secondary_voltage;
+    return id == (uint8_t)PROCEDURE_lock || id == (uint8_t)PROCEDURE_secondary_current || by_voltage;
 }
 
 bool procedure_without_angle(const drive_t *drive)

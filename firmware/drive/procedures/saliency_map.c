@@ -16,19 +16,6 @@
 #define TURNED     PM_TURN(2.0 / 360)
 #define ZERO       (SALIENCY_MAP_SIDE / 2) /* column of i_d = 0 */
 
-/* As found, else as told. */
-static pm_q_t resistance(const drive_t *drive)
-{
-    const pm_q_t found = drive->commissioning_report.result.R;
-    return found != 0 ? found : drive->config.machine.R_s;
-}
-
-static pm_q_t inductance(const drive_t *drive)
-{
-    const pm_q_t found = drive->commissioning_report.result.L_d;
-    return found != 0 ? found : drive->config.machine.L_d;
-}
-
 static bool is_on_map(const saliency_map_t *self)
 {
     return self->at > 0U && self->at < (uint8_t)LAST;
@@ -61,7 +48,7 @@ static void enter(drive_t *drive, uint8_t at)
     saliency_map_t *self = &drive->procedure.saliency_map;
     self->at = at;
     self->ms = 0;
-    self->still = 0;
+    self->hold.still = 0;
     self->axes = 0;
     saliency_circle_reset(&self->circle);
     drive->commissioning_report.progress = (uint8_t)(100U * (uint32_t)at / (uint32_t)(LAST + 1));
@@ -86,7 +73,7 @@ PM_APART pm_procedure_t procedure_saliency_map_step(drive_t *drive, const drive_
     const pm_dq_t i = {.d = drive->i_ab.alpha, .q = drive->i_ab.beta};
     const pm_angle_t phi = sine_step(&self->sine, &c->sine, i);
     const pm_ab_t carrier = carrier_along(pm_unit(c->sine.v_h, pm_dir(phi).cos), pm_dir(self->axis));
-    const pm_ab_t v = {.alpha = self->v.alpha + carrier.alpha, .beta = self->v.beta + carrier.beta};
+    const pm_ab_t v = {.alpha = self->hold.v.alpha + carrier.alpha, .beta = self->hold.v.beta + carrier.beta};
     self->axis += c->turn;
     drive->status.i = i;
     drive->status.theta = self->theta;
@@ -95,29 +82,13 @@ PM_APART pm_procedure_t procedure_saliency_map_step(drive_t *drive, const drive_
     return PM_RUNNING; /* its slow part knows the end */
 }
 
-/* k (error + its integral over 21 ms), k = w L, w = 2 pi 30 Hz: what dead time takes swings with the axis. */
-static pm_q_t control(pm_q_t *integral, pm_q_t error, pm_q_t k, pm_q_t top)
-{
-    const pm_q_t proportional = pm_mul_sat(error, k);
-    *integral = pm_clamp(*integral + pm_frac(proportional, PM_FRAC(1.0 / 21)), -top, top);
-    return pm_clamp(*integral + pm_clamp(proportional, -top, top), -top, top);
-}
-
 /* The current of this point is there. */
 static bool holds(drive_t *drive)
 {
     saliency_map_t *self = &drive->procedure.saliency_map;
-    const pm_ab_t ref = wanted(drive);
-    const pm_dq_t i = sine_mean(&self->sine, &drive->config.saliency_map.sine);
-    const pm_q_t R = resistance(drive);
-    const pm_q_t k = pm_mul_sat(inductance(drive), drive->config.saliency_map.omega);
-    const pm_q_t top = pm_mul(drive->status.v_dc, PM_Q(0.2));
-    const pm_ab_t error = {ref.alpha - i.d, ref.beta - i.q};
-    self->v.alpha = control(&self->integral.alpha, error.alpha, k, top) + pm_mul_sat(ref.alpha, R);
-    self->v.beta = control(&self->integral.beta, error.beta, k, top) + pm_mul_sat(ref.beta, R);
-    const pm_q_t off = pm_max(pm_abs(error.alpha), pm_abs(error.beta));
-    self->still = off > drive->saliency_map.i / 32 ? 0U : (uint16_t)(self->still + 1U);
-    return self->still >= SETTLED_MS;
+    const saliency_map_config_t *c = &drive->config.saliency_map;
+    commissioning_hold(drive, &self->hold, wanted(drive), sine_mean(&self->sine, &c->sine), c->omega);
+    return self->hold.still >= SETTLED_MS;
 }
 
 static void swap(saliency_point_t *a, saliency_point_t *b)

@@ -20,6 +20,7 @@
 #ifndef DRIVE_PROCEDURES_SALIENCY_MAP_H
 #define DRIVE_PROCEDURES_SALIENCY_MAP_H
 
+#include "firmware/drive/commissioning/commissioning.h"
 #include "firmware/params/types.h"
 #include "injection/saliency_circle.h"
 #include "injection/sine.h"
@@ -52,14 +53,13 @@ typedef struct {
 typedef struct {
     sine_t sine;
     saliency_circle_t circle;
-    int32_t rest[3];    /* of the timer's counts, 128ths */
-    pm_ab_t v;          /* without the carrier */
-    pm_ab_t integral;   /* of it */
-    pm_angle_t theta;   /* d-axis of the rotor, less half a turn or not */
-    pm_angle_t axis;    /* eta */
-    uint16_t ms, still; /* at this point, of them with the current where it shall be */
-    uint16_t axes;      /* of the circle that are in it */
-    uint8_t at;         /* 0: axis, then the points, then the axis again */
+    int32_t rest[3]; /* of the timer's counts, 128ths */
+    commissioning_hold_t hold;
+    pm_angle_t theta; /* d-axis of the rotor, less half a turn or not */
+    pm_angle_t axis;  /* eta */
+    uint16_t ms;      /* at this point */
+    uint16_t axes;    /* of the circle that are in it */
+    uint8_t at;       /* 0: axis, then the points, then the axis again */
 } saliency_map_t;
 
 void make_saliency_map(maker_t *m, saliency_map_config_t *c);

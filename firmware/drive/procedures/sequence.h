@@ -38,7 +38,8 @@ typedef enum {
 
 /* Whether the image has a step for the polarity alone. */
 #define SEQUENCE_HAS_POLARITY                                                                                \
-    (PM_HAS(d_current) || PM_HAS(secondary_current) || PM_HAS(dual_pulses) || PM_HAS(three_phase_hf))
+    (PM_HAS(d_current) || PM_HAS(secondary_current) || PM_HAS(secondary_voltage) || PM_HAS(dual_pulses) ||   \
+     PM_HAS(three_phase_hf))
 
 #if SEQUENCE_HAS_POLARITY
 #define SEQUENCE_STEPS 6

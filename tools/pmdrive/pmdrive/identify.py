@@ -16,13 +16,14 @@ from .errors import NotDone, UsageError
 from .motion import Motion
 
 ROUTINES = {"resistance": 1, "inductance": 2, "flux": 4, "mechanics": 8}
-ALONE = {"saliency": 16}  # with the rotor locked
+ALONE = {"saliency": 16, "neutral": 32}  # with the rotor locked; with it free
 RESULTS = {
     "resistance": ("R_s", "dead_voltage", "leg_capacitance"),
     "inductance": ("L_d", "L_q", "L_q_rated", "L_dh_rated", "L_qh_rated", "L_dqh_rated", "cross_half"),
     "flux": ("psi_m",),
     "mechanics": ("J", "friction", "coulomb"),
     "saliency": ("L_d", "L_q", "L_dh_rated", "L_qh_rated", "L_dqh_rated", "cross_half"),
+    "neutral": ("dL_0", "zero_L_c0", "zero_falls"),
 }
 DONE, FAILED = 2, 3
 WHAT_TO_DO = {
@@ -31,7 +32,7 @@ WHAT_TO_DO = {
     3: "check the current sensors' scale, i_full_scale and v_full_scale",
     4: "free the shaft, take its load off, or allow more current: --current",
     5: "it was stopped, or a fault came: `pmdrive faults`",
-    6: "a round machine has no saliency to map",
+    6: "a round machine has no saliency to map; nothing at the star point: is it led out?",
     7: "lock the shaft",
 }
 ROUND = 0.03      # less saliency than that is none,
@@ -46,7 +47,7 @@ def routines(words=None):
     if unknown or not words:
         raise UsageError(f"`{', '.join(unknown)}` is no routine", f"one or several of {', '.join(ROUTINES)}; or {', '.join(ALONE)}")
     if len(words) > 1 and any(word in ALONE for word in words):
-        raise UsageError("the rotor is locked for `saliency`, and must not be for the others", "run it alone")
+        raise UsageError(f"`{'` and `'.join(ALONE)}` run alone: the rotor is locked for `saliency`", "run it alone")
     return words
 
 
@@ -111,6 +112,10 @@ def parameters(drive, found):
         wanted.update((name, x[name]) for name in RESULTS["inductance"])
     if "saliency" in found:
         wanted.update((name, x[name]) for name in RESULTS["saliency"])
+    if "neutral" in found:
+        wanted.update(dL_0=x["dL_0"], zero_L_c0=x["zero_L_c0"])
+        if x["zero_falls"] < 2:  # else nothing is known of it
+            wanted["zero_falls"] = x["zero_falls"]
     wanted.update((name, x[name]) for name in ("psi_m", "J") if name in x)
     return raw_values(wanted)
 

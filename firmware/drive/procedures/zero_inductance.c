@@ -1,0 +1,204 @@
+#include "firmware/drive/procedures/zero_inductance.h"
+
+#include "firmware/drive/commissioning/commissioning_parts.h"
+#include "firmware/drive/drive_parts.h"
+#include "firmware/math/compiler.h"
+#include "firmware/math/image.h"
+#include "firmware/math/root.h"
+#include "firmware/math/trig.h"
+
+#if PM_HAS(zero_inductance)
+
+#define VALUES    32U
+#define RISE_MS   256
+#define TURN_MS   800U /* with the current: the rotor comes to rest */
+#define FREE_MS   200U /* without */
+#define LATEST_MS 5000U
+#define SHARE     128  /* of |Y|: a difference that is none */
+#define LEAST     4000 /* of the machine's inductance */
+
+enum { TURN, WITH, FREE, WITHOUT };
+
+static pm_q_t current(const drive_t *drive)
+{
+    return pm_min(commissioning_current(drive), drive->config.zero_inductance.i_most);
+}
+
+static void enter(drive_t *drive, uint8_t part)
+{
+    zero_inductance_t *self = &drive->procedure.zero_inductance;
+    self->part = part;
+    self->ms = 0;
+    self->hold.still = 0;
+    self->a = (pm_dq_t){0, 0};
+    self->b = (pm_dq_t){0, 0};
+    self->y = (pm_dq_t){0, 0};
+    drive->commissioning_report.progress = (uint8_t)(25U * part);
+}
+
+void procedure_zero_inductance_begin(drive_t *drive)
+{
+    commissioning_report_t *report = &drive->commissioning_report;
+    report->routines = (uint8_t)COMMISSIONING_NEUTRAL;
+    report->state = (uint8_t)COMMISSIONING_RUNNING;
+    report->reason = (uint8_t)COMMISSIONING_NO_REASON;
+    drive->zero_inductance = (zero_inductance_result_t){0};
+    sine_reset(&drive->procedure.zero_inductance.sine, &drive->config.zero_inductance.sine, (pm_dq_t){0, 0});
+    enter(drive, TURN);
+}
+
+PM_APART pm_procedure_t procedure_zero_inductance_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
+{
+    zero_inductance_t *self = &drive->procedure.zero_inductance;
+    const zero_inductance_config_t *c = &drive->config.zero_inductance;
+    const pm_dq_t i = {.d = drive->i_ab.alpha, .q = drive->i_ab.beta};
+    const pm_dq_t zero = {.d = neutral_signal(&drive->neutral, &drive->config.neutral, in->more.v_neutral)};
+    const uint16_t at = self->sine.phase.at;
+    const pm_angle_t phi = sine_step(&self->sine, &c->sine, i);
+    window_step(&self->neutral, at, pm_dir(phi - c->sine.lag), zero);
+    const pm_ab_t carrier = carrier_along(c->sine.v_h, pm_dir(phi));
+    const pm_ab_t v = {.alpha = self->hold.v.alpha + carrier.alpha, .beta = self->hold.v.beta + carrier.beta};
+    drive->status.i = i;
+    drive->status.theta = 0;
+    drive->v_next = v;
+    commissioning_write_legs(drive, self->rest, pm_clarke_inverse(v), out);
+    return PM_RUNNING; /* its slow part knows the end */
+}
+
+/* The current is there. */
+static bool holds(drive_t *drive)
+{
+    zero_inductance_t *self = &drive->procedure.zero_inductance;
+    const zero_inductance_config_t *c = &drive->config.zero_inductance;
+    const bool with = self->part <= (uint8_t)WITH;
+    const pm_q_t i = current(drive);
+    self->i = commissioning_approach(self->i, with ? i : 0, i / RISE_MS + 1);
+    commissioning_hold(drive, &self->hold, (pm_ab_t){self->i, 0}, sine_mean(&self->sine, &c->sine), c->omega);
+    return self->hold.still >= (with ? TURN_MS : FREE_MS);
+}
+
+static void add(pm_dq_t *sum, pm_q_t cosine, pm_q_t sine)
+{
+    sum->d += cosine;
+    sum->q -= sine;
+}
+
+/* Whether these were all. */
+static bool add_value(drive_t *drive)
+{
+    zero_inductance_t *self = &drive->procedure.zero_inductance;
+    const pm_frac_t per_n = drive->config.zero_inductance.sine.per_n;
+    const pm_dq_t i_cos = window_cosine(&self->sine.window, per_n);
+    const pm_dq_t i_sin = window_sine(&self->sine.window, per_n);
+    const pm_q_t y_cos = window_cosine(&self->neutral, per_n).d;
+    const pm_q_t y_sin = window_sine(&self->neutral, per_n).d;
+    const pm_q_t size = pm_hypot(y_cos, y_sin);
+    polarity_mean_t *mean = &self->size[self->part == (uint8_t)WITH ? 0 : 1];
+    if (self->part == (uint8_t)WITH && mean->count == 0U) {
+        self->first = size;
+    }
+    add(&self->a, i_cos.d, i_sin.d);
+    add(&self->b, i_cos.q, i_sin.q);
+    add(&self->y, y_cos, y_sin);
+    polarity_add(mean, size - self->first);
+    return mean->count >= VALUES;
+}
+
+/* Im(a* b) */
+static int64_t cross(pm_dq_t a, pm_dq_t b)
+{
+    return (int64_t)a.d * b.q - (int64_t)a.q * b.d;
+}
+
+/* x / y, which are of the same format: Q28. */
+static pm_q_t share(int64_t x, int64_t y)
+{
+    const int64_t one = y / PM_ONE;
+    return one == 0 ? 0 : (pm_q_t)pm_quotient(x, (int32_t)one);
+}
+
+/* Which way, if it is sure. */
+static void find_fall(drive_t *drive)
+{
+    const zero_inductance_t *self = &drive->procedure.zero_inductance;
+    zero_inductance_result_t *r = &drive->zero_inductance;
+    const polarity_config_t none = {.reversed = false};
+    const pm_q_t noise = pm_hypot(polarity_noise(&self->size[0]), polarity_noise(&self->size[1]));
+    const pm_q_t rise = polarity_mean(&self->size[0]) - polarity_mean(&self->size[1]);
+    bool rises;
+    if (polarity_judge(&none, rise, self->first / SHARE, noise, &r->margin, &rises) == PM_DONE) {
+        r->falls = !rises;
+    } else {
+        r->margin = 0;
+    }
+}
+
+static pm_procedure_t conclude(drive_t *drive)
+{
+    const zero_inductance_t *self = &drive->procedure.zero_inductance;
+    zero_inductance_result_t *r = &drive->zero_inductance;
+    const pm_dq_t k = drive->config.zero_inductance.k;
+    const pm_dq_t w = {pm_mul(self->y.q, k.q) - pm_mul(self->y.d, k.d),
+                       -pm_mul(self->y.d, k.q) - pm_mul(self->y.q, k.d)};
+    const int64_t both = cross(self->a, self->b);
+    if (pm_abs(self->a.d) + pm_abs(self->a.q) < drive->config.i_max / 16) { /* of 32 halves */
+        return PM_FAILED_NO_CURRENT;
+    }
+    r->dL_0 = share(cross(w, self->b), both);
+    r->L_c0 = share(cross(self->a, w), both);
+    if (pm_hypot(r->dL_0, r->L_c0) < drive->config.machine.L_d / LEAST) {
+        return PM_FAILED_SALIENCY;
+    }
+    find_fall(drive);
+    return PM_DONE;
+}
+
+static pm_procedure_t finish(drive_t *drive, pm_procedure_t result)
+{
+    commissioning_report_t *report = &drive->commissioning_report;
+    if (result == PM_DONE) {
+        report->state = (uint8_t)COMMISSIONING_DONE;
+        report->progress = 100;
+    } else {
+        report->state = (uint8_t)COMMISSIONING_FAILED;
+        report->reason =
+            (uint8_t)(result == PM_FAILED_SALIENCY ? COMMISSIONING_ROUND : COMMISSIONING_NO_CURRENT);
+        drive->zero_inductance = (zero_inductance_result_t){0};
+    }
+    return result;
+}
+
+pm_procedure_t procedure_zero_inductance_slow(drive_t *drive)
+{
+    zero_inductance_t *self = &drive->procedure.zero_inductance;
+    const uint32_t block =
+        (drive->config.zero_inductance.sine.n + drive->config.slow_divider - 1U) / drive->config.slow_divider;
+    self->ms++;
+    const bool held = holds(drive);
+    if (self->ms > LATEST_MS) {
+        return finish(drive, PM_FAILED_NO_CURRENT);
+    }
+    if (self->part == (uint8_t)TURN || self->part == (uint8_t)FREE) {
+        if (held) {
+            enter(drive, (uint8_t)(self->part + 1U));
+        }
+        return PM_RUNNING;
+    }
+    if (self->ms % block != 0U || !add_value(drive)) {
+        return PM_RUNNING;
+    }
+    if (self->part == (uint8_t)WITH) {
+        enter(drive, FREE);
+        return PM_RUNNING;
+    }
+    return finish(drive, conclude(drive));
+}
+
+void procedure_zero_inductance_abort(drive_t *drive)
+{
+    drive->zero_inductance = (zero_inductance_result_t){0};
+    drive->commissioning_report.state = (uint8_t)COMMISSIONING_FAILED;
+    drive->commissioning_report.reason = (uint8_t)COMMISSIONING_ABORTED;
+}
+
+#endif

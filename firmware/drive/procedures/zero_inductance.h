@@ -1,0 +1,66 @@
+/* dL_0 and L_c0 of a motor whose star point is led out, measured by the drive, and which way the load on the magnet changes them
+ * (METHODS.md 6.2.1 and 8.3.2; rows 71 to 77 and 95): what zero_sequence.h must know.
+ *
+ * A current I along phase A, that of the command (rated by default) but psi_m / 2 (L_q - L_d) at most, turns the free rotor to theta = 0. There a carrier V_h e^{j phi} of
+ * f_pwm / 20 turns, first with I, then without a current; friction keeps the rotor. Of a whole period of the carrier, with the complex
+ * amplitudes I_a, I_b of the currents and Y of the channel, and [A, B] = Im(A* B):
+ *   v_0 = p psi_0,  psi_0 = -1/2 Re[c i e^{j 2 theta}],  c = dL_0 - j L_c0          zero_sequence.h
+ *   dL_0 I_a + L_c0 I_b = W = -K Y,   K = 2 T_s (1 - a q) / ((1 - a)(1 - q)),   a = e^{-T_s / RC},  q = e^{-j 2 pi / 20}
+ *   dL_0 = [W, I_b] / [I_a, I_b]
+ *   L_c0 = [I_a, W] / [I_a, I_b]
+ * of the means without current over 32 values. K takes off the filter, and the differences that make a voltage of a current; dead time,
+ * resistance and delay are in both and drop out. A rotor that friction keeps delta beside phase A turns c by 2 delta.
+ *   D = |Y| with I - |Y| without,   margin = (|D| - |Y| / 128) / sigma                polarity.h
+ * D < 0 beyond five sigma: zero_falls 1, with magnetising current; D > 0: 0. Below, the machine does not saturate: margin 0, and the
+ * start cannot tell the poles by it (d_current.h).
+ *
+ * The rotor must be free and without load; it turns by up to half a turn, electrical. 2.5 s. Each period 170 instructions. The bridge is
+ * driven without dead-time compensation (commissioning.h). PM_FAILED_NO_CURRENT: a current does not come, or the carrier has no answer
+ * in the currents; PM_FAILED_SALIENCY: none at the neutral, below 1/4000 of the inductance.
+ * Tests: tests/unit/drive/zero_inductance_test.cpp. */
+#ifndef DRIVE_PROCEDURES_ZERO_INDUCTANCE_H
+#define DRIVE_PROCEDURES_ZERO_INDUCTANCE_H
+
+#include "firmware/drive/commissioning/commissioning.h"
+#include "firmware/params/types.h"
+#include "injection/polarity.h"
+#include "injection/sine.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct {
+    sine_config_t sine;
+    pm_dq_t k;     /* K w_base: real and imaginary part */
+    pm_q_t i_most; /* psi_m / 2 (L_q - L_d) */
+    pm_q_t omega;  /* of the control of the current */
+} zero_inductance_config_t;
+
+/* Of the last run, per-unit; all 0: not measured. */
+typedef struct {
+    pm_q_t dL_0, L_c0;
+    pm_sigma_t margin; /* of `falls`; 0: not known */
+    bool falls;        /* the answer, with magnetising current */
+} zero_inductance_result_t;
+
+typedef struct {
+    sine_t sine;
+    window_t neutral; /* d: v_zero */
+    int32_t rest[3];  /* of the timer's counts, 128ths */
+    commissioning_hold_t hold;
+    pm_q_t i;                /* that is held, along phase A */
+    pm_dq_t a, b, y;         /* sums of I_a, I_b, Y */
+    polarity_mean_t size[2]; /* of |Y|, with I and without; beside `first` */
+    pm_q_t first;
+    uint16_t ms; /* of this part */
+    uint8_t part;
+} zero_inductance_t;
+
+void make_zero_inductance(maker_t *m, zero_inductance_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

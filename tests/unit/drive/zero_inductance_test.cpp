@@ -1,0 +1,217 @@
+// dL_0 and L_c0 by the drive's own procedure, against those of the plant: dead time, drops, leg capacitance, noise, free rotor with
+// friction. The drive is told neither.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+
+#include "firmware/drive/commissioning/commissioning_parts.h"
+#include "hal/sim/sim_loop.h"
+#include "tests/support/plants.h"
+#include "tests/unit/drive/direct.h"
+
+namespace
+{
+
+using bench::kDegree;
+using bench::real;
+
+// 2 % of dL_0, and for L_c0 what friction leaves of the rotor's angle, half a degree: 2 delta dL_0.
+constexpr double kWithin = 0.02, kAcross = 0.03;
+constexpr double kLongest_s = 8;
+
+struct Motor {
+    const char *name;
+    bool spm;
+    double dL_0_H, L_c0_H, theta_deg;
+};
+
+drive_params_t parameters(const Motor &m)
+{
+    drive_params_t p = direct::params(2);
+    p.neutral_full_scale = m.spm ? 2000 : 10000;
+    p.neutral_filter = 100000;
+    p.dL_0 = 0;
+    if (m.spm) {
+        p.pole_pairs = 5;
+        p.R_s = 383000;
+        p.L_d = 3000000;
+        p.L_q = 3300000;
+        p.psi_m = 77600000;
+        p.L_q_rated = 3296600;
+        p.L_dh_rated = 2994300;
+        p.L_qh_rated = 3288000;
+        p.L_dqh_rated = -51600;
+        p.cross_half = -7770;
+        p.leg_capacitance = 2000;
+        p.dead_time = 1000;
+        p.device_drop = 0;
+        p.v_dc_nominal = 36000;
+        p.v_full_scale = 60000;
+        p.v_dc_max = 50000;
+        p.v_dc_derate = 45000;
+        p.v_dc_min = 20000;
+        p.speed_max = 60000;
+        p.speed_trip = 72000;
+        p.speed_low = 4200;
+        p.speed_high = 8400;
+        p.v_injection = 8000;
+    }
+    return p;
+}
+
+plant_config_t plant_of(const Motor &m)
+{
+    plant_config_t c = m.spm ? plants::spm_400() : plants::ipm_1000();
+    c.inverter.c_leg_F = m.spm ? 2e-9 : 0.5e-9;
+    c.mech.T_coulomb_Nm = 0.02;
+    c.winding.dL_0_H = m.dL_0_H;
+    c.winding.L_c0_H = m.L_c0_H;
+    c.sensor.gain_error[0] = 0.01;
+    c.sensor.gain_error[2] = -0.01;
+    c.sensor.v_zero_full_scale_V = m.spm ? 2 : 10;
+    c.sensor.v_zero_filter_s = 100e-6;
+    c.sensor.v_zero_noise_lsb = 0.5;
+    return c;
+}
+
+class Bench
+{
+  public:
+    Bench(const plant_config_t &config, const drive_params_t &p, double theta_deg)
+        : params_(p), plant_(plant_create(&config, theta_deg * kDegree, &error_), &plant_destroy)
+    {
+        EXPECT_NE(plant_, nullptr) << error_;
+        EXPECT_TRUE(sim_loop_init(&loop, plant_.get(), &params_).ok);
+        command(true);
+    }
+
+    void command(bool enable)
+    {
+        drive_command_t c = {};
+        c.enable = enable;
+        c.mode = DRIVE_MODE_IDENTIFY;
+        c.current_mA = 4000;
+        c.routines = COMMISSIONING_NEUTRAL;
+        drive_command(&loop.app.drive, &c);
+    }
+
+    void run_s(double time_s)
+    {
+        for (int k = 0; k < std::lround(time_s * 1e4) && report().state <= COMMISSIONING_RUNNING; ++k) {
+            sim_loop_step(&loop);
+        }
+    }
+
+    const commissioning_report_t &report() const
+    {
+        return loop.app.drive.commissioning_report;
+    }
+
+    const zero_inductance_result_t &result() const
+    {
+        return loop.app.drive.zero_inductance;
+    }
+
+    double henry() const
+    {
+        const drive_base_t &b = loop.app.drive.config.base;
+        return pm_num_to_double(b.psi) / pm_num_to_double(b.i);
+    }
+
+    double theta_deg() const
+    {
+        plant_truth_t t;
+        plant_truth(plant_.get(), &t);
+        return bench::wrapped(t.theta_e_rad) / kDegree;
+    }
+
+    sim_loop_t loop = {};
+
+  private:
+    static double pm_num_to_double(pm_num_t x)
+    {
+        int32_t value = 0;
+        (void)pm_num_to_fixed(pm_num_mul(x, pm_num(1000000)), 0, &value);
+        return value * 1e-6;
+    }
+
+    drive_params_t params_;
+    const char *error_ = nullptr;
+    std::unique_ptr<plant_t, decltype(&plant_destroy)> plant_;
+};
+
+class ZeroInductance : public ::testing::TestWithParam<Motor>
+{
+};
+
+TEST_P(ZeroInductance, IsThatOfThePlant)
+{
+    const Motor m = GetParam();
+    Bench x(plant_of(m), parameters(m), m.theta_deg);
+    x.run_s(kLongest_s);
+    ASSERT_EQ(x.report().state, COMMISSIONING_DONE) << int(x.report().reason);
+    EXPECT_EQ(x.report().progress, 100);
+    EXPECT_NEAR(x.henry() * real(x.result().dL_0), m.dL_0_H, kWithin * std::abs(m.dL_0_H));
+    EXPECT_NEAR(x.henry() * real(x.result().L_c0), m.L_c0_H, kAcross * std::abs(m.dL_0_H));
+    EXPECT_GE(x.result().margin, 5 * 256); // L_sa / D grows with magnetising current
+    EXPECT_FALSE(x.result().falls);
+    sim_loop_step(&x.loop);
+    EXPECT_EQ(x.loop.app.out.legs, PM_LEGS_OFF);
+}
+
+constexpr Motor kMotors[] = {{"ipm", false, 2e-3, 0, 20},         {"south", false, 2e-3, 0, 200},
+                             {"cross", false, 2e-3, 0.5e-3, 133}, {"negative", false, -1.5e-3, -0.3e-3, 290},
+                             {"spm", true, 0.3e-3, 0, 100},       {"spm cross", true, 0.3e-3, 0.1e-3, 310}};
+INSTANTIATE_TEST_SUITE_P(Motors, ZeroInductance, ::testing::ValuesIn(kMotors));
+
+TEST(ZeroInductanceFalls, IsNotSaidOfALinearMachine)
+{
+    const Motor m = {"linear", false, 2e-3, 0, 20};
+    plant_config_t c = plant_of(m);
+    c.machine.c_A_Wb5 = 0;
+    Bench x(c, parameters(m), m.theta_deg);
+    x.run_s(kLongest_s);
+    ASSERT_EQ(x.report().state, COMMISSIONING_DONE) << int(x.report().reason);
+    EXPECT_EQ(x.result().margin, 0);
+    EXPECT_NEAR(x.henry() * real(x.result().dL_0), m.dL_0_H, kWithin * m.dL_0_H);
+}
+
+// Twin: a channel whose filter is told as none is off by what the filter does to the carrier.
+TEST(ZeroInductanceFails, WithAnotherFilter)
+{
+    const Motor m = kMotors[0];
+    drive_params_t p = parameters(m);
+    p.neutral_filter = 50000;
+    Bench x(plant_of(m), p, m.theta_deg);
+    x.run_s(kLongest_s);
+    const double off =
+        std::hypot(x.henry() * real(x.result().dL_0) - m.dL_0_H, x.henry() * real(x.result().L_c0));
+    EXPECT_GE(off, 5 * kWithin * m.dL_0_H);
+}
+
+TEST(ZeroInductanceFails, WithoutAnAnswer)
+{
+    Motor m = kMotors[0];
+    m.dL_0_H = 0;
+    Bench x(plant_of(m), parameters(m), m.theta_deg);
+    x.run_s(kLongest_s);
+    EXPECT_EQ(x.report().state, COMMISSIONING_FAILED);
+    EXPECT_EQ(x.report().reason, COMMISSIONING_ROUND);
+    EXPECT_EQ(x.result().dL_0, 0);
+}
+
+TEST(ZeroInductanceFails, WhenItIsStopped)
+{
+    const Motor m = kMotors[0];
+    Bench x(plant_of(m), parameters(m), m.theta_deg);
+    x.run_s(1.0);
+    EXPECT_EQ(x.report().state, COMMISSIONING_RUNNING);
+    x.command(false);
+    x.run_s(0.1);
+    EXPECT_EQ(x.report().state, COMMISSIONING_FAILED);
+    EXPECT_EQ(x.report().reason, COMMISSIONING_ABORTED);
+    EXPECT_EQ(x.loop.app.out.legs, PM_LEGS_OFF);
+}
+
+} // namespace
