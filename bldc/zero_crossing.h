@@ -9,13 +9,15 @@
  *   ZERO_LINK       that of the three that belongs to the instant of the sample
  *   ZERO_TERMINALS  mean of the three terminals, whatever the instant:  v - mean = (2/3) f e
  *   ZERO_NEUTRAL    the star point, which needs NEEDS_NEUTRAL:          v - v_N = e
+ *   ZERO_VIRTUAL    none, but the mean of the terminals less that of ZERO_LINK: (f / 3) e, of virtual_third.h
  * Towards the crossing the difference y rises (its sign is changed in odd sectors). The sample before the crossing and the
  * one after it, with their instants:
  *   t_z = t_1 + (t_2 - t_1) (-y_1) / (y_2 - y_1)
  * so that the carrier may have any ratio to the speed. Where only one of them tells a distance:
- *   t_z = t - y t_60 / swing,     swing = f e'(0) pi / 3:  what the difference rises by in 60 degrees, t_60 their time
- * which holds for the late crossing, when the first sample behind the freewheeling is already past it, and for a
- * sample that the rails have cut.
+ *   t_z = t - t_60 (x + curve x^3),   x = y / swing <= 3/4,   swing = f e'(0) pi / 3
+ * which holds for the late crossing, when the first sample behind the freewheeling is already past it, and for a sample that
+ * the rails have cut. swing is what the difference rises by in 60 degrees at the slope of its crossing, t_60 their time;
+ * curve is that of a sine, 1.4 degrees at a distance of 30.
  * A sample nearer than `seen` tells neither side until another of its sector was further off: a rotor
  * that stands has no EMF, only noise, which crosses.
  *
@@ -28,7 +30,8 @@
  * than 5/8 of the swing, where no rotor in this sector can be.
  * With both legs high the upper diode holds it above v_dc, and `rail` counts from there upwards: EMFs of either sign are
  * seen, as far as the channel's full scale leaves room. With both low that is beyond a channel which begins at zero: there
- * freewheeling and past look alike at a downward crossing, and a late one is missed.
+ * freewheeling and past look alike at a downward crossing, and a late one is missed. The mean of the terminals may stay
+ * above zero there, by the current of the driven legs: the slope then tells from the last sample further off than rail / 4.
  *
  * A RC filter of the terminals must settle within the on time and does not delay (METHODS-ADDENDUM.md, E20); what a
  * comparator delays is taken off by the commutation.
@@ -48,17 +51,20 @@
 extern "C" {
 #endif
 
-typedef enum { ZERO_LINK, ZERO_TERMINALS, ZERO_NEUTRAL } zero_reference_t;
+#define ZERO_CURVE_SINE PM_FRAC(0.18277046) /* (pi / 3)^2 / 6 */
+
+typedef enum { ZERO_LINK, ZERO_TERMINALS, ZERO_NEUTRAL, ZERO_VIRTUAL } zero_reference_t;
 
 /* Where both driven legs are at the instant of a sample. */
 typedef enum { ZERO_LEGS_LOW, ZERO_LEGS_APART, ZERO_LEGS_HIGH } zero_legs_t;
 
 typedef struct {
     zero_reference_t reference;
-    pm_q_t rail;    /* nearer than this to a rail a sample tells nothing; METHODS-ADDENDUM.md A2: 0.35 V */
-    uint32_t blank; /* counts after a commutation */
-    pm_q_t swing;   /* at base speed, > 0, */
-    uint32_t t_60;  /* where this is the time of 60 degrees, counts */
+    pm_q_t rail;     /* nearer than this to a rail a sample tells nothing; METHODS-ADDENDUM.md A2: 0.35 V */
+    uint32_t blank;  /* counts after a commutation */
+    pm_q_t swing;    /* at base speed, > 0, */
+    uint32_t t_60;   /* where this is the time of 60 degrees, counts */
+    pm_frac_t curve; /* of a distance y: 0 for a trapezoid; ZERO_CURVE_SINE */
 } zero_crossing_config_t;
 
 typedef struct {

@@ -38,7 +38,7 @@ pm_q_t swing(double factor)
 
 // Sector in which the crossing is at count 0; a sample of the ideal terminal at another.
 struct Bench {
-    zero_crossing_config_t config = {ZERO_LINK, fixed(0.35 / kBase_V, 28), 1000, swing(1), kT60};
+    zero_crossing_config_t config = {ZERO_LINK, fixed(0.35 / kBase_V, 28), 1000, swing(1), kT60, 0};
     uint32_t sector = 0;
     bool reverse = false;
     zero_legs_t legs = ZERO_LEGS_APART;
@@ -138,6 +138,20 @@ TEST(ZeroCrossing, FindsALateCrossingFromItsDistance)
         // a sine instead of the line that the slope stands for
         const double line = std::sin(degrees(first) * kDegree) / kDegree / 60 * kT60;
         EXPECT_NEAR(b.find(first), first - line, kError_counts) << first;
+    }
+}
+
+// The arc of a sine instead of the line, up to 30 degrees: the fifth order is left, 3/40 x^5.
+TEST(ZeroCrossing, FindsALateCrossingOfASineByItsArc)
+{
+    Bench b;
+    b.config.curve = ZERO_CURVE_SINE;
+    for (const double first : {4000.0, 25000.0, 45000.0}) {
+        const double x = std::sin(degrees(first) * kDegree);
+        const double left = (std::asin(x) - x - x * x * x / 6) / kDegree / 60 * kT60;
+        const zero_expected_t due = {0, kT60, static_cast<uint32_t>(-1), 0};
+        EXPECT_NEAR(b.find(first, due), left, kError_counts) << first;
+        EXPECT_LT(left, 0.3 / 60 * kT60); // degrees
     }
 }
 
