@@ -11,13 +11,13 @@
  * as patterns.h says, and what is subtracted is that of the sample's own instant: the samples of on and off times join
  * to one signal, whose crossing lies between two of them with their instants (zero_crossing.h). No low-pass, no lag.
  *
- * Of the terminals only their mean is used, also for the freewheeling, during which the open one is at a rail:
+ * Of the terminals only their mean is used. What it says of the open one, which rests at a rail while it freewheels, is
  *   v_open = 3 e_0 + n v_dc / 2
- * so a board may bring three equal resistors' star to one channel and give its code for all three terminals.
+ * and goes into zero_crossing.h in its place, against n v_dc / 2 (ZERO_LINK). So a board may bring three equal resistors' star to one channel and give its code for all three terminals.
  * What it costs is the sum of three: against the open terminal's, per volt of e, the noise of the channels counts 1.7
  * times, an error of v_dc's divider or of all three 3 times, and a diode that carries the off time, v_diode, 3 times.
  *
- * Q28 per-unit, within +-8. virtual_third(): 8 instructions. Tests: tests/unit/bldc/virtual_third_test.cpp,
+ * Q28 per-unit, within +-8. 8 instructions each. Tests: tests/unit/bldc/virtual_third_test.cpp,
  * tests/scenario/six_step_virtual.yaml. */
 #ifndef BLDC_VIRTUAL_THIRD_H
 #define BLDC_VIRTUAL_THIRD_H
@@ -30,6 +30,7 @@ static inline pm_q_t virtual_third(const zero_sample_t *in, zero_legs_t legs)
     return pm_frac(sum, PM_FRAC(0.333333333333333333)) - pm_half((int32_t)legs * in->v_dc);
 }
 
+/* Of the open leg. */
 static inline pm_q_t virtual_third_terminal(const zero_sample_t *in, zero_legs_t legs)
 {
     return in->v[0] + in->v[1] + in->v[2] - (int32_t)legs * in->v_dc;

@@ -9,7 +9,6 @@
  *   ZERO_LINK       that of the three that belongs to the instant of the sample
  *   ZERO_TERMINALS  mean of the three terminals, whatever the instant:  v - mean = (2/3) f e
  *   ZERO_NEUTRAL    the star point, which needs NEEDS_NEUTRAL:          v - v_N = e
- *   ZERO_VIRTUAL    none, but the mean of the terminals less that of ZERO_LINK: (f / 3) e, of virtual_third.h
  * Towards the crossing the difference y rises (its sign is changed in odd sectors). The sample before the crossing and the
  * one after it, with their instants:
  *   t_z = t_1 + (t_2 - t_1) (-y_1) / (y_2 - y_1)
@@ -30,15 +29,16 @@
  * than 5/8 of the swing, where no rotor in this sector can be.
  * With both legs high the upper diode holds it above v_dc, and `rail` counts from there upwards: EMFs of either sign are
  * seen, as far as the channel's full scale leaves room. With both low that is beyond a channel which begins at zero: there
- * freewheeling and past look alike at a downward crossing, and a late one is missed. The mean of the terminals may stay
- * above zero there, by the current of the driven legs: the slope then tells from the last sample further off than rail / 4.
+ * freewheeling and past look alike at a downward crossing, and a late one is missed. An offset of the channel, or of
+ * virtual_third.h the current of the driven legs, may keep it above zero there: within rail / 4 the slope tells from the last
+ * sample further off.
  *
  * A RC filter of the terminals must settle within the on time and does not delay (METHODS-ADDENDUM.md, E20); what a
  * comparator delays is taken off by the commutation.
  *
  * Instants are counts of the carrier's timer that go on from period to period and wrap after 2^32. Voltages in Q28
  * per-unit. Error of the instant: (t_2 - t_1) 2^-15 and a count of 2. zero_crossing_step(): 60 instructions, 78 with
- * a division where it finds a crossing, 50 and a division more where that is a late one. Once a sample.
+ * a division where it finds a crossing, 60 and a division more where that is a late one. Once a sample.
  * Tests: tests/unit/bldc/zero_crossing_test.cpp, six_step_test.cpp. */
 #ifndef BLDC_ZERO_CROSSING_H
 #define BLDC_ZERO_CROSSING_H
@@ -53,7 +53,7 @@ extern "C" {
 
 #define ZERO_CURVE_SINE PM_FRAC(0.18277046) /* (pi / 3)^2 / 6 */
 
-typedef enum { ZERO_LINK, ZERO_TERMINALS, ZERO_NEUTRAL, ZERO_VIRTUAL } zero_reference_t;
+typedef enum { ZERO_LINK, ZERO_TERMINALS, ZERO_NEUTRAL } zero_reference_t;
 
 /* Where both driven legs are at the instant of a sample. */
 typedef enum { ZERO_LEGS_LOW, ZERO_LEGS_APART, ZERO_LEGS_HIGH } zero_legs_t;
@@ -80,6 +80,7 @@ typedef struct {
 
 typedef struct {
     pm_q_t threshold; /* what y is at the crossing in the on time; thresholds.h */
+    uint32_t moved;   /* or how far the crossing is behind that of y, counts; phase_compensation.h */
     uint32_t t_60;    /* counts */
     uint32_t at;      /* instant of the crossing, from those before */
     pm_q_t

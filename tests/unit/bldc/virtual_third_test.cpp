@@ -21,7 +21,7 @@ constexpr double kEnvelopeRms = 1, kEnvelope = 1.5; // row 126
 Options virtual_third_of(bool reverse)
 {
     Options o;
-    o.reference = ZERO_VIRTUAL;
+    o.virtual_third = true;
     o.reverse = reverse;
     return o;
 }

@@ -24,7 +24,7 @@ double degrees(double counts)
     return 60.0 * counts / kT60;
 }
 
-constexpr zero_expected_t kExpected = {0, kT60, 0, 0};
+constexpr zero_expected_t kExpected = {0, 0, kT60, 0, 0};
 
 struct Sample {
     zero_sample_t measured;
@@ -141,6 +141,30 @@ TEST(ZeroCrossing, FindsALateCrossingFromItsDistance)
     }
 }
 
+// A channel with an offset rests above the rail for good behind a downward crossing with both legs low.
+TEST(ZeroCrossing, ACrossingIntoTheRailIsFoundWithAnOffset)
+{
+    for (const double offset_V : {0.0, 0.02, 0.05}) {
+        Bench b;
+        b.sector = 1;
+        b.legs = ZERO_LEGS_LOW;
+        b.open();
+        bool found = false;
+        for (double at = -30000; at < 20000 && !found; at += kSpacing) {
+            Sample s = b.sample(at);
+            for (pm_q_t &v : s.measured.v) {
+                v += fixed(offset_V / kBase_V, 28);
+            }
+            found = b.step(s);
+        }
+        ASSERT_TRUE(found) << offset_V;
+        // by the slope of the last sample, up to kSpacing ahead; the offset is 0.5 degrees of 6 V
+        EXPECT_NEAR(static_cast<int32_t>(b.self.at), 0,
+                    kShape_counts + 1.1 * offset_V / kAmplitude / kDegree / 60 * kT60)
+            << offset_V;
+    }
+}
+
 // The arc of a sine instead of the line, up to 30 degrees: the fifth order is left, 3/40 x^5.
 TEST(ZeroCrossing, FindsALateCrossingOfASineByItsArc)
 {
@@ -149,7 +173,7 @@ TEST(ZeroCrossing, FindsALateCrossingOfASineByItsArc)
     for (const double first : {4000.0, 25000.0, 45000.0}) {
         const double x = std::sin(degrees(first) * kDegree);
         const double left = (std::asin(x) - x - x * x * x / 6) / kDegree / 60 * kT60;
-        const zero_expected_t due = {0, kT60, static_cast<uint32_t>(-1), 0};
+        const zero_expected_t due = {0, 0, kT60, static_cast<uint32_t>(-1), 0};
         EXPECT_NEAR(b.find(first, due), left, kError_counts) << first;
         EXPECT_LT(left, 0.3 / 60 * kT60); // degrees
     }
