@@ -83,15 +83,22 @@ static void found(six_step_t *self, uint32_t at, bool like_those_learnt)
     commutation_crossed(&self->commutation, at);
     follow(self);
     self->learn = self->commutation.whole == SECTORS && like_those_learnt;
+    if (!like_those_learnt) {
+        self->alike = 0;
+    }
 }
 
 /* In a period that has no crossing to look for. */
 static void learn(six_step_t *self, const six_step_config_t *config)
 {
+    self->learn = false;
+    if (self->alike < SECTORS) { /* the turn has some of the other kind */
+        self->alike++;
+        return;
+    }
     const commutation_t *c = &self->commutation;
     thresholds_learn(&self->thresholds, &config->thresholds, c->crossed, self->reverse, c->interval, c->sum,
                      zero_crossing_swing(&config->crossing, self->expected.t_60));
-    self->learn = false;
 }
 
 /* The sample of the period that began at `start`. */

@@ -81,8 +81,9 @@ typedef struct {
     zero_expected_t expected;
     six_step_plan_t plan[2]; /* [1] of the period that begins now, [0] of the one that has ended */
     uint32_t commutated;     /* instant of the last commutation */
-    uint16_t legs;           /* PM_LEGS_... of commutation.sector */
-    bool learn;              /* from the last crossing */
+    uint32_t alike; /* crossings in succession of the kind that thresholds are learnt from, up to SECTORS */
+    uint16_t legs;  /* PM_LEGS_... of commutation.sector */
+    bool learn;     /* from the last crossing */
     bool reverse;
     bool lost;
     third_harmonic_t third;
