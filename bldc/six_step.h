@@ -15,9 +15,9 @@
  * (commutation.h) `lost` is set and all legs are off from the next call on, until the next reset.
  *
  * six_step_step(), instructions on Cortex-M4 with five periods in a sector:
- *   without a crossing             218 on average, at most 277
- *   with one                       340             356
- *   after one, thresholds learnt   304             398, where it commutates too
+ *   without a crossing             228 on average, at most 290
+ *   with one                       367             378
+ *   after one, thresholds learnt   304             407, where it commutates too
  * Tests: tests/target/bldc, tests/unit/bldc/six_step_test.cpp. */
 #ifndef BLDC_SIX_STEP_H
 #define BLDC_SIX_STEP_H
