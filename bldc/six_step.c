@@ -12,24 +12,30 @@
 static void follow(six_step_t *self)
 {
     self->expected.t_60 = commutation_t_60(&self->commutation);
-    self->expected.at = self->commutation.crossing + self->expected.t_60;
+    const uint32_t next = sector_next(self->commutation.crossed);
+    self->expected.at = self->commutation.crossing + self->expected.t_60 - (uint32_t)self->phase.shift[next];
 }
 
-static void open(six_step_t *self, uint32_t sector, uint32_t since)
+static void open(six_step_t *self, const six_step_config_t *config, uint32_t sector, uint32_t since)
 {
     zero_crossing_open(&self->crossing, sector, self->reverse, since);
-    self->expected.threshold = thresholds_at(&self->thresholds, sector, self->reverse);
+    self->expected.threshold = thresholds_at(&self->thresholds, sector, self->reverse) & config->compared;
+    self->expected.moved = (uint32_t)self->phase.shift[sector];
 }
 
 void six_step_slow(six_step_t *self, const six_step_config_t *config)
 {
     const uint32_t t_60 = self->expected.t_60;
     const bool sure = self->commutation.young == 0U && t_60 < 2U * SAMPLES * config->pattern.half_period;
+    const pm_q_t swing = zero_crossing_swing(&config->crossing, t_60);
+    if (config->compared == 0) {
+        phase_compensation_slow(&self->phase, &self->thresholds, self->reverse, t_60, swing);
+    }
     if (config->crossings == CROSSINGS_third_harmonic) {
-        third_harmonic_slow(&self->third, &config->third, t_60, zero_crossing_swing(&config->crossing, t_60));
+        third_harmonic_slow(&self->third, &config->third, t_60, swing);
         return;
     }
-    self->expected.seen = sure ? 0 : zero_crossing_swing(&config->crossing, t_60) / 8;
+    self->expected.seen = sure ? 0 : swing / 8;
 }
 
 /* In the middle of `sector`, whose crossing is known. */
@@ -39,7 +45,7 @@ static void begin(six_step_t *self, const six_step_config_t *config, uint32_t se
     self->learn = false;
     follow(self);
     six_step_slow(self, config);
-    open(self, sector, now);
+    open(self, config, sector, now);
     third_harmonic_open(&self->third, now);
     self->crossing.found = true;
     self->commutated = now;
@@ -72,20 +78,27 @@ void six_step_begin(six_step_t *self, const six_step_config_t *config, pm_angle_
     begin(self, config, sector, now);
 }
 
-static void found(six_step_t *self, uint32_t legs)
+static void found(six_step_t *self, uint32_t at, bool like_those_learnt)
 {
-    commutation_crossed(&self->commutation, self->crossing.at);
+    commutation_crossed(&self->commutation, at);
     follow(self);
-    self->learn = self->commutation.whole == SECTORS && legs == ZERO_LEGS_APART;
+    self->learn = self->commutation.whole == SECTORS && like_those_learnt;
+    if (!like_those_learnt) {
+        self->alike = 0;
+    }
 }
 
 /* In a period that has no crossing to look for. */
 static void learn(six_step_t *self, const six_step_config_t *config)
 {
+    self->learn = false;
+    if (self->alike < SECTORS) { /* the turn has some of the other kind */
+        self->alike++;
+        return;
+    }
     const commutation_t *c = &self->commutation;
     thresholds_learn(&self->thresholds, &config->thresholds, c->crossed, self->reverse, c->interval, c->sum,
                      zero_crossing_swing(&config->crossing, self->expected.t_60));
-    self->learn = false;
 }
 
 /* The sample of the period that began at `start`. */
@@ -99,7 +112,7 @@ static void look(six_step_t *self, const six_step_config_t *config, const six_st
             commutation_missed(&self->commutation);
             follow(self);
         }
-        open(self, sector, commutated ? start + plan->commutate_at : self->commutated);
+        open(self, config, sector, commutated ? start + plan->commutate_at : self->commutated);
     }
     if (self->crossing.found) {
         if (self->learn) {
@@ -107,9 +120,10 @@ static void look(six_step_t *self, const six_step_config_t *config, const six_st
         }
         return;
     }
+    const bool on = plan->legs == ZERO_LEGS_APART;
     const zero_instant_t when = {start + plan->sample_at, (zero_legs_t)plan->legs};
     if (zero_crossing_step(&self->crossing, &config->crossing, &in->sample, when, &self->expected)) {
-        found(self, plan->legs);
+        found(self, self->crossing.at, on);
     } else if (self->crossing.ahead) {
         commutation_ahead(&self->commutation, self->crossing.at);
     } else {
@@ -121,13 +135,16 @@ static void look(six_step_t *self, const six_step_config_t *config, const six_st
 PM_APART static void look_third(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in)
 {
     commutation_t *c = &self->commutation;
-    const bool rising = sector_rising(sector_next(c->crossed));
+    const uint32_t next = sector_next(c->crossed), moved = (uint32_t)self->phase.shift[next];
+    const bool rising = sector_rising(next);
     if (third_harmonic_step(&self->third, &config->third, in->v_zero, in->now, rising)) {
-        commutation_crossed(c, self->third.crossing);
-        follow(self);
+        found(self, self->third.crossing + moved, true);
         return;
     }
-    const uint32_t at = in->now - self->third.lag;
+    if (self->learn) {
+        learn(self, config);
+    }
+    const uint32_t at = in->now - self->third.lag + moved;
     const int32_t late = (int32_t)(at - self->expected.at);
     if (sector_distance(c->crossed, self->plan[1].sector) >= 2U &&
         late > (int32_t)(self->expected.t_60 / 2U)) {

@@ -15,17 +15,19 @@
  * (commutation.h) `lost` is set and all legs are off from the next call on, until the next reset.
  *
  * six_step_step(), instructions on Cortex-M4 with five periods in a sector:
- *   without a crossing             218 on average, at most 277
- *   with one                       340             356
- *   after one, thresholds learnt   304             398, where it commutates too
+ *   without a crossing             228 on average, at most 290
+ *   with one                       367             378
+ *   after one, thresholds learnt   304             407, where it commutates too
  * Tests: tests/target/bldc, tests/unit/bldc/six_step_test.cpp. */
 #ifndef BLDC_SIX_STEP_H
 #define BLDC_SIX_STEP_H
 
 #include "bldc/commutation.h"
 #include "bldc/patterns.h"
+#include "bldc/phase_compensation.h"
 #include "bldc/third_harmonic.h"
 #include "bldc/thresholds.h"
+#include "bldc/virtual_third.h"
 #include "bldc/zero_crossing.h"
 #include "firmware/params/types.h"
 
@@ -45,16 +47,17 @@ typedef struct {
     zero_crossing_config_t crossing; /* its swing is that of e_0 with the third harmonic */
     commutation_config_t commutation;
     thresholds_config_t thresholds;
+    int32_t compared; /* -1: with what is learnt; 0: it is taken off the instants: phase_compensation.h */
     third_harmonic_config_t third;
     crossings_id_t crossings;
 } six_step_config_t;
 
 typedef struct {
-    uint32_t now; /* counts at t_k */
-    bool sampled; /* what was asked for two calls ago is here; not with the third harmonic */
-    zero_sample_t sample;
-    pm_q_t u;      /* patterns.h */
-    pm_q_t v_zero; /* at t_k, drive/neutral.h; CROSSINGS_third_harmonic only */
+    uint32_t now;         /* counts at t_k */
+    bool sampled;         /* what was asked for two calls ago is here; not with the third harmonic */
+    zero_sample_t sample; /* of CROSSINGS_virtual_third what six_step_from_mean() makes of it */
+    pm_q_t u;             /* patterns.h */
+    pm_q_t v_zero;        /* at t_k, drive/neutral.h; CROSSINGS_third_harmonic only */
 } six_step_in_t;
 
 typedef struct {
@@ -78,11 +81,13 @@ typedef struct {
     zero_expected_t expected;
     six_step_plan_t plan[2]; /* [1] of the period that begins now, [0] of the one that has ended */
     uint32_t commutated;     /* instant of the last commutation */
-    uint16_t legs;           /* PM_LEGS_... of commutation.sector */
-    bool learn;              /* from the last crossing */
+    uint32_t alike; /* crossings in succession of the kind that thresholds are learnt from, up to SECTORS */
+    uint16_t legs;  /* PM_LEGS_... of commutation.sector */
+    bool learn;     /* from the last crossing */
     bool reverse;
     bool lost;
     third_harmonic_t third;
+    phase_compensation_t phase; /* all zero without by_instant */
 } six_step_t;
 
 /* theta at `now`; omega: electrical, per-unit, negative for the other direction; six sectors take less than 2^29 counts.
@@ -110,10 +115,20 @@ static inline pm_q_t six_step_current(const six_step_t *self, const pm_q_t i[PM_
 void six_step_begin(six_step_t *self, const six_step_config_t *config, pm_angle_t theta, bool reverse,
                     uint32_t t_30, uint32_t now);
 
+/* Before the call with a sample of CROSSINGS_virtual_third: in place of the terminals what their mean says of the open one. */
+static inline void six_step_from_mean(const six_step_t *self, zero_sample_t *sample)
+{
+    const pm_q_t v = virtual_third_terminal(sample, (zero_legs_t)self->plan[0].legs);
+    sample->v[0] = v;
+    sample->v[1] = v;
+    sample->v[2] = v;
+}
+
 void six_step_step(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in,
                    six_step_out_t *out);
 
-/* At 1 kHz: lag of the third harmonic, and what a sector must show of its swing, an eighth, for its crossing to be one. Without
+/* At 1 kHz: lag of the third harmonic, shifts of its crossings, and what a sector must show of its swing, an eighth, for its
+ * crossing to be one. Without
  * the call a rotor that has stopped may pass for one that turns. */
 void six_step_slow(six_step_t *self, const six_step_config_t *config);
 

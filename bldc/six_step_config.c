@@ -31,8 +31,8 @@ static pm_num_t swing_of_terminal(const maker_t *m)
     const pm_num_t pi_third = pm_num_mul(PM_NUM_TWO_PI, pm_num_ratio(1, 6));
     const pm_num_t sine = pm_num_ratio(3, 2), trapezoid = pm_num_mul(PM_NUM_TWO_PI, pm_num_ratio(1, 4));
     const pm_num_t slope = pm_num_mul(m->params->emf_shape == 0 ? sine : trapezoid, pi_third);
-    return m->params->zero_reference == CROSSINGS_open_terminal ? slope
-                                                                : pm_num_mul(slope, pm_num_ratio(2, 3));
+    static const uint8_t thirds[CROSSINGS_COUNT] = {3, 2, 0, 3};
+    return pm_num_mul(slope, pm_num_ratio(thirds[m->params->zero_reference], 3));
 }
 
 /* What the signal of the crossings rises by in 60 degrees at the slope of its crossing, V s. */
@@ -74,10 +74,11 @@ static uint32_t needs_of(int32_t id)
 static void make_crossing(maker_t *m, uint32_t turn_base, zero_crossing_config_t *c)
 {
     const pm_num_t swing = pm_num_mul(swing_of(m), m->base.omega);
-    c->reference = m->params->zero_reference == CROSSINGS_open_terminal ? ZERO_LINK : ZERO_TERMINALS;
+    c->reference = m->params->zero_reference == CROSSINGS_terminal_mean ? ZERO_TERMINALS : ZERO_LINK;
     c->rail = fixed(m, pm_num_div(pm_num_dec(RAIL_mV, -3), m->base.v), Q_BITS, DRIVE_PARAM_v_full_scale);
     c->blank = counts(m, DRIVE_PARAM_t_blank);
     c->swing = gain(m, pm_num_div(swing, m->base.v), Q_BITS, DRIVE_PARAM_psi_m);
+    c->curve = m->params->emf_shape == 0 ? ZERO_CURVE_SINE : 0;
     c->t_60 = (turn_base + SECTORS / 2U) / SECTORS;
 }
 
@@ -104,7 +105,9 @@ void make_six_step(maker_t *m, six_step_config_t *c)
     c->thresholds.k_V = fixed(m, vertical, FRAC_BITS, DRIVE_PARAM_learn_vertical);
     c->thresholds.k_H =
         fixed(m, si(m, DRIVE_PARAM_learn_horizontal), FRAC_BITS, DRIVE_PARAM_learn_horizontal);
-    c->thresholds.most =
-        fixed(m, pm_num_div(pm_num_mul(pm_num_ratio(1, 12), si(m, DRIVE_PARAM_v_dc_nominal)), m->base.v),
-              Q_BITS, DRIVE_PARAM_v_dc_nominal);
+    c->compared =
+        c->crossings == CROSSINGS_third_harmonic || c->crossings == CROSSINGS_virtual_third ? 0 : -1;
+    const pm_num_t most = pm_num_ratio(1, c->crossings == CROSSINGS_third_harmonic ? 36 : 12);
+    c->thresholds.most = fixed(m, pm_num_div(pm_num_mul(most, si(m, DRIVE_PARAM_v_dc_nominal)), m->base.v),
+                               Q_BITS, DRIVE_PARAM_v_dc_nominal);
 }

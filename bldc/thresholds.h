@@ -12,10 +12,11 @@
  *   u_V += k_V (3/2) swing D_V / T    D_V = (i_0 + i_1 + i_2) - (i_3 + i_4 + i_5)
  *   u_H += k_H swing D_H / T          D_H = i_2 - i_0 + i_5 - i_3
  * with swing of zero_crossing.h, so that k_V and k_H are the share of a deviation that is taken off in a turn: 0.05
- * settles within 100 turns. Of on times: deviations are others in the off time, whose crossings they are not learnt from, nor
- * used for. Horizontal deviations show by their differences only: their mean is taken as zero.
+ * settles within 100 turns. Of on times: deviations are others in the off time, whose crossings they are not used for; they are
+ * learnt from turns that have none of these. Horizontal deviations show by their differences only: their mean is taken as zero, and taken off, as
+ * a ramp of the speed moves all three alike.
  *
- * Q28 per-unit; each value is held within +-most. thresholds_learn(): 76 instructions with a division,
+ * Q28 per-unit; each value is held within +-most. thresholds_learn(): 90 instructions with a division,
  * after a crossing if all six of the last turn are good. thresholds_at(): 17.
  * Tests: tests/unit/bldc/thresholds_test.cpp, six_step_test.cpp. */
 #ifndef BLDC_THRESHOLDS_H

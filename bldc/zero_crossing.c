@@ -1,5 +1,6 @@
 #include "bldc/zero_crossing.h"
 
+#include "firmware/math/compiler.h"
 #include "firmware/math/root.h"
 
 static pm_q_t against_reference(const zero_crossing_config_t *config, const zero_sample_t *in,
@@ -19,29 +20,17 @@ pm_q_t zero_crossing_swing(const zero_crossing_config_t *config, uint32_t t_60)
 }
 
 /* Time in which the difference rises by y >= 0. */
-static uint32_t rise(pm_q_t swing, uint32_t t_60, pm_q_t y)
+static uint32_t rise(const zero_crossing_config_t *config, pm_q_t swing, uint32_t t_60, pm_q_t y)
 {
-    return (uint32_t)pm_unit((int32_t)t_60, pm_ratio(pm_min(y, swing), swing));
+    const pm_unit_t share = pm_ratio(pm_min(y, swing - swing / 4), swing);
+    const pm_unit_t cube = pm_unit(pm_unit(share, share), share);
+    return (uint32_t)pm_unit((int32_t)t_60, pm_frac_add(share, cube, config->curve));
 }
 
 /* Between the last sample ahead and this one. */
 static uint32_t between(const zero_crossing_t *self, uint32_t at, pm_q_t y)
 {
     return self->at + (uint32_t)pm_unit((int32_t)(at - self->at), pm_ratio(-self->y, y - self->y));
-}
-
-/* From the distance of the sample that no rail has cut; past: one has cut this. */
-static uint32_t by_slope(const zero_crossing_t *self, uint32_t at, pm_q_t y, bool past, pm_q_t swing,
-                         uint32_t t_60)
-{
-    if (!past) {
-        return at - rise(swing, t_60, y);
-    }
-    if (self->cut) {
-        return at;
-    }
-    const uint32_t later = rise(swing, t_60, -self->y);
-    return later < at - self->at ? self->at + later : at;
 }
 
 /* A first sample past the crossing: not on its way from the rail to the EMF. */
@@ -56,14 +45,44 @@ static bool believed(zero_crossing_t *self, uint32_t at, pm_q_t y, const zero_ex
     return again || (int32_t)(at - expected->at) >= 0;
 }
 
+typedef struct {
+    uint32_t at;
+    pm_q_t y;
+    bool past; /* the rail has cut it */
+} late_t;
+
+/* From the distance of the sample that no rail has cut. */
+PM_APART static bool is_late(zero_crossing_t *self, const zero_crossing_config_t *config, late_t in,
+                             const zero_expected_t *expected)
+{
+    const uint32_t t_60 = expected->t_60;
+    const pm_q_t swing = zero_crossing_swing(config, t_60);
+    if (!self->ahead && !believed(self, in.at, in.y, expected, swing)) {
+        return false;
+    }
+    if (!in.past) {
+        self->at = in.at - rise(config, swing, t_60, in.y);
+        return true;
+    }
+    const uint32_t later = self->cut ? UINT32_MAX : rise(config, swing, t_60, -self->y);
+    if (later < in.at - self->at) {
+        self->at += later;
+        return true;
+    }
+    self->at = in.y < 0 ? self->at : in.at; /* rests at the rail, or is due by this sample itself */
+    return in.y >= 0;
+}
+
 void zero_crossing_open(zero_crossing_t *self, uint32_t sector, bool reverse, uint32_t since)
 {
-    const zero_crossing_t opened = {.sector = (uint8_t)sector,
-                                    .leg = sector_legs(sector, reverse).open,
-                                    .rising = sector_rising(sector),
-                                    .open_since = since,
-                                    .at = since};
-    *self = opened;
+    self->sector = (uint8_t)sector;
+    self->leg = sector_legs(sector, reverse).open;
+    self->rising = sector_rising(sector);
+    self->open_since = since;
+    self->ahead = false;
+    self->cut = false;
+    self->past = false;
+    self->found = false;
 }
 
 bool zero_crossing_step(zero_crossing_t *self, const zero_crossing_config_t *config, const zero_sample_t *in,
@@ -82,27 +101,28 @@ bool zero_crossing_step(zero_crossing_t *self, const zero_crossing_config_t *con
         return false; /* freewheeling, of a braking current at the other rail */
     }
     const pm_q_t difference = against_reference(config, in, when.legs, v);
-    const pm_q_t threshold = when.legs == ZERO_LEGS_APART ? expected->threshold : 0;
+    const bool on = when.legs == ZERO_LEGS_APART;
+    const pm_q_t threshold = on ? expected->threshold : 0;
     const pm_q_t y = (rising ? difference : -difference) - threshold;
     if (!self->ahead && pm_abs(y) < expected->seen) {
         return false;
     }
-    if (y < 0 || cut) {
-        self->at = when.at;
+    const uint32_t at = on ? when.at + expected->moved : when.at;
+    if (cut && self->ahead && !self->cut) {
+        return false; /* tells less than the one before it */
+    }
+    if (cut || (y < 0 && !(past && v <= config->rail / 4))) {
+        self->at = at;
         self->y = y;
         self->ahead = true;
         self->cut = cut;
         return false;
     }
     if (self->ahead && !self->cut && !past) {
-        self->at = between(self, when.at, y);
+        self->at = between(self, at, y);
+        self->found = true;
     } else {
-        const pm_q_t swing = zero_crossing_swing(config, expected->t_60);
-        if (!self->ahead && !believed(self, when.at, y, expected, swing)) {
-            return false;
-        }
-        self->at = by_slope(self, when.at, y, past, swing, expected->t_60);
+        self->found = is_late(self, config, (late_t){at, y, past}, expected);
     }
-    self->found = true;
-    return true;
+    return self->found;
 }

@@ -46,6 +46,9 @@ void block_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
 #endif
     if (seen.sampled) {
         take_sample(drive, in, &seen.sample);
+        if (pm_rarely(c->six_step.crossings == CROSSINGS_virtual_third)) {
+            six_step_from_mean(&self->six_step, &seen.sample);
+        }
     }
     six_step_out_t next;
     six_step_step(&self->six_step, &c->six_step, &seen, &next);

@@ -51,5 +51,6 @@
 #define PM_WITHOUT_open_terminal 1
 #define PM_WITHOUT_terminal_mean 1
 #define PM_WITHOUT_third_harmonic 1
+#define PM_WITHOUT_virtual_third 1
 
 #endif

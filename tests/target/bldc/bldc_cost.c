@@ -31,6 +31,7 @@ static const six_step_config_t preset = {
     .crossing = {ZERO_LINK, PM_Q(0.35 / 40), 510, PM_Q(0.41), T_60},
     .commutation = {PM_FRAC(0.5 / 6), 0, 6 * T_60, 6},
     .thresholds = {PM_FRAC(0.075), PM_FRAC(0.05), PM_Q(0.05)},
+    .compared = -1,
 };
 
 /* Terminals at an instant in a sector; sector 0 begins at 30 degrees at instant 0. */

@@ -114,9 +114,12 @@ struct Options {
     double advance_deg = 0;
     double k_V = 0, k_H = 0; // of thresholds.h
     double blank_s = 3e-6, lead_s = 1e-6, least_s = 6e-6;
-    bool third = false;      // crossings of the third harmonic,
-    bool told_filter = true; // with the lag of the channel's RC taken off
+    bool virtual_third = false; // crossings of the third harmonic of the terminals
+    bool third = false;         // crossings of the third harmonic,
+    bool told_filter = true;    // with the lag of the channel's RC taken off
     bool reverse = false;
+    bool one_channel = false;  // the mean of the terminals in place of each
+    bool legs_unknown = false; // all samples are taken for those of on times
     int strikes = 6;
 };
 
@@ -145,6 +148,7 @@ inline six_step_config_t make(const Machine &m, const Options &o)
     c.pattern.lead = static_cast<uint16_t>(std::lround(o.lead_s / count_s));
     c.pattern.least = static_cast<uint16_t>(std::lround(o.least_s / count_s));
     c.crossing.reference = o.reference;
+    c.crossings = o.virtual_third ? CROSSINGS_virtual_third : CROSSINGS_open_terminal;
     c.crossing.rail = fixed(0.35 / kBase_V, PM_Q_BITS);
     c.crossing.blank = static_cast<uint32_t>(std::lround(o.blank_s / count_s));
     c.commutation.half = fixed((0.5 - o.advance_deg / 60) / 6, 32);
@@ -152,8 +156,10 @@ inline six_step_config_t make(const Machine &m, const Options &o)
     c.commutation.strikes = static_cast<uint8_t>(o.strikes);
     c.thresholds.k_V = fixed(1.5 * o.k_V, 32);
     c.thresholds.k_H = fixed(o.k_H, 32);
-    c.thresholds.most = fixed(2.0 / kBase_V, PM_Q_BITS);
+    c.compared = o.third || o.virtual_third ? 0 : -1;
+    c.thresholds.most = fixed((o.third ? 2.0 / 3 : 2.0) / kBase_V, PM_Q_BITS);
     c.crossing.t_60 = (c.commutation.turn_base + 3) / 6;
+    c.crossing.curve = m.trapezoid ? 0 : ZERO_CURVE_SINE;
     if (o.third) {
         c.crossings = CROSSINGS_third_harmonic;
         c.third.trapezoid = m.trapezoid;
@@ -250,6 +256,10 @@ class Rig
         for (int k = 0; k < 3; ++k) {
             in.sample.v[k] = fixed(adc_.v_leg[k] / 65536.0 + wrong_reference_V / kBase_V, PM_Q_BITS);
         }
+        if (options.one_channel) {
+            const pm_q_t mean = (in.sample.v[0] + in.sample.v[1] + in.sample.v[2]) / 3;
+            in.sample.v[0] = in.sample.v[1] = in.sample.v[2] = mean;
+        }
         in.sample.v_neutral = fixed(adc_.v_neutral[0] / 65536.0, PM_Q_BITS);
         in.sample.v_neutral -= (in.sample.v[0] + in.sample.v[1] + in.sample.v[2]) / 3;
         in.sample.v_dc =
@@ -259,6 +269,18 @@ class Rig
         in.v_zero =
             fixed((edge.v_zero[0] - 32768) / 32768.0 * machine.plant.sensor.v_zero_full_scale_V / kBase_V,
                   PM_Q_BITS);
+        if (options.legs_unknown) {
+            six_step.plan[0].legs = ZERO_LEGS_APART;
+        }
+        seen = {in.sampled, in.sample, static_cast<zero_legs_t>(six_step.plan[0].legs), sampled_rad_,
+                sampled_in_};
+        if (++since_slow_ * period_s_ >= 1e-3) {
+            since_slow_ = 0;
+            six_step_slow(&six_step, &config);
+        }
+        if (options.virtual_third) {
+            six_step_from_mean(&six_step, &in.sample);
+        }
         six_step_out_t out;
         const bool before = six_step.crossing.found;
         const uint32_t sector = six_step.crossing.sector;
@@ -335,6 +357,13 @@ class Rig
     Statistics of_sector[SECTORS];
     double crossing_deg = 0;
     double t_s = 0;
+    struct {
+        bool there;
+        zero_sample_t sample;
+        zero_legs_t legs;
+        double angle_rad; // at its instant
+        uint32_t sector;
+    } seen = {};                  // by the last step
     double wrong_reference_V = 0; // added to all terminals
 
   private:
@@ -385,6 +414,8 @@ class Rig
         sampled_ = out.sample_at != 0;
         if (sampled_) {
             plant_sample_at(plant_.get(), out.sample_at * count_s_, &adc_);
+            sampled_rad_ = angle_rad();
+            sampled_in_ = first ? sector_next(from) : from;
         }
         if (out.commutate_at != 0 && !first) {
             commutate(out, from);
@@ -394,9 +425,11 @@ class Rig
     std::unique_ptr<plant_t, void (*)(plant_t *)> plant_{nullptr, &plant_destroy};
     const double period_s_, count_s_, sign_;
     double turn_s_ = 0, torque_ = 0, current_ = 0;
-    int periods_ = 0;
+    int periods_ = 0, since_slow_ = 0;
     uint32_t now_ = 0, looked_ = 0, sector_ = 0, next_sector_ = 0;
     bool sampled_ = false;
+    double sampled_rad_ = 0;
+    uint32_t sampled_in_ = 0;
     plant_adc_t adc_ = {};
     six_step_out_t asked_ = {};
 };

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "tests/unit/bldc/rig.h"
 
@@ -110,6 +112,34 @@ TEST(Thresholds, HorizontalOnesHaveNoMean)
     }
     for (const pm_q_t u : b.self.u_H) {
         EXPECT_NEAR(real(u), 0, kLeft);
+    }
+}
+
+// Nor by a ramp: intervals of a rotor that speeds up or slows down by 1 % in each.
+TEST(Thresholds, ARampGivesHorizontalOnesNoMean)
+{
+    for (const double ratio : {0.99, 1.01}) {
+        const Bench b{{0, 0, 0}, {0, 0, 0}};
+        thresholds_t self = {};
+        double t_60 = kT60;
+        uint32_t interval[SECTORS] = {};
+        for (uint32_t s = 0; s < SECTORS; ++s) {
+            interval[s] = static_cast<uint32_t>(t_60 *= ratio);
+        }
+        for (int n = 0; n < 600; ++n) {
+            const uint32_t s = static_cast<uint32_t>(n) % SECTORS;
+            interval[s] = static_cast<uint32_t>(t_60 *= ratio);
+            uint32_t sum = 0;
+            for (const uint32_t i : interval) {
+                sum += i;
+            }
+            thresholds_learn(&self, &b.config, s, false, interval, sum, fixed(kSwing, 28));
+            t_60 = n % 30 == 29 ? kT60 : t_60; // again and again
+            if (n % 30 == 29) {
+                std::fill(std::begin(interval), std::end(interval), static_cast<uint32_t>(kT60));
+            }
+        }
+        EXPECT_NEAR(real(self.u_H[0] + self.u_H[1] + self.u_H[2]), 0, 3 * kLeft);
     }
 }
 

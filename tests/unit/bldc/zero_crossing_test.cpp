@@ -24,7 +24,7 @@ double degrees(double counts)
     return 60.0 * counts / kT60;
 }
 
-constexpr zero_expected_t kExpected = {0, kT60, 0, 0};
+constexpr zero_expected_t kExpected = {0, 0, kT60, 0, 0};
 
 struct Sample {
     zero_sample_t measured;
@@ -38,7 +38,7 @@ pm_q_t swing(double factor)
 
 // Sector in which the crossing is at count 0; a sample of the ideal terminal at another.
 struct Bench {
-    zero_crossing_config_t config = {ZERO_LINK, fixed(0.35 / kBase_V, 28), 1000, swing(1), kT60};
+    zero_crossing_config_t config = {ZERO_LINK, fixed(0.35 / kBase_V, 28), 1000, swing(1), kT60, 0};
     uint32_t sector = 0;
     bool reverse = false;
     zero_legs_t legs = ZERO_LEGS_APART;
@@ -138,6 +138,44 @@ TEST(ZeroCrossing, FindsALateCrossingFromItsDistance)
         // a sine instead of the line that the slope stands for
         const double line = std::sin(degrees(first) * kDegree) / kDegree / 60 * kT60;
         EXPECT_NEAR(b.find(first), first - line, kError_counts) << first;
+    }
+}
+
+// A channel with an offset rests above the rail for good behind a downward crossing with both legs low.
+TEST(ZeroCrossing, ACrossingIntoTheRailIsFoundWithAnOffset)
+{
+    for (const double offset_V : {0.0, 0.02, 0.05}) {
+        Bench b;
+        b.sector = 1;
+        b.legs = ZERO_LEGS_LOW;
+        b.open();
+        bool found = false;
+        for (double at = -30000; at < 20000 && !found; at += kSpacing) {
+            Sample s = b.sample(at);
+            for (pm_q_t &v : s.measured.v) {
+                v += fixed(offset_V / kBase_V, 28);
+            }
+            found = b.step(s);
+        }
+        ASSERT_TRUE(found) << offset_V;
+        // by the slope of the last sample, up to kSpacing ahead; the offset is 0.5 degrees of 6 V
+        EXPECT_NEAR(static_cast<int32_t>(b.self.at), 0,
+                    kShape_counts + 1.1 * offset_V / kAmplitude / kDegree / 60 * kT60)
+            << offset_V;
+    }
+}
+
+// The arc of a sine instead of the line, up to 30 degrees: the fifth order is left, 3/40 x^5.
+TEST(ZeroCrossing, FindsALateCrossingOfASineByItsArc)
+{
+    Bench b;
+    b.config.curve = ZERO_CURVE_SINE;
+    for (const double first : {4000.0, 25000.0, 45000.0}) {
+        const double x = std::sin(degrees(first) * kDegree);
+        const double left = (std::asin(x) - x - x * x * x / 6) / kDegree / 60 * kT60;
+        const zero_expected_t due = {0, 0, kT60, static_cast<uint32_t>(-1), 0};
+        EXPECT_NEAR(b.find(first, due), left, kError_counts) << first;
+        EXPECT_LT(left, 0.3 / 60 * kT60); // degrees
     }
 }
 

@@ -498,6 +498,20 @@ TEST(Block, WhatItCannotDoIsRefused)
     EXPECT_EQ(verdict(heavy).param, DRIVE_PARAM_six_step_speed);
 }
 
+// A sine's third harmonic is a figure of its own; a trapezoid has that of its shape, and terminals need none.
+TEST(Block, AThirdHarmonicThatIsNotKnownIsRefused)
+{
+    Fan x;
+    drive_params_t p = x.params();
+    p.zero_reference = CROSSINGS_third_harmonic;
+    p.psi_3 = 0;
+    EXPECT_TRUE(verdict(p).ok) << verdict(p).reason;
+    p.emf_shape = 0;
+    EXPECT_EQ(verdict(p).param, DRIVE_PARAM_psi_3);
+    p.zero_reference = CROSSINGS_virtual_third;
+    EXPECT_TRUE(verdict(p).ok) << verdict(p).reason;
+}
+
 // The drive board has no samples within the period yet.
 TEST(Block, ABoardWithoutItsChannelsRefusesIt)
 {

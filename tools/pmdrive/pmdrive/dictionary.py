@@ -338,7 +338,7 @@ ENTRIES = (
  'ON_PWM'), "10.3.1 #109"),
     Entry(0x2500, 4, "freewheeling", "six_step", "i32", "off", "1", 0, 0, 0, 1, 1, False, True, "application", "none", {0: 'one switch: the diode carries the off time, no braking', 1: 'complementary: the other switch does, the current may flow back'}, 'the off time of a chopped leg', "10.3.1 #109"),
     Entry(0x2500, 5, "emf_shape", "six_step", "i32", "off", "1", 0, 0, 0, 1, 0, False, True, "application", "none", {0: 'sine', 1: 'trapezoid, psi_m of its fundamental'}, 'of the machine', "10.3.2.2 #111"),
-    Entry(0x2500, 6, "zero_reference", "six_step", "i32", "off", "1", 0, 0, 0, 2, 0, False, True, "application", "none", {0: 'by v_dc and the switches', 1: 'mean of the terminals', 2: 'none: the third harmonic at the star point crosses with it'}, 'what the open terminal is compared with', "10.3.2.1 #110"),
+    Entry(0x2500, 6, "zero_reference", "six_step", "i32", "off", "1", 0, 0, 0, 3, 0, False, True, "application", "none", {0: 'by v_dc and the switches', 1: 'mean of the terminals', 2: 'none: the third harmonic at the star point crosses with it', 3: 'none: the third harmonic of the terminals does, their mean less what the legs put there'}, 'what the open terminal is compared with', "10.3.2.1 #110"),
     Entry(0x2500, 7, "six_step_advance", "six_step", "i32", "off", "deg", -3, 0, -20000, 25000, 0, False, True, "application", "none", {}, 'the legs change by so much, electrical, ahead of 30 degrees after the crossing', "10.2.3 #108"),
     Entry(0x2500, 8, "learn_vertical", "six_step", "i32", "off", "1", -3, 0, 0, 300, 50, False, True, "application", "none", {}, ('share of what unlike dividers do to the crossings that is taken off in each '
  'turn; 0: nothing'), "10.4.3.1 #114"),
