@@ -29,6 +29,7 @@ void six_step_slow(six_step_t *self, const six_step_config_t *config)
         third_harmonic_slow(&self->third, &config->third, t_60, zero_crossing_swing(&config->crossing, t_60));
         return;
     }
+    thresholds_slow(&self->thresholds);
     self->expected.seen = sure ? 0 : zero_crossing_swing(&config->crossing, t_60) / 8;
 }
 

@@ -37,3 +37,11 @@ void thresholds_learn(thresholds_t *self, const thresholds_config_t *config, uin
         self->u_H[leg] = learn(self->u_H[leg], config->k_H, h, config->most);
     }
 }
+
+void thresholds_slow(thresholds_t *self)
+{
+    const pm_q_t mean = pm_frac(self->u_H[0] + self->u_H[1] + self->u_H[2], PM_FRAC(0.333333333333333333));
+    for (uint32_t leg = 0; leg < PM_LEGS; leg++) {
+        self->u_H[leg] -= mean;
+    }
+}

@@ -188,7 +188,8 @@ static bool is_slow(const drive_t *drive)
 /* Of crossings that the voltage between the legs belies. */
 static bool is_wrong(block_t *self, const block_config_t *c, pm_q_t v_dc)
 {
-    const pm_q_t e = pm_mul(self->current.u, v_dc) - pm_mul(c->current.R_2, self->i);
+    const pm_q_t lost = self->i < 0 ? -c->lost : c->lost;
+    const pm_q_t e = pm_mul(self->current.u - lost, v_dc) - pm_mul(c->current.R_2, self->i);
     const pm_q_t emf = self->current.emf;
     const bool wrong = c->six_step.pattern.complementary && pm_abs(e - emf) > pm_half(emf);
     self->wrong_ms = wrong ? (uint16_t)(self->wrong_ms + 1U) : 0U;

@@ -190,6 +190,16 @@ struct Statistics {
     }
 };
 
+// Of the leg that has gone, until its current is zero.
+struct Freewheel {
+    Statistics angle, current; // degrees, A
+
+    double i() const
+    {
+        return current.mean();
+    }
+};
+
 class Rig
 {
   public:
@@ -273,10 +283,12 @@ class Rig
                                               omega_e() / kDegree);
         }
         write(out);
+        followed_ = 0;
         run(asked_, sector_);
         sector_ = next_sector_;
         next_sector_ = six_step.commutation.sector;
         asked_ = out;
+        follow(2.0 * machine.plant.inverter.timer_counts);
         plant_run_period(plant_.get());
         plant_truth_t t;
         plant_truth_windings(plant_.get(), &t);
@@ -310,6 +322,8 @@ class Rig
     {
         crossings = {};
         first_past = {};
+        ripples = {};
+        freewheels[0] = freewheels[1] = {};
         torque_ = current_ = 0;
         periods_ = 0;
         commutations = {};
@@ -331,7 +345,11 @@ class Rig
     six_step_config_t config;
     six_step_t six_step = {};
     Statistics crossings, commutations;
-    Statistics first_past; // the samples that have shown the crossings
+    Statistics first_past;   // the samples that have shown the crossings
+    Statistics ripples;      // of the current in periods without commutation and freewheeling, A; if
+    bool watch = false;      // the plant is looked at within the period,
+    bool freewheel = false;  // from a commutation on until the current has ceased
+    Freewheel freewheels[2]; // into even and odd sectors
     Statistics of_sector[SECTORS];
     double crossing_deg = 0;
     double t_s = 0;
@@ -354,11 +372,13 @@ class Rig
 
     static plant_leg_state_t of(pm_leg_t state)
     {
-        return state == PM_LEG_UPPER   ? PLANT_LEG_UPPER
-               : state == PM_LEG_LOWER ? PLANT_LEG_LOWER
-               : state == PM_LEG_HIGH  ? PLANT_LEG_HIGH
-               : state == PM_LEG_LOW   ? PLANT_LEG_LOW
-                                       : PLANT_LEG_PWM;
+        return state == PM_LEG_UPPER            ? PLANT_LEG_UPPER
+               : state == PM_LEG_LOWER          ? PLANT_LEG_LOWER
+               : state == PM_LEG_INVERTED       ? PLANT_LEG_INVERTED
+               : state == PM_LEG_LOWER_INVERTED ? PLANT_LEG_LOWER_INVERTED
+               : state == PM_LEG_HIGH           ? PLANT_LEG_HIGH
+               : state == PM_LEG_LOW            ? PLANT_LEG_LOW
+                                                : PLANT_LEG_PWM;
     }
 
     void commutate(const six_step_out_t &out, uint32_t from)
@@ -369,10 +389,16 @@ class Rig
             driven[k] = pm_leg(out.then, k) != PM_LEG_OFF;
             state[k] = of(pm_leg(out.then, k));
         }
+        follow(out.commutate_at);
         plant_move(plant_.get(), out.commutate_at * count_s_);
         const double e = wrapped_deg(angle_rad() - (90 + 60.0 * from - options.advance_deg) * kDegree);
         commutations.add(e);
         of_sector[from].add(e);
+        const sector_t next = sector_legs(sector_next(from), options.reverse);
+        gone_ = next.open;
+        gone_A_ = std::abs(current(gone_));
+        left_rad_ = gone_A_ > 0 ? angle_rad() : 0;
+        gone_odd_ = !sector_rising(sector_next(from));
         plant_drive_legs(plant_.get(), driven, state);
     }
 
@@ -384,6 +410,7 @@ class Rig
         }
         sampled_ = out.sample_at != 0;
         if (sampled_) {
+            follow(out.sample_at);
             plant_sample_at(plant_.get(), out.sample_at * count_s_, &adc_);
         }
         if (out.commutate_at != 0 && !first) {
@@ -391,9 +418,61 @@ class Rig
         }
     }
 
+    // Up to a count of the period, in parts of it.
+    void follow(double to)
+    {
+        if (freewheel) {
+            cease(to);
+        }
+        followed_ = watch ? followed_ : to;
+        if (!watch) {
+            return;
+        }
+        const double part = machine.plant.inverter.timer_counts / 50.0,
+                     end = 2.0 * machine.plant.inverter.timer_counts;
+        if (followed_ <= 0) {
+            least_ = 1e9;
+            largest_ = -1e9;
+            whole_ = asked_.commutate_at == 0 && current(sector_legs(sector_, options.reverse).open) == 0;
+        }
+        for (; followed_ < to - part; followed_ += part) {
+            plant_move(plant_.get(), followed_ * count_s_);
+            const double i_A = current(sector_legs(sector_, options.reverse).high);
+            least_ = std::min(least_, i_A);
+            largest_ = std::max(largest_, i_A);
+        }
+        if (to >= end && whole_) {
+            ripples.add(largest_ - least_);
+        }
+    }
+
+    // Up to a count of the period, in steps of 0.2 us, while the leg that has gone carries current.
+    void cease(double to)
+    {
+        for (double at = followed_ + 0.2e-6 / count_s_; left_rad_ != 0 && at < to; at += 0.2e-6 / count_s_) {
+            plant_move(plant_.get(), at * count_s_);
+            if (current(gone_) == 0) {
+                freewheels[gone_odd_ ? 1 : 0].angle.add(wrapped_deg(angle_rad() - left_rad_));
+                freewheels[gone_odd_ ? 1 : 0].current.add(gone_A_);
+                left_rad_ = 0;
+            }
+        }
+    }
+
+    double current(int leg) const
+    {
+        plant_truth_t t;
+        plant_truth_windings(plant_.get(), &t);
+        return t.i_A[leg];
+    }
+
     std::unique_ptr<plant_t, void (*)(plant_t *)> plant_{nullptr, &plant_destroy};
     const double period_s_, count_s_, sign_;
     double turn_s_ = 0, torque_ = 0, current_ = 0;
+    double followed_ = 0, least_ = 0, largest_ = 0;
+    bool whole_ = false, gone_odd_ = false;
+    int gone_ = 0;
+    double gone_A_ = 0, left_rad_ = 0;
     int periods_ = 0;
     uint32_t now_ = 0, looked_ = 0, sector_ = 0, next_sector_ = 0;
     bool sampled_ = false;

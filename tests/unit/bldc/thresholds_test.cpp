@@ -113,6 +113,34 @@ TEST(Thresholds, HorizontalOnesHaveNoMean)
     }
 }
 
+// Intervals of a rotor that speeds up: each shorter by 1 % than the one before.
+TEST(Thresholds, SpeedingUpLeavesNoMean)
+{
+    thresholds_t with = {}, twin = {};
+    const Bench b{{0, 0, 0}, {0, 0, 0}};
+    for (uint32_t n = 0; n < 30; ++n) {
+        uint32_t interval[SECTORS] = {}, turn = 0;
+        for (uint32_t k = 0; k < SECTORS; ++k) {
+            interval[(n + k + 1) % SECTORS] = 10000 - 100 * (n + k);
+            turn += 10000 - 100 * (n + k);
+        }
+        for (thresholds_t *self : {&with, &twin}) {
+            thresholds_learn(self, &b.config, n % SECTORS, false, interval, turn, PM_ONE / 4);
+        }
+        thresholds_slow(&with);
+    }
+    for (int leg = 0; leg < 3; ++leg) {
+        EXPECT_NEAR(real(with.u_H[leg]), 0, 5e-5) << leg;
+        EXPECT_GT(std::abs(real(twin.u_H[leg])), 4e-4) << leg;
+    }
+    thresholds_t some = {{1, 2, 3}, {100, 400, -200}};
+    thresholds_slow(&some);
+    EXPECT_EQ(some.u_V[2], 3);
+    EXPECT_EQ(some.u_H[0], 0);
+    EXPECT_EQ(some.u_H[1], 300);
+    EXPECT_EQ(some.u_H[2], -300);
+}
+
 TEST(Thresholds, StayWithinTheirLimit)
 {
     Bench b{{0.5, 0, 0}, {0, 0, 0}};
