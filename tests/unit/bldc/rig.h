@@ -116,6 +116,7 @@ struct Options {
     double blank_s = 3e-6, lead_s = 1e-6, least_s = 6e-6;
     bool third = false;      // crossings of the third harmonic,
     bool told_filter = true; // with the lag of the channel's RC taken off
+    bool late_rule = true;   // a first sample past the crossing counts
     bool reverse = false;
     int strikes = 6;
 };
@@ -273,12 +274,17 @@ class Rig
         const bool before = six_step.crossing.found;
         const uint32_t sector = six_step.crossing.sector;
         looked_ = now_ - 2 * machine.plant.inverter.timer_counts + six_step.plan[0].sample_at;
+        if (!options.late_rule && in.sampled && is_late(in)) {
+            in.sampled = false;
+        }
+        const bool ahead = six_step.crossing.ahead;
         six_step_step(&six_step, &config, &in, &out);
         if (six_step.crossing.found && !(before && six_step.crossing.sector == sector)) {
             const double ago_s = static_cast<double>(now_ - six_step.crossing.at) * count_s_;
             crossing_deg = wrapped_deg(angle_rad() - omega_e() * ago_s -
                                        (60 + 60.0 * six_step.crossing.sector) * kDegree);
             crossings.add(crossing_deg);
+            in_time.add(ahead && six_step.crossing.sector == sector ? 1 : 0);
             first_past.add(crossing_deg + static_cast<double>(looked_ - six_step.crossing.at) * count_s_ *
                                               omega_e() / kDegree);
         }
@@ -320,7 +326,7 @@ class Rig
 
     void clear()
     {
-        crossings = {};
+        crossings = in_time = {};
         first_past = {};
         ripples = {};
         freewheels[0] = freewheels[1] = {};
@@ -345,6 +351,7 @@ class Rig
     six_step_config_t config;
     six_step_t six_step = {};
     Statistics crossings, commutations;
+    Statistics in_time;      // 1: a sample ahead of the crossing was seen
     Statistics first_past;   // the samples that have shown the crossings
     Statistics ripples;      // of the current in periods without commutation and freewheeling, A; if
     bool watch = false;      // the plant is looked at within the period,
@@ -416,6 +423,21 @@ class Rig
         if (out.commutate_at != 0 && !first) {
             commutate(out, from);
         }
+    }
+
+    // Would this sample find a crossing of which none ahead was seen?
+    bool is_late(const six_step_in_t &in) const
+    {
+        zero_crossing_t seen = six_step.crossing;
+        const six_step_plan_t &plan = six_step.plan[0];
+        if (seen.found || seen.ahead || plan.commutate_at != 0) {
+            return false;
+        }
+        const zero_instant_t when = {in.now - 2U * machine.plant.inverter.timer_counts + plan.sample_at,
+                                     static_cast<zero_legs_t>(plan.legs)};
+        zero_expected_t expected = six_step.expected;
+        expected.at = when.at; // due
+        return zero_crossing_step(&seen, &config.crossing, &in.sample, when, &expected);
     }
 
     // Up to a count of the period, in parts of it.
