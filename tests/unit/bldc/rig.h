@@ -430,7 +430,8 @@ class Rig
     {
         zero_crossing_t seen = six_step.crossing;
         const six_step_plan_t &plan = six_step.plan[0];
-        if (seen.found || seen.ahead || plan.commutate_at != 0) {
+        const bool next = plan.commutate_at != 0 && plan.commutate_at < plan.sample_at;
+        if (seen.found || seen.ahead || next) {
             return false;
         }
         const zero_instant_t when = {in.now - 2U * machine.plant.inverter.timer_counts + plan.sample_at,

@@ -66,13 +66,14 @@ Boundary boundary(const Machine &m, const Options &o, double omega)
     for (int n = 0; n < 8; ++n) {
         const double u = 0.5 * (low + high);
         Rig r(m, o, omega);
-        r.freewheel = true;
         r.run_for(5 * turn_s, little);
         r.six_step.expected.seen = 0; // of a drive that has seen its crossings: six_step_slow()
         for (double part = 0.1; part < 0.95; part += 0.1) {
             r.run_for(turn_s, little + part * (u - little));
         }
-        r.measure(8, 15, u);
+        r.run_for(8 * turn_s, u);
+        r.freewheel = true;
+        r.measure(0, 12, u);
         const bool held = !r.six_step.lost && r.in_time.mean() >= 0.5;
         (held ? low : high) = u;
         if (held) {
@@ -105,9 +106,10 @@ Machine machine(const Place &p)
 Rig beyond(const Machine &m, const Options &o, double omega, const Boundary &b, double factor)
 {
     Rig r(m, o, omega);
-    r.freewheel = true;
     r.run_for(10 * 2 * kPi / omega, 0.9 * b.u);
-    r.measure(20, 20, std::min(0.98, factor * b.u));
+    r.run_for(15 * 2 * kPi / omega, std::min(0.98, factor * b.u));
+    r.freewheel = true;
+    r.measure(0, 15, std::min(0.98, factor * b.u));
     return r;
 }
 
