@@ -81,8 +81,9 @@ void injection_reset(injection_t *self, const injection_config_t *config, const 
 void injection_slow(injection_t *self, const injection_config_t *config, const obs_in_t *in);
 obs_out_t injection_last(const injection_t *self, const injection_config_t *config);
 
-/* Of the source that the parameter `injection` names. injection_sees_saliency(): the answer at 45 degrees of
- * error without load is four times the noise, and some saliency is left at rated current. */
+/* Of the source that the parameter `injection` names. injection_sees_saliency(): the carrier is more than dead time and
+ * devices take of it without load, its answer at 45 degrees of error is four times the noise, and some saliency is left at
+ * rated current. make_injection() refuses a carrier below the first. */
 void make_injection(maker_t *m, injection_config_t *c);
 injection_limits_t injection_limits(const maker_t *m);
 bool injection_sees_saliency(const maker_t *m);

@@ -17,7 +17,8 @@ class. What `drive:` of the file says stands above what is chosen here. The rule
 taken from c_A_Wb5 of `electrical:`, or from L_q_rated of `drive:`. L_q may be below L_d.
 
 `injection: 4` or `1` in `drive:` asks for a sine along d or a rotating one: its amplitude, frequency and loops are then chosen by the
-position error that is predicted for each of twelve carriers without load and at rated current (METHODS.md 5.8.3, row 67).
+position error that is predicted for each of twelve carriers without load and at rated current (METHODS.md 5.8.3, row 67). It is
+not asked for where `drive:` tells all three, v_injection, f_injection and injection_bandwidth.
 """
 import argparse
 import importlib
@@ -249,10 +250,13 @@ def drive(x, board, tolerance):
     out["offset_max"] = 0.03 * known["i_full_scale"], "3 % of the converter's range"
     out.update((name, (value, tune.WHY[name])) for name, value in tune.values(known, tolerance=tolerance).items())
     out["flying_start"] = 1.0, "a rotor that wind or its load turns is caught"
-    if told.get("injection") in (carrier.ROTATING, carrier.PULSATING):
+    if told.get("injection") in (carrier.ROTATING, carrier.PULSATING) and not SINE <= told.keys():
         out.update(sine(x, {**{name: value for name, (value, _) in out.items()}, **known, **told}))
     out.update((name, (value, "told")) for name, value in told.items())
     return {name: stored(name, *reason) for name, reason in out.items()}
+
+
+SINE = {"v_injection", "f_injection", "injection_bandwidth"}
 
 
 def sine(x, d):

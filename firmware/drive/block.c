@@ -87,11 +87,17 @@ static pm_q_t most_of(const drive_t *drive)
     return pm_max(i, drive->config.i_max / 8); /* with less it would not keep its speed */
 }
 
+/* Between the two legs, of the speed that the crossings say. */
+static pm_q_t emf_of(const drive_t *drive)
+{
+    const pm_q_t psi = pm_mul(drive->config.machine.psi_m, LINE_OF_PHASES);
+    return pm_mul_sat(psi, pm_abs(drive->block.pll.omega));
+}
+
 static void prepare(drive_t *drive, pm_q_t i_q)
 {
     block_t *self = &drive->block;
-    const pm_q_t psi = pm_mul(drive->config.machine.psi_m, LINE_OF_PHASES);
-    const pm_q_t emf = pm_mul(psi, pm_abs(self->pll.omega));
+    const pm_q_t emf = emf_of(drive);
     const pm_q_t i = pm_mul(i_q, LINE_OF_Q);
     line_current_prepare(&self->current, self->six_step.reverse ? -i : i, emf,
                          pm_max(drive->status.v_dc, V_DC_LEAST));
@@ -185,15 +191,23 @@ static bool is_slow(const drive_t *drive)
     return other && drive->command.mode != DRIVE_MODE_TORQUE && pm_abs(self->pll.omega) < c->omega_off;
 }
 
-/* Of crossings that the voltage between the legs belies. */
-static bool is_wrong(block_t *self, const block_config_t *c, pm_q_t v_dc)
+/* Beyond speed_trip. */
+static bool is_fast(const block_t *self)
 {
-    const pm_q_t lost = self->i < 0 ? -c->lost : c->lost;
-    const pm_q_t e = pm_mul(self->current.u - lost, v_dc) - pm_mul(c->current.R_2, self->i);
-    const pm_q_t emf = self->current.emf;
+    return pm_abs(self->pll.omega) > PM_ONE;
+}
+
+/* Of crossings that the voltage between the legs belies: at once where they would be an over-speed. */
+static bool is_wrong(drive_t *drive)
+{
+    const block_config_t *c = &drive->config.block;
+    block_t *self = &drive->block;
+    const pm_q_t taken = self->i < 0 ? -c->lost : c->lost;
+    const pm_q_t e = pm_mul(self->current.u - taken, drive->status.v_dc) - pm_mul(c->current.R_2, self->i);
+    const pm_q_t emf = emf_of(drive);
     const bool wrong = c->six_step.pattern.complementary && pm_abs(e - emf) > pm_half(emf);
     self->wrong_ms = wrong ? (uint16_t)(self->wrong_ms + 1U) : 0U;
-    return self->wrong_ms > WRONG_MS;
+    return self->wrong_ms > WRONG_MS || (wrong && is_fast(self));
 }
 
 /* A rotor that is held shows no EMF: noise may make the crossings of a start, but not for longer than is_wrong() takes. */
@@ -215,6 +229,9 @@ block_result_t block_slow(drive_t *drive)
     }
     six_step_slow(&self->six_step, &c->six_step);
     look(self, c);
+    if (young && is_fast(self)) { /* from rest: no rotor was there so soon */
+        return BLOCK_STALLED;
+    }
     if (young) {
         const pm_q_t i_q = self->six_step.reverse ? -c->i_start : c->i_start;
         speed_control_reset(&drive->speed, self->pll.omega, i_q);
@@ -225,7 +242,7 @@ block_result_t block_slow(drive_t *drive)
     if (is_slow(drive)) {
         return BLOCK_SLOW;
     }
-    if (is_wrong(self, c, drive->status.v_dc)) {
+    if (is_wrong(drive)) {
         return lost(drive);
     }
     if (drive->block_ms < BLOCK_SETTLED_MS) {

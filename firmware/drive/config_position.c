@@ -31,9 +31,7 @@ static int32_t per_span(maker_t *m)
  * devices take may not be compensated where a leg's current is near zero: that may count 0.15, half of what means lost. */
 static pm_unit_t tied_share(maker_t *m)
 {
-    const pm_num_t dead =
-        mul3(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm), si(m, DRIVE_PARAM_v_dc_nominal));
-    const pm_num_t lost = pm_num_add(dead, si(m, DRIVE_PARAM_device_drop));
+    const pm_num_t lost = pm_num_add(dead_voltage(m), si(m, DRIVE_PARAM_device_drop));
     const pm_num_t sure =
         mul3(pm_num_ratio(3, 10), angular(m, DRIVE_PARAM_flux_bandwidth), si(m, DRIVE_PARAM_psi_m));
     return pm_num_cmp(lost, sure) > 0

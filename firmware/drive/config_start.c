@@ -3,6 +3,8 @@
 #include "firmware/drive/procedures/procedure.h"
 #include "firmware/params/maker.h"
 
+#define PERIODS_LEAST 16U
+
 /* The procedure that position_pulses names. */
 static procedure_id_t pulses_of(const drive_params_t *params)
 {
@@ -57,14 +59,19 @@ static uint8_t pole_of(const drive_params_t *params)
 }
 
 #if PM_HAS(pulsating_sine)
-/* Dead time bends a carrier that it takes more of than a quarter into a second harmonic as large as that of the poles. */
-PM_APART static void check_second_harmonic(maker_t *m)
+/* Dead time bends a carrier that it takes more of than a quarter into a second harmonic as large as that of the poles. So
+ * it does to one of few periods: it takes from a current at its rising edge, from the opposite one at the falling edge half
+ * a period later, so that half cycles are not alike. */
+PM_APART static void check_second_harmonic(maker_t *m, uint32_t n)
 {
-    const pm_num_t lost =
-        mul3(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm), si(m, DRIVE_PARAM_v_dc_nominal));
-    if (m->params->polarity == 3 &&
-        pm_num_cmp(pm_num_mul(lost, pm_num(4)), si(m, DRIVE_PARAM_v_injection)) > 0) {
+    if (m->params->polarity != 3) {
+        return;
+    }
+    if (pm_num_cmp(pm_num_mul(dead_voltage(m), pm_num(4)), si(m, DRIVE_PARAM_v_injection)) > 0) {
         refuse(m, DRIVE_PARAM_v_injection, "polarity 3 needs four times what dead time takes");
+    }
+    if (n < PERIODS_LEAST) {
+        refuse(m, DRIVE_PARAM_f_injection, "polarity 3 needs 16 periods of the PWM in one of the carrier");
     }
 }
 #endif
@@ -85,7 +92,7 @@ static void make_carrier(maker_t *m, drive_config_t *config)
     case INJECTION_pulsating_sine:
         carrier = polarity_by_current(m, c->pulsating_sine.sine.n, c->pulsating_sine.h_d);
         seen = true;
-        check_second_harmonic(m);
+        check_second_harmonic(m, c->pulsating_sine.sine.n);
         break;
 #endif
 #if PM_HAS(zero_rotating)

@@ -49,6 +49,15 @@ static pm_dq_t with_margin(const drive_t *drive, pm_dq_t i)
     return (pm_dq_t){.d = pm_sqrt(pm_mul(length, length) - pm_mul(i.q, i.q)), .q = i.q};
 }
 
+/* EMF of a rotor whose position is known, beside that of its speed: what R, L and psi_m are not known to. Damping must not take
+ * it for a swing. */
+static pm_q_t unexplained(const drive_t *drive, pm_ab_t v, pm_dq_t i)
+{
+    const pm_machine_t *m = &drive->config.machine;
+    const pm_q_t psi_d = m->psi_m + pm_mul(m->L_d, i.d);
+    return v.beta - pm_mul(drive->follow.R, i.q) - pm_mul(drive->omega_ramp, psi_d);
+}
+
 /* The torque stays as it is. */
 void open_loop_resume(drive_t *drive)
 {
@@ -67,6 +76,7 @@ void open_loop_resume(drive_t *drive)
                     drive->omega_ramp);
     follow_resume(&drive->follow);
     begin(drive);
+    drive->emf_open = unexplained(drive, v, i);
 }
 
 static void hand_over(drive_t *drive)

@@ -121,4 +121,10 @@ static inline pm_num_t angular(const maker_t *m, drive_param_id_t id)
     return pm_num_mul(two_pi, si(m, id));
 }
 
+/* Voltage that dead time takes of a leg, beside the drops of its devices, V. */
+static inline pm_num_t dead_voltage(const maker_t *m)
+{
+    return mul3(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm), si(m, DRIVE_PARAM_v_dc_nominal));
+}
+
 #endif

@@ -16,7 +16,7 @@ FUNCTIONS = {
     "floor": math.floor,
     "ceil": math.ceil,
 }
-CONSTANTS = {"pi": math.pi, "true": True, "false": False}
+CONSTANTS = {"pi": math.pi, "true": True, "false": False, "untold": None}  # what `told` leaves to tools/tune.py
 BINARY = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,

@@ -71,6 +71,11 @@ def laid_over(machine, sections):
     return result
 
 
+def chosen(sections):
+    """Without what is `untold`."""
+    return {name: {key: x for key, x in entries.items() if x is not None} for name, entries in sections.items()}
+
+
 class Campaign(CampaignFile):
     """A file, and its runs."""
 
@@ -126,7 +131,7 @@ class Campaign(CampaignFile):
         names = dict(drawn)
         for section, entries in truth.items():
             names.update((f"{section}.{key}", value) for key, value in entries.items())
-        told = laid_over({"name": name, **truth}, self._evaluated(self.told, names, number))
+        told = laid_over({"name": name, **truth}, chosen(self._evaluated(self.told, names, number)))
         try:
             completed = self._completed(told)
         except tune.UsageError as error:

@@ -66,6 +66,9 @@ PM_APART pm_procedure_t procedure_lock_slow(drive_t *drive)
         drive->position.pll.theta = APART;
         return PM_RUNNING;
     }
+    if (pm_abs(drive->position.pll.omega) > PM_ONE / 2) {
+        return PM_FAILED_SALIENCY;
+    }
     drive->sequence.theta = drive->position.pll.theta;
     return self->ms < CLOSE_MS ? PM_RUNNING : PM_DONE;
 }

@@ -10,7 +10,7 @@
  *
  * Each look 24 ms, of which the first 16 for transients; closed loop 40 ms: 90 ms. No current but the carrier's; no
  * movement. PM_FAILED_SALIENCY: the answer is below five sigma or two fifths of what the machine's data promise, so that
- * load may take all of it;
+ * load may take all of it, or the closed loop turns as fast as half of speed_trip, as one that nothing holds;
  * PM_FAILED_NO_CURRENT: the carrier's own current is, at both angles. 45 degrees apart, one of them shows more than a
  * quarter up to L_q = 7 L_d.
  * Sources whose carrier stands in the stator are refused: these detect I_p first, at a known angle.

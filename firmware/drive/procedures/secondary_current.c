@@ -7,7 +7,7 @@
 
 #define LOCK_MS 30U
 #define MORE    4U /* times the number of values at most */
-#define SHARE   2048
+#define SHARE   1024
 
 void procedure_secondary_current_begin(drive_t *drive)
 {

@@ -289,6 +289,41 @@ TEST(Block, LostWithin40MillisecondsOfItsStartIsAStall)
     }
 }
 
+// Crossings that noise makes may say any speed; what the legs say of the EMF tells it from a rotor that is too fast.
+TEST(Block, AnOverSpeedThatTheVoltageBeliesIsNone)
+{
+    for (const auto &[ms, fault] : {std::pair{20, DRIVE_FAULT_STALL}, {45, DRIVE_FAULT_POSITION_LOST}}) {
+        Fan x;
+        x.params().resync_tries = 0;
+        x.params().flying_start = 0;
+        x.enable();
+        x.speed_rel(0.4);
+        x.run_s(1.3);
+        ASSERT_EQ(x.fault(), DRIVE_FAULT_NONE);
+        ASSERT_EQ(x.drive().stage, STAGE_SIX_STEP);
+        x.drive().block_ms = static_cast<uint16_t>(ms);
+        x.drive().block.six_step.commutation.sum /= 5;
+        x.run_s(0.002);
+        EXPECT_EQ(x.fault(), fault) << ms;
+        EXPECT_FALSE(x.driven());
+    }
+}
+
+TEST(Block, ARotorThatIsThrownBeyondItsTripIsAnOverSpeed)
+{
+    Fan x;
+    x.enable();
+    x.speed_rel(1);
+    x.run_s(1.5);
+    ASSERT_EQ(x.drive().stage, STAGE_SIX_STEP);
+    for (int ms = 0; ms < 400 && x.fault() == DRIVE_FAULT_NONE; ++ms) {
+        plant_set_speed(x.plant(), (1 + 0.002 * ms) * kRated_rad_s);
+        x.run_s(1e-3);
+    }
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_OVER_SPEED);
+    EXPECT_FALSE(x.driven());
+}
+
 TEST(Block, AStartThatIsCalledOffIsNotTriedAgain)
 {
     Fan x;

@@ -123,6 +123,9 @@ const std::vector<Cross> kCrosses = {
     {"open-loop current above i_max", {{DRIVE_PARAM_i_open_loop, 5.1}}, DRIVE_PARAM_i_open_loop},
     {"pulses above the trip", {{DRIVE_PARAM_i_pulse, 9.1}}, DRIVE_PARAM_i_pulse},
     {"carrier leaves no voltage", {{DRIVE_PARAM_v_injection, 150}}, DRIVE_PARAM_v_injection},
+    {"carrier within what dead time and devices take", // 4/3 of 6 V and 1 V
+     {{DRIVE_PARAM_start_method, 1}, {DRIVE_PARAM_v_injection, 9.33}},
+     DRIVE_PARAM_v_injection},
     {"amplifiers that settle longer than half a period",
      {{DRIVE_PARAM_t_settle, 8e-6}, {DRIVE_PARAM_f_pwm, 30000}, {DRIVE_PARAM_timer_counts, 2833}},
      DRIVE_PARAM_t_settle},
@@ -547,6 +550,27 @@ TEST(Config, ACarrierThatTheLegsCannotMakeAboutHalfDutyIsRefused)
     };
     EXPECT_TRUE(refused(100000).ok);
     EXPECT_EQ(refused(200000).param, DRIVE_PARAM_v_injection);
+}
+
+// 4/3 of 6 V of dead time and 1 V of a device. Left to itself the drive then starts without injection.
+TEST(Config, ACarrierThatDeadTimeTakesDoesNotLead)
+{
+    const auto made = [](int32_t start_method, int32_t v_injection_mV) {
+        drive_params_t p;
+        drive_params_default(&p);
+        p.start_method = start_method;
+        p.v_injection = v_injection_mV;
+        drive_config_t c = {};
+        const drive_result_t result = drive_configure(&c, &p, PM_CHANNELS);
+        EXPECT_EQ(result.ok || result.param == DRIVE_PARAM_v_injection, true) << result.reason;
+        return result.ok ? c.injection : -1;
+    };
+    for (const int32_t asked : {1, 3}) {
+        EXPECT_EQ(made(asked, 9333), -1);
+        EXPECT_EQ(made(asked, 9334), 1);
+    }
+    EXPECT_EQ(made(0, 9333), 0);
+    EXPECT_EQ(made(2, 9333), 0);
 }
 
 // Without dead time there is nothing that the capacitance of a leg could give back.

@@ -359,6 +359,31 @@ TEST(OpenLoop, ResumeKeepsTorqueAndVoltage)
     }
 }
 
+// A magnet told a tenth too strong shows a tenth less EMF than the speed, before and after: no swing, to which the vector would yield.
+TEST(OpenLoop, WhatIsToldWrongIsNoSwingOfTheVectorResumed)
+{
+    Drive x = started();
+    slow(x, kAlign_ms);
+    const pm_machine_t &m = x.d.config.machine;
+    const double omega = 0.1, R = real(x.d.follow.R), emf = 0.9 * omega * real(m.psi_m);
+    const Complex i = {0, 0.01};
+    x.d.stage = STAGE_VECTOR;
+    x.d.position.pll.omega = bench::fixed(omega, 28);
+    x.d.status.i = bench::dq(i);
+    x.d.voltage.v = {bench::fixed(-omega * real(m.L_q) * i.imag(), PM_WIDE_BITS),
+                     bench::fixed(R * i.imag() + emf, PM_WIDE_BITS)};
+    open_loop_resume(&x.d);
+    const double vector = real(x.d.i_open);
+    x.d.status.i = bench::dq({vector, 0});
+    x.d.voltage.v = {bench::fixed(R * vector, PM_WIDE_BITS),
+                     bench::fixed(omega * real(m.L_d) * vector + emf, PM_WIDE_BITS)};
+    open_loop_hold(&x.d);
+    EXPECT_NEAR(real(x.d.omega_open), omega, 0.01 * omega);
+    x.d.emf_open = 0;
+    open_loop_hold(&x.d);
+    EXPECT_GT(std::abs(real(x.d.omega_open) - omega), 0.05 * omega) << "of which the vector would run ahead";
+}
+
 // The observer falls back to the open loop only without injection, and when both reference and estimate are below
 // omega_low (0.117 of the base), whichever way they turn.
 TEST(OpenLoop, FallsBackWhenReferenceAndEstimateAreSlow)

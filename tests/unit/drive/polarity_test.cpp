@@ -184,6 +184,22 @@ TEST(Lock, RefusesAMachineWithoutSaliency)
     }
 }
 
+// What turns is the estimate: no over-speed of the rotor, which is at rest.
+TEST(Lock, ALoopThatRunsAwayIsRefused)
+{
+    drive_params_t p = sine(1);
+    p.start_fallback = 0;
+    Start x(ipm(), p, 1.0);
+    x.run([](const drive_t &d) { return d.sequence.procedure == PROCEDURE_lock && !lock_looks(&d.beside.lock); });
+    x.drive().position.pll.omega = PM_Q(0.7);
+    for (int k = 0; k < 20; ++k) {
+        x.period();
+    }
+    EXPECT_EQ(drive_status(&x.drive())->refusal.procedure, PROCEDURE_lock);
+    EXPECT_EQ(drive_status(&x.drive())->refusal.reason, PM_FAILED_SALIENCY);
+    EXPECT_EQ(drive_status(&x.drive())->fault, DRIVE_FAULT_POSITION_NOT_FOUND);
+}
+
 // 1.237 and 1.082 in double precision.
 void expect_ratio(const plant_config_t &plant, const drive_params_t &p, double ratio)
 {
@@ -461,6 +477,13 @@ TEST(Polarity, AParameterThatCannotBeIsRefusedByName)
                   p.v_injection = 23000;
               }),
               DRIVE_PARAM_v_injection);
+    EXPECT_EQ(refused([](drive_params_t &p) { // 15 periods of the PWM in one of the carrier
+                  p.polarity = 3;
+                  p.injection = INJECTION_pulsating_sine;
+                  p.injection_bandwidth = 7000;
+                  p.f_injection = 10000000 / 15;
+              }),
+              DRIVE_PARAM_f_injection);
     EXPECT_EQ(refused([](drive_params_t &p) {
                   p.position_find = 2;
                   p.v_injection = 200000;

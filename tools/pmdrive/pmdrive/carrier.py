@@ -268,6 +268,7 @@ class Holds:
 
 SHARES = (1 / 4, 1 / 2, 3 / 4)        # of the largest carrier that the link leaves room for
 PERIODS = (8, 10, 20, 30)             # N
+PERIODS_POLE = 16                     # least that the drive finds the pole with by the second harmonic, polarity: 3
 LOOPS_HZ = (10.0, 7.0)
 SLOWER = 4.0                          # speed control than the position
 ERROR_DEG = 3.0                       # largest error that is accepted: METHODS.md 5.8.3
@@ -293,10 +294,11 @@ def grid(make, d, top):
     """Row 67: {(V, Hz): error} of twelve carriers, and for the fastest loop that any of them suits the one that takes the least flux
     and so the least current: (loop, map, (V, Hz) or None)."""
     found = {}
+    least = PERIODS_POLE if d.get("polarity") == 3 else 0
     for loop in LOOPS_HZ:
         found = {}
         for share in SHARES:
-            for N in PERIODS:
+            for N in (N for N in PERIODS if N >= least):
                 v, f = float(f"{share * top:.3g}"), d["f_pwm"] / N
                 found[v, f] = error_deg(make, {**d, "v_injection": v, "f_injection": f, "injection_bandwidth": loop,
                                                "speed_bandwidth": loop / SLOWER}, rated_i_q(d))
