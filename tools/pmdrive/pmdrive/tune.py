@@ -35,7 +35,7 @@ WHY = {
                        "saliency adds to the torque",
     "acceleration": "0.3 of rated torque, over what saliency adds to it; at most what the slower position loop "
                     "follows 0.12 rad behind",
-    "flux_bandwidth": "follows 0.8 of rated torque within a radian",
+    "flux_bandwidth": "follows 0.8 of rated torque within half a radian",
     "flux_gain": "half where the machine saturates; damping costs nothing where it does not",
     "speed_low": "with injection 15 % of rated speed; without 4 %, and half of speed_high",
     "speed_high": "with injection 27 % of rated speed; without 8 %, and an EMF above what a leg loses and R i is off by",
@@ -165,7 +165,7 @@ def values(x, bandwidth=None, tolerance=MEASURED):
     torque = 1.5 * x["pole_pairs"] * x["psi_m"] * x["i_rated"]
     jerk = torque / x["J"]  # rad/s2 at rated torque
     v_injection, leads = _injection(x, tolerance)
-    position_Hz = min(max(math.sqrt(0.8 * jerk * x["pole_pairs"]) / (2 * math.pi), 25.0), 60.0)
+    position_Hz = min(max(math.sqrt(1.6 * jerk * x["pole_pairs"]) / (2 * math.pi), 25.0), 60.0)
     slower = min(position_Hz, INJECTION_HZ) if leads else position_Hz
     behind = LAG * (2 * math.pi * slower) ** 2 / x["pole_pairs"]
     ripple = x["v_dc_nominal"] / (x["L_d"] * x["f_pwm"])  # of the current by the pulses: light load must be beyond it
