@@ -6,7 +6,7 @@
 static pm_q_t half_volts(const freewheeling_config_t *config, const freewheeling_in_t *in)
 {
     pm_q_t share = PM_ONE; /* of v_dc */
-    if (in->pattern != PATTERN_H_PWM_L_PWM) {
+    if (!pattern_chops_both(in->pattern)) {
         share = pattern_chops_incoming(in->pattern, in->sector) ? in->u : 2 * PM_ONE - in->u;
     }
     return pm_mean(pm_mul_sat(share, in->v_dc), pm_mul_sat(in->omega, config->emf));

@@ -1,11 +1,11 @@
-/* How far the rotor turns while the current of the leg that has gone decays, predicted (METHODS.md 10.5.1; row 116), and the
- * current up to which that leaves the crossing to be seen (10.5.2).
+/* How far the rotor turns while the current of the leg that has gone decays, predicted (METHODS.md 10.5.1, 10.5.3 to 10.5.5; rows 116,
+ * 118, 119, 120), and the current up to which that leaves the crossing to be seen (10.5.2, 10.6; rows 117, 121).
  *
  *   theta_f = omega (L / R) ln(1 + 3 R i / x)
  *   x = u v_dc + 2 E          the leg that has come is chopped:     H_PWM_L_ON into odd sectors, H_ON_L_PWM into even
  *                             ones, PWM_ON
  *   x = (2 - u) v_dc + 2 E    it is not:                            the other half of these, ON_PWM
- *   x = v_dc + 2 E            both are:                             H_PWM_L_PWM
+ *   x = v_dc + 2 E            both are:                             H_PWM_L_PWM, alternating or not
  * i before the commutation, L of a phase less mutual, E flat top of a trapezoid; a sine has 1.5 E_m for 2 E. E is
  * that of the commutation: at rated speed, where it turns on meanwhile, the formula is some 8 % short. Computed as
  *   theta_f = 2 omega L w / R (1 + w^2/3 + w^4/5 + w^6/7),   w = 3 R i / (2 x + 3 R i)

@@ -8,6 +8,7 @@ static uint32_t chopped(pattern_id_t id, uint32_t sector)
 {
     static const uint8_t of[PATTERN_COUNT][2] = {
         {HIGH | LOW, HIGH | LOW}, {HIGH, HIGH}, {LOW, LOW}, {LOW, HIGH}, {HIGH, LOW},
+        {HIGH | LOW, HIGH | LOW},
     };
     return of[id][sector & 1U];
 }
@@ -28,8 +29,12 @@ uint16_t pattern_states(const pattern_config_t *config, uint32_t sector, bool re
     if ((chops & HIGH) != 0U) {
         state[at.high] = config->complementary ? PM_LEG_PWM : PM_LEG_UPPER;
     }
-    if ((chops & LOW) != 0U) {
+    if (config->id == PATTERN_H_PWM_L_PWM) {
+        state[at.low] = config->complementary ? PM_LEG_INVERTED : PM_LEG_LOWER_INVERTED;
+    } else if ((chops & LOW) != 0U) {
         state[at.low] = config->complementary ? PM_LEG_PWM : PM_LEG_LOWER;
+    } else {
+        /* closed */
     }
     return pm_legs_of(state[0], state[1], state[2]);
 }
@@ -37,16 +42,17 @@ uint16_t pattern_states(const pattern_config_t *config, uint32_t sector, bool re
 /* Share for which a chopped switch is on. */
 static pm_q_t on_share(const pattern_config_t *config, pm_q_t u)
 {
-    return config->id == PATTERN_H_PWM_L_PWM ? pm_mean(PM_ONE, u) : u;
+    return pattern_chops_both(config->id) ? pm_mean(PM_ONE, u) : u;
 }
 
 void pattern_duties(const pattern_config_t *config, uint32_t sector, bool reverse, pm_q_t u, pm_legs_t *out)
 {
     const sector_t at = sector_legs(sector, reverse);
     const pm_q_t D = on_share(config, u);
+    const pm_q_t low = config->id == PATTERN_H_PWM_L_PWM ? D : PM_ONE - D;
     out->duty[at.high] = D;
-    out->duty[at.low] = PM_ONE - D;
-    out->duty[at.open] = sector_rising(sector) ? D : PM_ONE - D;
+    out->duty[at.low] = low;
+    out->duty[at.open] = sector_rising(sector) ? D : low;
 }
 
 pattern_sample_t pattern_sample(const pattern_config_t *config, uint32_t sector, pm_q_t u)
@@ -57,7 +63,9 @@ pattern_sample_t pattern_sample(const pattern_config_t *config, uint32_t sector,
     const int32_t on = pm_frac(u, (pm_frac_t)pm_shl(N, 33 - PM_Q_BITS));
     int32_t at;
     zero_legs_t legs = ZERO_LEGS_APART;
-    if (chops == (HIGH | LOW)) { /* the first of two pulses, from N - D to D */
+    if (config->id == PATTERN_H_PWM_L_PWM) {
+        at = N + D - lead;
+    } else if (chops == (HIGH | LOW)) { /* the first of two pulses, from N - D to D */
         const bool enough = pm_half(on) >= config->least;
         at = (enough ? D : N - D) - lead;
         legs = enough ? ZERO_LEGS_APART : ZERO_LEGS_LOW;

@@ -1,21 +1,28 @@
-/* Which switches are chopped in block commutation (METHODS.md 10.3.1).
+/* Which switches are chopped in block commutation (METHODS.md 10.3.1; row 109).
  *
  *   pattern         first 60 degrees   last 60 degrees      chopped, of the two legs that conduct
- *   H_PWM_L_PWM     chopped            chopped              both, the pulses of the low one shifted by half a period
+ *   H_PWM_L_PWM     chopped            chopped              both, at once
  *   H_PWM_L_ON      high one chopped, low one on            the high one
  *   H_ON_L_PWM      high one on, low one chopped            the low one
  *   PWM_ON          chopped            on                   the one that has come
  *   ON_PWM          on                 chopped              the one that has been there
+ *   H_PWM_L_PWM_ALTERNATING                                 both, the pulses of the low one shifted by half a period
  *                                                           (60 degrees: of the 120 a switch conducts)
  * u is the mean voltage between the two legs over v_dc, 0 ... 1. A switch is on for
  *   D = u                with one of the legs chopped
  *   D = (1 + u) / 2      with both: line voltage v_dc for (2 D - 1) T in two pulses, else 0
- * The line voltage of all five is +v_dc or 0: with a carrier that both legs share the legs of H_PWM_L_PWM are at the
- * same rail between the pulses, and the ripple has twice the carrier's frequency.
+ * Between the pulses the line voltage is 0, of H_PWM_L_PWM -v_dc: its low leg is PM_LEG_INVERTED (NEEDS_ONE_SWITCH). Ripple of
+ * the current, peak to peak, over v_dc T / (2 L):
+ *   H_PWM_L_PWM               2 D (1 - D) = (1 - u^2) / 2
+ *   one leg chopped           u (1 - u)
+ *   H_PWM_L_PWM_ALTERNATING   u (1 - u) / 2, at twice the carrier's frequency
+ * What the ripple costs in H_PWM_L_PWM buys the longest on time, half of a period and more at any u. Alternating has the
+ * shortest, half of u.
  * Complementary: the other switch of a chopped leg is closed for the rest, so the current may also flow back
  * (braking, no load). Else its diode carries the current (NEEDS_ONE_SWITCH), which may cease.
  *
- * Sample instants, counts in a period 0 ... 2 N with the high leg's pulse about N, the low leg's about 0:
+ * Sample instants, counts in a period 0 ... 2 N with the high leg's pulse about N, the low leg's about 0, of
+ * H_PWM_L_PWM about N:
  *   late in the on time    the driven legs are apart; `lead` before the switch opens
  *   late in the off time   both are at one rail, where the on time is shorter than `least`
  *
@@ -39,6 +46,7 @@ typedef enum {
     PATTERN_H_ON_L_PWM,
     PATTERN_PWM_ON,
     PATTERN_ON_PWM,
+    PATTERN_H_PWM_L_PWM_ALTERNATING,
     PATTERN_COUNT
 } pattern_id_t;
 
@@ -52,6 +60,11 @@ typedef struct {
 
 /* PM_LEGS_... of a sector. */
 uint16_t pattern_states(const pattern_config_t *config, uint32_t sector, bool reverse);
+
+static inline bool pattern_chops_both(pattern_id_t id)
+{
+    return id == PATTERN_H_PWM_L_PWM || id == PATTERN_H_PWM_L_PWM_ALTERNATING;
+}
 
 /* The leg that has come with this sector is chopped. */
 bool pattern_chops_incoming(pattern_id_t id, uint32_t sector);

@@ -28,6 +28,7 @@ void six_step_slow(six_step_t *self, const six_step_config_t *config)
     const uint32_t t_60 = self->expected.t_60;
     const bool sure = self->commutation.young == 0U && t_60 < 2U * SAMPLES * config->pattern.half_period;
     const pm_q_t swing = zero_crossing_swing(&config->crossing, t_60);
+    thresholds_slow(&self->thresholds);
     if (config->compared == 0) {
         phase_compensation_slow(&self->phase, &self->thresholds, self->reverse, t_60, swing);
     }

@@ -127,8 +127,8 @@ static inline void six_step_from_mean(const six_step_t *self, zero_sample_t *sam
 void six_step_step(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in,
                    six_step_out_t *out);
 
-/* At 1 kHz: lag of the third harmonic, shifts of its crossings, and what a sector must show of its swing, an eighth, for its
- * crossing to be one. Without
+/* At 1 kHz: lag of the third harmonic, shifts of its crossings, the mean of thresholds, and what a sector must show of its swing,
+ * an eighth, for its crossing to be one. Without
  * the call a rotor that has stopped may pass for one that turns. */
 void six_step_slow(six_step_t *self, const six_step_config_t *config);
 

@@ -23,6 +23,7 @@ static void make_pattern(maker_t *m, pattern_config_t *c)
     }
     c->least = (uint16_t)pm_min(blind, p->timer_counts);
     require(m, c->complementary ? 0U : NEEDS_ONE_SWITCH, DRIVE_PARAM_freewheeling);
+    require(m, c->id == PATTERN_H_PWM_L_PWM ? NEEDS_ONE_SWITCH : 0U, DRIVE_PARAM_pattern);
 }
 
 /* What the open terminal rises by, per psi_m w and rad, times pi / 3. */

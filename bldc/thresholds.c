@@ -35,9 +35,13 @@ void thresholds_learn(thresholds_t *self, const thresholds_config_t *config, uin
         const int32_t D = i_2 - i_0 + (int32_t)interval[sector] - (int32_t)interval[sector_next(s2)];
         const pm_q_t h = pm_unit(swing, share(reverse ? -D : D, turn));
         self->u_H[leg] = learn(self->u_H[leg], config->k_H, h, config->most);
-        const pm_q_t mean = pm_frac(self->u_H[0] + self->u_H[1] + self->u_H[2], PM_FRAC(1.0 / 3));
-        for (uint32_t k = 0; k < PM_LEGS; k++) {
-            self->u_H[k] -= mean;
-        }
+    }
+}
+
+void thresholds_slow(thresholds_t *self)
+{
+    const pm_q_t mean = pm_frac(self->u_H[0] + self->u_H[1] + self->u_H[2], PM_FRAC(1.0 / 3));
+    for (uint32_t leg = 0; leg < PM_LEGS; leg++) {
+        self->u_H[leg] -= mean;
     }
 }

@@ -13,10 +13,10 @@
  *   u_H += k_H swing D_H / T          D_H = i_2 - i_0 + i_5 - i_3
  * with swing of zero_crossing.h, so that k_V and k_H are the share of a deviation that is taken off in a turn: 0.05
  * settles within 100 turns. Of on times: deviations are others in the off time, whose crossings they are not used for; they are
- * learnt from turns that have none of these. Horizontal deviations show by their differences only: their mean is taken as zero, and taken off, as
- * a ramp of the speed moves all three alike.
+ * learnt from turns that have none of these. Horizontal deviations show by their differences only: their mean is taken as zero.
+ * A rotor that speeds up moves all three alike, 0.3 degrees in a start; thresholds_slow() takes that off.
  *
- * Q28 per-unit; each value is held within +-most. thresholds_learn(): 90 instructions with a division,
+ * Q28 per-unit; each value is held within +-most. thresholds_learn(): 76 instructions with a division,
  * after a crossing if all six of the last turn are good. thresholds_at(): 17.
  * Tests: tests/unit/bldc/thresholds_test.cpp, six_step_test.cpp. */
 #ifndef BLDC_THRESHOLDS_H
@@ -46,6 +46,9 @@ pm_q_t thresholds_at(const thresholds_t *self, uint32_t sector, bool reverse);
 /* After the crossing in `sector`; interval[s] ended with that in sector s. */
 void thresholds_learn(thresholds_t *self, const thresholds_config_t *config, uint32_t sector, bool reverse,
                       const uint32_t interval[], uint32_t turn, pm_q_t swing);
+
+/* At 1 kHz: no mean of u_H. */
+void thresholds_slow(thresholds_t *self);
 
 #ifdef __cplusplus
 }

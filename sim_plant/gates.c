@@ -81,6 +81,10 @@ static gate_t command_at(const gates_t *gates, int k, double late_s)
         return high ? GATE_HIGH : GATE_OFF;
     case PLANT_LEG_LOWER:
         return high ? GATE_OFF : GATE_LOW;
+    case PLANT_LEG_INVERTED:
+        return high ? GATE_LOW : GATE_HIGH;
+    case PLANT_LEG_LOWER_INVERTED:
+        return high ? GATE_LOW : GATE_OFF;
     default:
         return high ? GATE_HIGH : GATE_LOW;
     }
@@ -90,7 +94,7 @@ static gate_t command_at(const gates_t *gates, int k, double late_s)
 static double closing_at_s(gates_t *gates, int k, gate_t command, double t_s)
 {
     plant_leg_state_t state = gates->leg[k].state;
-    bool alone = state == PLANT_LEG_UPPER || state == PLANT_LEG_LOWER;
+    bool alone = state == PLANT_LEG_UPPER || state == PLANT_LEG_LOWER || state == PLANT_LEG_LOWER_INVERTED;
     if (command == GATE_OFF) {
         return t_s + gates->closing_s;
     }

@@ -27,12 +27,14 @@ extern "C" {
 /* How the timer drives a leg. The share of the period at the upper rail is compare/timer_counts, as long as
  * the current keeps the diode of the switch that is off conducting. */
 typedef enum {
-    PLANT_LEG_PWM,   /* both switches, one the complement of the other, with dead time */
-    PLANT_LEG_UPPER, /* the upper switch is on for that share, the lower one off: freewheeling through its
+    PLANT_LEG_PWM,      /* both switches, one the complement of the other, with dead time */
+    PLANT_LEG_UPPER,    /* the upper switch is on for that share, the lower one off: freewheeling through its
                         diode */
-    PLANT_LEG_LOWER, /* the lower switch is on for the rest, the upper one off */
-    PLANT_LEG_HIGH,  /* held at the upper rail whatever compare says, */
-    PLANT_LEG_LOW    /* at the lower rail */
+    PLANT_LEG_LOWER,    /* the lower switch is on for the rest, the upper one off */
+    PLANT_LEG_HIGH,     /* held at the upper rail whatever compare says, */
+    PLANT_LEG_LOW,      /* at the lower rail */
+    PLANT_LEG_INVERTED, /* both switches, the lower one on for that share, about the middle of the period */
+    PLANT_LEG_LOWER_INVERTED /* that one alone */
 } plant_leg_state_t;
 
 /* The timer's settings for one period. Compare values are counts of the half carrier: the high side

@@ -205,7 +205,8 @@ static bool is_wrong(drive_t *drive)
 {
     const block_config_t *c = &drive->config.block;
     block_t *self = &drive->block;
-    const pm_q_t e = pm_mul(self->current.u, drive->status.v_dc) - pm_mul(c->current.R_2, self->i);
+    const pm_q_t taken = self->i < 0 ? -c->lost : c->lost;
+    const pm_q_t e = pm_mul(self->current.u - taken, drive->status.v_dc) - pm_mul(c->current.R_2, self->i);
     const pm_q_t emf = emf_of(drive);
     const bool wrong = c->six_step.pattern.complementary && pm_abs(e - emf) > pm_half(emf);
     self->wrong_ms = wrong ? (uint16_t)(self->wrong_ms + 1U) : 0U;

@@ -11,7 +11,8 @@
  *      is wanted slower than 3/4 of six_step_speed, or the other way, begins anew with the align.
  * From then on angle and speed come from the zero crossings:
  *   theta = theta of the last crossing + (t - t_z) / turn
- * The voltage must be that of the speed, on average: u v_dc - 2 R i within half of the EMF, else crossings are believed that are
+ * The voltage must be that of the speed, on average: (u - lost) v_dc - 2 R i within half of the EMF, with what the dead time of
+ * one or both legs takes, else crossings are believed that are
  * none, as of a rotor that was stopped. Where diodes carry the off time u v_dc is not the voltage, and this is not looked at.
  *
  * A turn whose crossings are not where they belong ends it (missed_crossings): all legs off in the same period. With
@@ -46,6 +47,7 @@ typedef struct {
     pm_q_t omega_on;  /* six_step_speed ... */
     pm_q_t omega_off; /* ... and 3/4 of it */
     pm_q_t per_code;  /* per-unit volts of a terminal at full scale */
+    pm_q_t lost;      /* share of v_dc that dead time takes from a driving current */
     pm_q_t blind;     /* rad at base speed in t_blank and a period, Q28 */
     six_step_config_t six_step;
     line_current_config_t current;

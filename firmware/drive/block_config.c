@@ -49,6 +49,9 @@ void make_block(maker_t *m, block_config_t *c)
     const pm_num_t blind = pm_num_add(si(m, DRIVE_PARAM_t_blank), m->base.t_s);
     c->blind = fixed(m, pm_num_mul(blind, m->base.omega), Q_BITS, DRIVE_PARAM_t_blank);
     make_six_step(m, &c->six_step);
+    const int32_t legs = pattern_chops_both(c->six_step.pattern.id) ? 2 : 1;
+    const pm_num_t dead = pm_num_mul(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm));
+    c->lost = fixed(m, pm_num_mul(pm_num(legs), dead), Q_BITS, DRIVE_PARAM_dead_time);
     make_line_current(m, &c->current);
     make_freewheeling(m, &c->freewheeling);
     if (!c->from_rest && p->six_step_speed < p->speed_high) {

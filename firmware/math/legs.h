@@ -3,11 +3,12 @@
  *
  * With PM_LEG_PWM the mean voltage of a terminal against the negative rail is, dead time and drops aside,
  *   v = duty v_dc.
- * With the other states a diode, the motor or a closed switch decides. One switch alone has no dead time. These changes
+ * With PM_LEG_INVERTED it is (1 - duty) v_dc: the upper switch is closed about the start of the period. With the other
+ * states a diode, the motor or a closed switch decides. One switch alone has no dead time. These changes
  * need a period of OFF or PWM between:
- *   UPPER or HIGH to LOWER
- *   LOWER or LOW  to UPPER
- *   LOWER         to HIGH
+ *   UPPER or HIGH to LOWER of either kind
+ *   LOWER of either kind or LOW to UPPER
+ *   LOWER of either kind to HIGH
  * Tests: tests/contract/hal, tests/unit/drive. */
 #ifndef PM_MATH_LEGS_H
 #define PM_MATH_LEGS_H
@@ -15,14 +16,16 @@
 #include "firmware/math/fixed.h"
 #include "firmware/math/measure.h"
 
-/* Every port can do OFF and PWM; the others are NEEDS_HELD and NEEDS_ONE_SWITCH. */
+/* Every port can do OFF and PWM; HIGH and LOW are NEEDS_HELD, the others NEEDS_ONE_SWITCH. */
 typedef enum {
-    PM_LEG_OFF,   /* both switches open */
-    PM_LEG_PWM,   /* complementary, with dead time */
-    PM_LEG_UPPER, /* the upper switch as with PWM, the lower one open */
-    PM_LEG_LOWER, /* the lower switch as with PWM, the upper one open */
-    PM_LEG_HIGH,  /* the upper switch closed throughout; the duty does not matter */
-    PM_LEG_LOW,   /* the lower switch closed throughout */
+    PM_LEG_OFF,      /* both switches open */
+    PM_LEG_PWM,      /* complementary, with dead time */
+    PM_LEG_UPPER,    /* the upper switch as with PWM, the lower one open */
+    PM_LEG_LOWER,    /* the lower switch as with PWM, the upper one open */
+    PM_LEG_HIGH,     /* the upper switch closed throughout; the duty does not matter */
+    PM_LEG_LOW,      /* the lower switch closed throughout */
+    PM_LEG_INVERTED, /* complementary, the lower switch closed for the duty, about the middle of the period */
+    PM_LEG_LOWER_INVERTED, /* the lower switch as with INVERTED, the upper one open */
 } pm_leg_t;
 
 /* The states of three legs, four bits each: one word, so that a period in which nothing is unusual costs one
@@ -44,7 +47,8 @@ static inline pm_leg_t pm_leg(uint16_t legs, uint32_t leg)
 }
 
 typedef struct {
-    pm_q_t duty[PM_LEGS]; /* Q28, 0 ... 1: share of the period in which the upper switch of PWM is closed */
+    pm_q_t duty[PM_LEGS]; /* Q28, 0 ... 1: share of the period in which the upper switch of PWM, the
+                            lower one of INVERTED is closed */
     uint16_t legs;        /* PM_LEGS_... */
 } pm_legs_t;
 

@@ -9,6 +9,10 @@ static plant_leg_state_t switches_of(pm_leg_t state)
         return PLANT_LEG_UPPER;
     case PM_LEG_LOWER:
         return PLANT_LEG_LOWER;
+    case PM_LEG_INVERTED:
+        return PLANT_LEG_INVERTED;
+    case PM_LEG_LOWER_INVERTED:
+        return PLANT_LEG_LOWER_INVERTED;
     default:
         return PLANT_LEG_PWM;
     }
@@ -18,7 +22,7 @@ static plant_leg_state_t switches_of(pm_leg_t state)
 static void set_leg(const hal_t *hal, int leg, const drive_out_t *out, plant_pwm_t *pwm)
 {
     const pm_leg_t state = pm_leg(out->legs, (uint32_t)leg);
-    assert(state <= PM_LEG_LOW);
+    assert(state <= PM_LEG_LOWER_INVERTED);
     const bool held = state == PM_LEG_HIGH || state == PM_LEG_LOW;
     const uint32_t all = state == PM_LEG_HIGH ? hal->timer_counts : 0U;
     pwm->compare[leg][0] = held ? all : out->compare[leg][0];

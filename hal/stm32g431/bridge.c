@@ -206,6 +206,8 @@ static const struct {
     [PM_LEG_LOWER] = {TIM_CCER_CC1NE, TIM_OCM_PWM2},
     [PM_LEG_HIGH] = {LEG, TIM_OCM_HIGH},
     [PM_LEG_LOW] = {LEG, TIM_OCM_LOW},
+    [PM_LEG_INVERTED] = {LEG, TIM_OCM_PWM2},
+    [PM_LEG_LOWER_INVERTED] = {TIM_CCER_CC1NE, TIM_OCM_PWM1},
 };
 
 /* For the next COM event. */

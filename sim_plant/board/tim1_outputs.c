@@ -71,9 +71,13 @@ static plant_leg_state_t state_of(const tim1_t *tim, int leg)
         uint32_t enables, mode;
         plant_leg_state_t state;
     } known[] = {
-        {5u, TIM1_PWM_1, PLANT_LEG_PWM},   {1u, TIM1_PWM_1, PLANT_LEG_UPPER},
-        {4u, TIM1_PWM_2, PLANT_LEG_LOWER}, {5u, FORCED_HIGH, PLANT_LEG_HIGH},
+        {5u, TIM1_PWM_1, PLANT_LEG_PWM},
+        {1u, TIM1_PWM_1, PLANT_LEG_UPPER},
+        {4u, TIM1_PWM_2, PLANT_LEG_LOWER},
+        {5u, FORCED_HIGH, PLANT_LEG_HIGH},
         {5u, FORCED_LOW, PLANT_LEG_LOW},
+        {5u, TIM1_PWM_2, PLANT_LEG_INVERTED},
+        {4u, TIM1_PWM_1, PLANT_LEG_LOWER_INVERTED},
     };
     const uint32_t enables = board_field(tim->enables, 4 * leg, 3);
     for (size_t n = 0; n < sizeof known / sizeof *known; n++) {
@@ -91,9 +95,10 @@ static void check_change(const tim1_t *tim, int leg, plant_leg_state_t to)
 {
     const plant_leg_state_t from = tim->chip->wiring.state[leg];
     const bool upper = from == PLANT_LEG_UPPER || from == PLANT_LEG_HIGH;
-    const bool unsafe = (upper && to == PLANT_LEG_LOWER) ||
+    const bool lower = from == PLANT_LEG_LOWER || from == PLANT_LEG_LOWER_INVERTED;
+    const bool unsafe = (upper && (to == PLANT_LEG_LOWER || to == PLANT_LEG_LOWER_INVERTED)) ||
                         (from == PLANT_LEG_LOW && to == PLANT_LEG_UPPER) ||
-                        (from == PLANT_LEG_LOWER && (to == PLANT_LEG_UPPER || to == PLANT_LEG_HIGH));
+                        (lower && (to == PLANT_LEG_UPPER || to == PLANT_LEG_HIGH));
     if (unsafe && tim->chip->wiring.driven[leg]) {
         cpu_fail(tim->chip->cpu, "TIM1: channel %d goes from one switch to the other without dead time",
                  leg + 1);

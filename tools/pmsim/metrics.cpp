@@ -205,6 +205,8 @@ static const std::vector<SpecialMetric> &special_metrics()
         list.insert(list.end(), drive.begin(), drive.end());
         const std::vector<SpecialMetric> identify = identify_metrics();
         list.insert(list.end(), identify.begin(), identify.end());
+        const std::vector<SpecialMetric> power = power_metrics();
+        list.insert(list.end(), power.begin(), power.end());
         const std::vector<SpecialMetric> start = start_metrics();
         list.insert(list.end(), start.begin(), start.end());
         const std::vector<SpecialMetric> voltage = voltage_metrics();

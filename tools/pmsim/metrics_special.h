@@ -22,6 +22,7 @@ std::vector<SpecialMetric> angle_metrics();    // metrics_angle.cpp
 std::vector<SpecialMetric> motion_metrics();   // metrics_motion.cpp
 std::vector<SpecialMetric> drive_metrics();    // metrics_drive.cpp
 std::vector<SpecialMetric> identify_metrics(); // metrics_identify.cpp
+std::vector<SpecialMetric> power_metrics();    // metrics_power.cpp
 std::vector<SpecialMetric> start_metrics();    // metrics_start.cpp
 std::vector<SpecialMetric> voltage_metrics();  // metrics_voltage.cpp
 

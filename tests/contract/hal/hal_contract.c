@@ -316,7 +316,8 @@ static void check_held(run_t *run)
 #endif
 
 #if PM_CARRIES(NEEDS_ONE_SWITCH)
-/* The lower switches alone for the whole period: all terminals low. */
+/* The lower switches alone for the whole period: all terminals low. The same by a duty of 1 of inverted legs; all high by
+ * none. */
 static void check_one_switch(run_t *run)
 {
     struct app *app = &the_app;
@@ -332,6 +333,23 @@ static void check_one_switch(run_t *run)
         check(run, "no current with the lower switches alone", off > -2000 && off < 2000, off);
 #if PM_CARRIES(NEEDS_TERMINALS)
         check_code(run, "a terminal on its lower switch", app->in.more.v_terminal[leg], 0, 2000);
+#endif
+    }
+    app->out.legs = PM_LEGS_ALL(PM_LEG_INVERTED);
+    for (size_t high = 0; high < 2; high++) {
+        for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
+            const uint16_t all = (uint16_t)run->contract->config.timer_counts;
+            app->out.compare[leg][0] = high != 0 ? 0U : all;
+            app->out.compare[leg][1] = app->out.compare[leg][0];
+        }
+        wait_us(run, 1000);
+        check(run, "stays armed with inverted legs", hal_bridge_armed(run->hal), 0);
+#if PM_CARRIES(NEEDS_TERMINALS)
+        const bool seen = app->in.v_dc > 16000U && (hal_channels(run->hal) & NEEDS_TERMINALS) != 0U;
+        for (size_t leg = 0; seen && leg < DRIVE_LEGS; leg++) {
+            check_code(run, "a terminal of an inverted leg", app->in.more.v_terminal[leg],
+                       high != 0 ? 8000 : 0, high != 0 ? UINT16_MAX : 2000);
+        }
 #endif
     }
 }

@@ -268,9 +268,16 @@ TEST(SimChannels, OneSwitchOfALeg)
     const struct {
         pm_leg_t a, b;
         double i_A;
-    } cases[] = {{PM_LEG_UPPER, PM_LEG_LOW, to_a_A},   {PM_LEG_LOWER, PM_LEG_HIGH, -from_a_A},
-                 {PM_LEG_UPPER, PM_LEG_HIGH, 0.0},     {PM_LEG_LOWER, PM_LEG_LOW, 0.0},
-                 {PM_LEG_PWM, PM_LEG_HIGH, -from_a_A}, {PM_LEG_PWM, PM_LEG_LOW, to_a_A}};
+    } cases[] = {{PM_LEG_UPPER, PM_LEG_LOW, to_a_A},
+                 {PM_LEG_LOWER, PM_LEG_HIGH, -from_a_A},
+                 {PM_LEG_UPPER, PM_LEG_HIGH, 0.0},
+                 {PM_LEG_LOWER, PM_LEG_LOW, 0.0},
+                 {PM_LEG_PWM, PM_LEG_HIGH, -from_a_A},
+                 {PM_LEG_PWM, PM_LEG_LOW, to_a_A},
+                 {PM_LEG_INVERTED, PM_LEG_HIGH, -to_a_A},
+                 {PM_LEG_INVERTED, PM_LEG_LOW, from_a_A},
+                 {PM_LEG_LOWER_INVERTED, PM_LEG_HIGH, -to_a_A},
+                 {PM_LEG_LOWER_INVERTED, PM_LEG_LOW, 0.0}};
     for (const auto &c : cases) {
         Port port(config);
         ASSERT_TRUE(hal_bridge_arm(&port.hal));

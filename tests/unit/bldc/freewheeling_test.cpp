@@ -14,6 +14,7 @@ namespace
 constexpr double kFormula = 1e-3;  // of fixed point
 constexpr double kPlant = 0.03;    // with ten periods or more in a freewheel,
 constexpr double kPeriods = 1;     // else
+constexpr double kSweep = 0.05;    // rows 118 to 120
 constexpr double kCurrent = 0.011; // of the inverse
 
 constexpr double kBase_V = 40, kBase_A = 40;
@@ -91,7 +92,7 @@ TEST(Freewheeling, IsThatOfTheFormula)
     }
 }
 
-// METHODS.md 10.5.3 to 10.5.5: three sweeps.
+// METHODS.md 10.5.3 to 10.5.5 in fixed point; against the plant below.
 TEST(Freewheeling, FollowsResistanceInductanceLinkAndDuty)
 {
     for (const double factor : {0.5, 0.8, 1.25, 1.5}) {
@@ -214,6 +215,114 @@ TEST(Freewheeling, IsWithinAPeriodOfThePlantWhereThereAreFew)
         EXPECT_LE(against_plant(validation::bldc_fan(), kFan, 20e3, omega, 5).periods, kPeriods);
     }
     EXPECT_LE(against_plant(validation::bldc_hs(), kHs, 40e3, 2000, 15).periods, kPeriods);
+}
+
+// One point of a sweep: the plant's angle against the prediction in fixed point, and against one that does not know what was
+// changed. BLDC-FAN with 100 kHz, the mean of both directions of the current.
+struct Point {
+    double share_off = 0, twin_off = 0; // relative
+    double angle_rad = 0;
+};
+
+Point point(double R, double L, double v_dc_V, double u, validation::Pattern pattern, Case twin,
+            double twin_v_dc_V, double twin_u)
+{
+    constexpr double omega = 80;
+    plant_config_t config = validation::bldc_fan();
+    config.machine.R_s_ohm = R;
+    config.machine.L_d0_H = config.machine.L_q0_H = L;
+    config.dclink.v_source_V = v_dc_V;
+    config.inverter.f_pwm_Hz = 100e3;
+    Case c = kFan;
+    c.R_ohm = R;
+    c.L_H = L;
+    validation::SixStep drive(config, pattern, u, omega);
+    drive.run_sectors(2 + static_cast<int>(6 * L / R * omega / 1.047));
+    Point p;
+    for (int n = 0; n < 2; ++n) {
+        const Freewheel f = next(drive);
+        const double measured = f.lasted_s * drive.omega_e;
+        const double own = angle(c, c.in(of(pattern), f.sector, u, drive.omega_e, v_dc_V), f.i_A);
+        const double other =
+            angle(twin, twin.in(of(pattern), f.sector, twin_u, drive.omega_e, twin_v_dc_V), f.i_A);
+        EXPECT_GE(f.lasted_s * 100e3, 7) << "chops of the carrier";
+        p.share_off = std::max(p.share_off, std::abs(measured / own - 1));
+        p.twin_off = std::max(p.twin_off, std::abs(measured / other - 1));
+        p.angle_rad += measured / 2 / f.i_A;
+    }
+    return p;
+}
+
+// Duty of about 4 A at that speed.
+double duty_of(double R, double v_dc_V)
+{
+    return (kFan.emf_Vs * 80 + 2 * R * 4) / v_dc_V;
+}
+
+// Rows 118 to 120, against the plant, in both modes.
+TEST(Freewheeling, OfThePlantFollowsResistance)
+{
+    for (const validation::Pattern pattern : {validation::Pattern::pwm_on, validation::Pattern::on_pwm}) {
+        double before = 1e9;
+        for (const double factor : {0.5, 1.0, 1.5, 2.0}) {
+            const double R = kFan.R_ohm * factor;
+            Case twin = kFan;
+            twin.R_ohm = 0.1 * R;
+            const double u = duty_of(2 * kFan.R_ohm, 24); // the same voltage: more resistance, less current
+            const Point p = point(R, kFan.L_H, 24, u, pattern, twin, 24, u);
+            EXPECT_LE(p.share_off, kSweep) << factor;
+            EXPECT_LT(p.angle_rad, before) << factor; // of an ampere
+            before = p.angle_rad;
+            if (factor == 2.0) {
+                EXPECT_GE(p.twin_off, kSweep);
+            }
+        }
+    }
+}
+
+TEST(Freewheeling, OfThePlantFollowsInductance)
+{
+    for (const validation::Pattern pattern : {validation::Pattern::pwm_on, validation::Pattern::on_pwm}) {
+        for (const double factor : {0.7, 1.0, 1.5, 2.0}) {
+            const double L = kFan.L_H * factor, u = duty_of(kFan.R_ohm, 24);
+            const Point p = point(kFan.R_ohm, L, 24, u, pattern, kFan, 24, u);
+            EXPECT_LE(p.share_off, kSweep) << factor;
+            EXPECT_GE(p.twin_off, std::abs(factor - 1) - kSweep * factor) << factor; // in proportion
+        }
+    }
+}
+
+TEST(Freewheeling, OfThePlantFollowsTheLinkVoltage)
+{
+    for (const validation::Pattern pattern : {validation::Pattern::pwm_on, validation::Pattern::on_pwm}) {
+        double before = 1e9;
+        for (const double v_dc_V : {12.0, 18.0, 24.0, 36.0}) {
+            const double u = 0.25;
+            const Point p = point(kFan.R_ohm, kFan.L_H, v_dc_V, u, pattern, kFan, 24, u);
+            EXPECT_LE(p.share_off, kSweep) << v_dc_V;
+            EXPECT_LT(p.angle_rad, before) << v_dc_V;
+            before = p.angle_rad;
+            if (v_dc_V != 24) {
+                EXPECT_GE(p.twin_off, 2 * kSweep) << v_dc_V;
+            }
+        }
+    }
+}
+
+// More duty, a shorter freewheeling where the leg that has come is chopped, a longer one where it is not.
+TEST(Freewheeling, OfThePlantFollowsTheDuty)
+{
+    for (const validation::Pattern pattern : {validation::Pattern::pwm_on, validation::Pattern::on_pwm}) {
+        const bool first = pattern == validation::Pattern::pwm_on;
+        double before = first ? 1e9 : 0;
+        for (const double u : {0.15, 0.3, 0.5, 0.7, 0.9}) {
+            const Point p = point(kFan.R_ohm, kFan.L_H, 24, u, pattern, kFan, 24, first ? 1.5 * u : u - 0.5);
+            EXPECT_LE(p.share_off, kSweep) << u;
+            EXPECT_GE(p.twin_off, 2 * kSweep) << u;
+            EXPECT_TRUE(first ? p.angle_rad < before : true) << u;
+            before = p.angle_rad;
+        }
+    }
 }
 
 } // namespace

@@ -15,6 +15,7 @@ using bldc_rig::real;
 
 constexpr uint16_t kN = 2125;
 constexpr double kDuty = 1e-7;
+constexpr double kRipple = 0.15, kRms = 0.3; // METHODS-ADDENDUM.md B (c), row 109
 
 pattern_config_t make(pattern_id_t id, bool complementary = true)
 {
@@ -25,7 +26,8 @@ pattern_config_t make(pattern_id_t id, bool complementary = true)
 bool high_at(pm_leg_t state, double duty, double count)
 {
     const double from = kN * (1 - duty), to = kN * (1 + duty);
-    return state == PM_LEG_HIGH || (state != PM_LEG_LOW && count >= from && count < to);
+    const bool pulse = count >= from && count < to;
+    return state == PM_LEG_HIGH || (state == PM_LEG_INVERTED ? !pulse : state != PM_LEG_LOW && pulse);
 }
 
 // METHODS.md 0.1: EMF of a phase, angles in degrees.
@@ -66,7 +68,8 @@ TEST(Patterns, ChopWhatTheirNameSays)
                       {PATTERN_H_PWM_L_ON, true, true, false, false},
                       {PATTERN_H_ON_L_PWM, false, false, true, true},
                       {PATTERN_PWM_ON, true, false, true, false},
-                      {PATTERN_ON_PWM, false, true, false, true}};
+                      {PATTERN_ON_PWM, false, true, false, true},
+                      {PATTERN_H_PWM_L_PWM_ALTERNATING, true, true, true, true}};
     for (const auto &p : list) {
         for (const bool reverse : {false, true}) {
             for (const bool complementary : {false, true}) {
@@ -82,9 +85,10 @@ TEST(Patterns, ChopWhatTheirNameSays)
                     EXPECT_EQ(pm_leg(legs, at.high), !upper          ? PM_LEG_HIGH
                                                      : complementary ? PM_LEG_PWM
                                                                      : PM_LEG_UPPER);
-                    EXPECT_EQ(pm_leg(legs, at.low), !lower          ? PM_LEG_LOW
-                                                    : complementary ? PM_LEG_PWM
-                                                                    : PM_LEG_LOWER);
+                    const bool at_once = p.id == PATTERN_H_PWM_L_PWM;
+                    const pm_leg_t both = at_once ? PM_LEG_INVERTED : PM_LEG_PWM;
+                    const pm_leg_t one = at_once ? PM_LEG_LOWER_INVERTED : PM_LEG_LOWER;
+                    EXPECT_EQ(pm_leg(legs, at.low), !lower ? PM_LEG_LOW : complementary ? both : one);
                 }
             }
         }
@@ -107,7 +111,11 @@ TEST(Patterns, LineVoltageIsTheCommand)
                     const sector_t at = sector_legs(s, reverse), next = sector_legs(sector_next(s), reverse);
                     const auto mean = [&](uint32_t leg) {
                         const pm_leg_t state = pm_leg(out.legs, leg);
-                        return state == PM_LEG_HIGH ? 1 : state == PM_LEG_LOW ? 0 : real(out.duty[leg]);
+                        const double duty = real(out.duty[leg]);
+                        return state == PM_LEG_HIGH       ? 1
+                               : state == PM_LEG_LOW      ? 0
+                               : state == PM_LEG_INVERTED ? 1 - duty
+                                                          : duty;
                     };
                     EXPECT_NEAR(mean(at.high) - mean(at.low), u, kDuty);
                     EXPECT_EQ(out.duty[next.high], then.duty[next.high]);
@@ -132,8 +140,10 @@ TEST(Patterns, SamplesAreTakenWhereTheLegsAreAsTold)
                 pattern_duties(&c, s, false, fixed(u, 28), &out);
                 out.legs = pattern_states(&c, s, false);
                 const sector_t at = sector_legs(s, false);
-                const double pulses = id == PATTERN_H_PWM_L_PWM ? 2 : 1;
-                EXPECT_EQ(sample.legs == ZERO_LEGS_APART, 2 * kN * u / pulses >= c.least - 1) << id << u;
+                const double share = id == PATTERN_H_PWM_L_PWM               ? (1 + u) / 2
+                                     : id == PATTERN_H_PWM_L_PWM_ALTERNATING ? u / 2
+                                                                             : u;
+                EXPECT_EQ(sample.legs == ZERO_LEGS_APART, 2 * kN * share >= c.least - 1) << id << u;
                 for (int ahead = 0; ahead >= -100; ahead -= 50) {
                     const double count = sample.at + ahead;
                     const bool up = high_at(pm_leg(out.legs, at.high), real(out.duty[at.high]), count);
@@ -142,6 +152,58 @@ TEST(Patterns, SamplesAreTakenWhereTheLegsAreAsTold)
                     EXPECT_EQ(down, sample.legs == ZERO_LEGS_HIGH) << id << ' ' << u << ' ' << s;
                 }
             }
+        }
+    }
+}
+
+// Row 109, peak to peak, of two legs that conduct with the EMF of the speed behind them: 1.6 times as much with both chopped at
+// once, half with both in turn.
+TEST(Patterns, RippleOfTheCurrentIsThatOfTheFormula)
+{
+    using namespace bldc_rig;
+    Machine m = hs();
+    m.plant.inverter.dead_time_s = 0.3e-6;
+    const double u = 0.45, T_s = 1 / m.plant.inverter.f_pwm_Hz, L = m.plant.machine.L_d0_H;
+    double of[PATTERN_COUNT];
+    for (int id = 0; id < PATTERN_COUNT; ++id) {
+        Options o;
+        o.pattern = static_cast<pattern_id_t>(id);
+        Rig r(m, o, electrical(m, 46e3));
+        r.watch = true;
+        r.measure(30, 20, u);
+        const double share = id == PATTERN_H_PWM_L_PWM               ? (1 - u * u) / 2
+                             : id == PATTERN_H_PWM_L_PWM_ALTERNATING ? u * (1 - u) / 2
+                                                                     : u * (1 - u);
+        of[id] = r.ripples.mean();
+        ASSERT_GT(r.ripples.n, 100);
+        EXPECT_FALSE(r.six_step.lost);
+        EXPECT_NEAR(of[id] / (share * 24 * T_s / (2 * L)), 1, kRipple) << id;
+    }
+    const double D = (1 + u) / 2;
+    for (const int id : {PATTERN_H_PWM_L_ON, PATTERN_H_ON_L_PWM, PATTERN_PWM_ON, PATTERN_ON_PWM}) {
+        EXPECT_NEAR(of[PATTERN_H_PWM_L_PWM] / of[id] / (2 * D * (1 - D) / (u * (1 - u))), 1, kRipple) << id;
+        // Twin: pulses in turn
+        EXPECT_LE(of[PATTERN_H_PWM_L_PWM_ALTERNATING] / of[id], 0.5 * (1 + kRipple)) << id;
+    }
+}
+
+// Row 109: BLDC-HS at 40,000 r/min by any pattern; against 0 in place of v_dc / 2 by none.
+TEST(Patterns, EachShowsTheCrossings)
+{
+    using namespace bldc_rig;
+    for (int id = 0; id < PATTERN_COUNT; ++id) {
+        for (const bool complementary : {true, false}) {
+            Options o;
+            o.pattern = static_cast<pattern_id_t>(id);
+            o.complementary = complementary;
+            const double u = pattern_chops_both(o.pattern) ? 0.58 : 0.5; // twice the dead time
+            Rig r(hs(), o, electrical(hs(), 40e3)), twin(hs(), o, electrical(hs(), 40e3));
+            r.measure(30, 40, u);
+            EXPECT_FALSE(r.six_step.lost);
+            EXPECT_LE(r.commutations.rms(), kRms) << id << complementary;
+            twin.wrong_reference_V = 12;
+            twin.measure(30, 40, u);
+            EXPECT_TRUE(twin.six_step.lost) << id << complementary;
         }
     }
 }

@@ -117,6 +117,7 @@ struct Options {
     bool virtual_third = false; // crossings of the third harmonic of the terminals
     bool third = false;         // crossings of the third harmonic,
     bool told_filter = true;    // with the lag of the channel's RC taken off
+    bool late_rule = true;      // a first sample past the crossing counts
     bool reverse = false;
     bool one_channel = false;  // the mean of the terminals in place of each
     bool legs_unknown = false; // all samples are taken for those of on times
@@ -193,6 +194,16 @@ struct Statistics {
     double rms() const
     {
         return n > 0 ? std::sqrt(squares / n) : 1e9;
+    }
+};
+
+// Of the leg that has gone, until its current is zero.
+struct Freewheel {
+    Statistics angle, current; // degrees, A
+
+    double i() const
+    {
+        return current.mean();
     }
 };
 
@@ -285,20 +296,27 @@ class Rig
         const bool before = six_step.crossing.found;
         const uint32_t sector = six_step.crossing.sector;
         looked_ = now_ - 2 * machine.plant.inverter.timer_counts + six_step.plan[0].sample_at;
+        if (!options.late_rule && in.sampled && is_late(in)) {
+            in.sampled = false;
+        }
+        const bool ahead = six_step.crossing.ahead;
         six_step_step(&six_step, &config, &in, &out);
         if (six_step.crossing.found && !(before && six_step.crossing.sector == sector)) {
             const double ago_s = static_cast<double>(now_ - six_step.crossing.at) * count_s_;
             crossing_deg = wrapped_deg(angle_rad() - omega_e() * ago_s -
                                        (60 + 60.0 * six_step.crossing.sector) * kDegree);
             crossings.add(crossing_deg);
+            in_time.add(ahead && six_step.crossing.sector == sector ? 1 : 0);
             first_past.add(crossing_deg + static_cast<double>(looked_ - six_step.crossing.at) * count_s_ *
                                               omega_e() / kDegree);
         }
         write(out);
+        followed_ = 0;
         run(asked_, sector_);
         sector_ = next_sector_;
         next_sector_ = six_step.commutation.sector;
         asked_ = out;
+        follow(2.0 * machine.plant.inverter.timer_counts);
         plant_run_period(plant_.get());
         plant_truth_t t;
         plant_truth_windings(plant_.get(), &t);
@@ -330,8 +348,10 @@ class Rig
 
     void clear()
     {
-        crossings = {};
+        crossings = in_time = {};
         first_past = {};
+        ripples = {};
+        freewheels[0] = freewheels[1] = {};
         torque_ = current_ = 0;
         periods_ = 0;
         commutations = {};
@@ -353,7 +373,12 @@ class Rig
     six_step_config_t config;
     six_step_t six_step = {};
     Statistics crossings, commutations;
-    Statistics first_past; // the samples that have shown the crossings
+    Statistics in_time;      // 1: a sample ahead of the crossing was seen
+    Statistics first_past;   // the samples that have shown the crossings
+    Statistics ripples;      // of the current in periods without commutation and freewheeling, A; if
+    bool watch = false;      // the plant is looked at within the period,
+    bool freewheel = false;  // from a commutation on until the current has ceased
+    Freewheel freewheels[2]; // into even and odd sectors
     Statistics of_sector[SECTORS];
     double crossing_deg = 0;
     double t_s = 0;
@@ -383,11 +408,13 @@ class Rig
 
     static plant_leg_state_t of(pm_leg_t state)
     {
-        return state == PM_LEG_UPPER   ? PLANT_LEG_UPPER
-               : state == PM_LEG_LOWER ? PLANT_LEG_LOWER
-               : state == PM_LEG_HIGH  ? PLANT_LEG_HIGH
-               : state == PM_LEG_LOW   ? PLANT_LEG_LOW
-                                       : PLANT_LEG_PWM;
+        return state == PM_LEG_UPPER            ? PLANT_LEG_UPPER
+               : state == PM_LEG_LOWER          ? PLANT_LEG_LOWER
+               : state == PM_LEG_INVERTED       ? PLANT_LEG_INVERTED
+               : state == PM_LEG_LOWER_INVERTED ? PLANT_LEG_LOWER_INVERTED
+               : state == PM_LEG_HIGH           ? PLANT_LEG_HIGH
+               : state == PM_LEG_LOW            ? PLANT_LEG_LOW
+                                                : PLANT_LEG_PWM;
     }
 
     void commutate(const six_step_out_t &out, uint32_t from)
@@ -398,10 +425,16 @@ class Rig
             driven[k] = pm_leg(out.then, k) != PM_LEG_OFF;
             state[k] = of(pm_leg(out.then, k));
         }
+        follow(out.commutate_at);
         plant_move(plant_.get(), out.commutate_at * count_s_);
         const double e = wrapped_deg(angle_rad() - (90 + 60.0 * from - options.advance_deg) * kDegree);
         commutations.add(e);
         of_sector[from].add(e);
+        const sector_t next = sector_legs(sector_next(from), options.reverse);
+        gone_ = next.open;
+        gone_A_ = std::abs(current(gone_));
+        left_rad_ = gone_A_ > 0 ? angle_rad() : 0;
+        gone_odd_ = !sector_rising(sector_next(from));
         plant_drive_legs(plant_.get(), driven, state);
     }
 
@@ -413,6 +446,7 @@ class Rig
         }
         sampled_ = out.sample_at != 0;
         if (sampled_) {
+            follow(out.sample_at);
             plant_sample_at(plant_.get(), out.sample_at * count_s_, &adc_);
             sampled_rad_ = angle_rad();
             sampled_in_ = first ? sector_next(from) : from;
@@ -422,10 +456,78 @@ class Rig
         }
     }
 
+    // Would this sample find a crossing of which none ahead was seen?
+    bool is_late(const six_step_in_t &in) const
+    {
+        zero_crossing_t seen = six_step.crossing;
+        const six_step_plan_t &plan = six_step.plan[0];
+        const bool next = plan.commutate_at != 0 && plan.commutate_at < plan.sample_at;
+        if (seen.found || seen.ahead || next) {
+            return false;
+        }
+        const zero_instant_t when = {in.now - 2U * machine.plant.inverter.timer_counts + plan.sample_at,
+                                     static_cast<zero_legs_t>(plan.legs)};
+        zero_expected_t expected = six_step.expected;
+        expected.at = when.at; // due
+        return zero_crossing_step(&seen, &config.crossing, &in.sample, when, &expected);
+    }
+
+    // Up to a count of the period, in parts of it.
+    void follow(double to)
+    {
+        if (freewheel) {
+            cease(to);
+        }
+        followed_ = watch ? followed_ : to;
+        if (!watch) {
+            return;
+        }
+        const double part = machine.plant.inverter.timer_counts / 50.0,
+                     end = 2.0 * machine.plant.inverter.timer_counts;
+        if (followed_ <= 0) {
+            least_ = 1e9;
+            largest_ = -1e9;
+            whole_ = asked_.commutate_at == 0 && current(sector_legs(sector_, options.reverse).open) == 0;
+        }
+        for (; followed_ < to - part; followed_ += part) {
+            plant_move(plant_.get(), followed_ * count_s_);
+            const double i_A = current(sector_legs(sector_, options.reverse).high);
+            least_ = std::min(least_, i_A);
+            largest_ = std::max(largest_, i_A);
+        }
+        if (to >= end && whole_) {
+            ripples.add(largest_ - least_);
+        }
+    }
+
+    // Up to a count of the period, in steps of 0.2 us, while the leg that has gone carries current.
+    void cease(double to)
+    {
+        for (double at = followed_ + 0.2e-6 / count_s_; left_rad_ != 0 && at < to; at += 0.2e-6 / count_s_) {
+            plant_move(plant_.get(), at * count_s_);
+            if (current(gone_) == 0) {
+                freewheels[gone_odd_ ? 1 : 0].angle.add(wrapped_deg(angle_rad() - left_rad_));
+                freewheels[gone_odd_ ? 1 : 0].current.add(gone_A_);
+                left_rad_ = 0;
+            }
+        }
+    }
+
+    double current(int leg) const
+    {
+        plant_truth_t t;
+        plant_truth_windings(plant_.get(), &t);
+        return t.i_A[leg];
+    }
+
     std::unique_ptr<plant_t, void (*)(plant_t *)> plant_{nullptr, &plant_destroy};
     const double period_s_, count_s_, sign_;
     double turn_s_ = 0, torque_ = 0, current_ = 0;
     int periods_ = 0, since_slow_ = 0;
+    double followed_ = 0, least_ = 0, largest_ = 0;
+    bool whole_ = false, gone_odd_ = false;
+    int gone_ = 0;
+    double gone_A_ = 0, left_rad_ = 0;
     uint32_t now_ = 0, looked_ = 0, sector_ = 0, next_sector_ = 0;
     bool sampled_ = false;
     double sampled_rad_ = 0;

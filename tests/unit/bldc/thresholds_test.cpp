@@ -115,32 +115,32 @@ TEST(Thresholds, HorizontalOnesHaveNoMean)
     }
 }
 
-// Nor by a ramp: intervals of a rotor that speeds up or slows down by 1 % in each.
-TEST(Thresholds, ARampGivesHorizontalOnesNoMean)
+// Intervals of a rotor that speeds up: each shorter by 1 % than the one before.
+TEST(Thresholds, SpeedingUpLeavesNoMean)
 {
-    for (const double ratio : {0.99, 1.01}) {
-        const Bench b{{0, 0, 0}, {0, 0, 0}};
-        thresholds_t self = {};
-        double t_60 = kT60;
-        uint32_t interval[SECTORS] = {};
-        for (uint32_t s = 0; s < SECTORS; ++s) {
-            interval[s] = static_cast<uint32_t>(t_60 *= ratio);
+    thresholds_t with = {}, twin = {};
+    const Bench b{{0, 0, 0}, {0, 0, 0}};
+    for (uint32_t n = 0; n < 30; ++n) {
+        uint32_t interval[SECTORS] = {}, turn = 0;
+        for (uint32_t k = 0; k < SECTORS; ++k) {
+            interval[(n + k + 1) % SECTORS] = 10000 - 100 * (n + k);
+            turn += 10000 - 100 * (n + k);
         }
-        for (int n = 0; n < 600; ++n) {
-            const uint32_t s = static_cast<uint32_t>(n) % SECTORS;
-            interval[s] = static_cast<uint32_t>(t_60 *= ratio);
-            uint32_t sum = 0;
-            for (const uint32_t i : interval) {
-                sum += i;
-            }
-            thresholds_learn(&self, &b.config, s, false, interval, sum, fixed(kSwing, 28));
-            t_60 = n % 30 == 29 ? kT60 : t_60; // again and again
-            if (n % 30 == 29) {
-                std::fill(std::begin(interval), std::end(interval), static_cast<uint32_t>(kT60));
-            }
+        for (thresholds_t *self : {&with, &twin}) {
+            thresholds_learn(self, &b.config, n % SECTORS, false, interval, turn, PM_ONE / 4);
         }
-        EXPECT_NEAR(real(self.u_H[0] + self.u_H[1] + self.u_H[2]), 0, 3 * kLeft);
+        thresholds_slow(&with);
     }
+    for (int leg = 0; leg < 3; ++leg) {
+        EXPECT_NEAR(real(with.u_H[leg]), 0, 5e-5) << leg;
+        EXPECT_GT(std::abs(real(twin.u_H[leg])), 4e-4) << leg;
+    }
+    thresholds_t some = {{1, 2, 3}, {100, 400, -200}};
+    thresholds_slow(&some);
+    EXPECT_EQ(some.u_V[2], 3);
+    EXPECT_EQ(some.u_H[0], 0);
+    EXPECT_EQ(some.u_H[1], 300);
+    EXPECT_EQ(some.u_H[2], -300);
 }
 
 TEST(Thresholds, StayWithinTheirLimit)

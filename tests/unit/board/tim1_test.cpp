@@ -141,11 +141,25 @@ TEST_F(Tim1, ALegWithoutItsChannelsFloatsFromTheInstantOn)
     EXPECT_EQ(c.take_error(), "");
 }
 
-TEST_F(Tim1, ALowerSwitchAloneInMode1IsAnError)
+// Mode 2 with both outputs, mode 1 with the lower one alone; not the upper one alone in mode 2.
+TEST_F(Tim1, ALegMayBeInverted)
 {
-    c.all();
-    arm(0x554);
-    EXPECT_EQ(c.take_error(), "TIM1: outputs 4 of channel 1 in mode 6 are not modelled");
+    ready();
+    c.gates();
+    c.set(rig::tim1 + 4, 1); // CCPC
+    c.start_timer();
+    c.set(bdtr, moe);
+    c.run(200);
+    c.write(ccer, 0x545);
+    c.write(ccmr1, 0x6878);
+    c.write(egr, 0x20);
+    EXPECT_EQ(c.chip->wiring.state[0], PLANT_LEG_INVERTED);
+    EXPECT_EQ(c.chip->wiring.state[1], PLANT_LEG_LOWER_INVERTED);
+    EXPECT_EQ(c.chip->wiring.state[2], PLANT_LEG_PWM);
+    EXPECT_EQ(c.take_error(), "");
+    c.write(ccer, 0x551);
+    c.write(egr, 0x20);
+    EXPECT_EQ(c.take_error(), "TIM1: outputs 1 of channel 1 in mode 7 are not modelled");
 }
 
 // Written ahead, in effect at the COM event. One switch alone has no dead time, so the current is u v_dc / 2 R and

@@ -33,7 +33,8 @@ TEST(Measure, TheFirstOfSeveralIsNamed)
 
 TEST(Legs, StatesOfOneWord)
 {
-    const pm_leg_t all[] = {PM_LEG_OFF, PM_LEG_PWM, PM_LEG_UPPER, PM_LEG_LOWER, PM_LEG_HIGH, PM_LEG_LOW};
+    const pm_leg_t all[] = {PM_LEG_OFF,  PM_LEG_PWM, PM_LEG_UPPER,    PM_LEG_LOWER,
+                            PM_LEG_HIGH, PM_LEG_LOW, PM_LEG_INVERTED, PM_LEG_LOWER_INVERTED};
     for (const pm_leg_t a : all) {
         for (const pm_leg_t b : all) {
             for (const pm_leg_t c : all) {

@@ -470,6 +470,26 @@ TEST(Metrics, EveryEnergyIsInTheBalance)
     EXPECT_TRUE(std::isnan(gather("energy_residual_rel", [](Sample &, int) {}).number));
 }
 
+// Blocks of 120 degrees of 3 A with a torque that alternates; and energies of the window alone.
+TEST(Metrics, TorquePerAmpereItsRippleAndLosses)
+{
+    const auto blocks = [](Sample &s, int k) {
+        plant_truth_t &t = s.rig.truth;
+        t.i_A[k % 3] = 3.0;
+        t.i_A[(k + 1) % 3] = -3.0;
+        t.torque_Nm = k % 2 == 0 ? -1.5 : -2.5;
+        t.e_copper_J = 7.0 + 1e-4 * 3.0 * k;
+        t.e_device_J = 1e-4 * k;
+        t.e_mech_J = 5.0 + 1e-4 * 12.0 * k;
+    };
+    EXPECT_NEAR(gather("torque_per_ampere_Nm_A", blocks).number, 2.0 / (3.0 * std::sqrt(2.0 / 3.0)), exact);
+    EXPECT_NEAR(gather("torque_ripple_rel", blocks).number, 0.25, exact);
+    EXPECT_NEAR(gather("loss_W", blocks).number, 4.0, 1e-6);
+    EXPECT_NEAR(gather("efficiency", blocks).number, 0.75, 1e-6);
+    EXPECT_TRUE(std::isnan(gather("loss_W", blocks, 1).number));
+    EXPECT_TRUE(std::isnan(gather("efficiency", blocks, 0).number));
+}
+
 TEST(Metrics, EveryMetricOfTheTableCanBeMade)
 {
     const pmsim::Setup setup = test_setup();

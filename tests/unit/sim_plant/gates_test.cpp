@@ -368,6 +368,22 @@ TEST_F(SlowSwitches, OneSwitchChoppedClosesWithoutDeadTime)
     expect(run(600, 200), {{20e-6 + off, GATE_OFF}, {60e-6 + on, GATE_LOW}});
 }
 
+// The switches exchanged: the lower one about the middle of the period.
+TEST_F(SlowSwitches, InvertedLegsExchangeTheirSwitches)
+{
+    run(0, 0);
+    run(600, 200);
+    pwm.state[0] = PLANT_LEG_LOWER_INVERTED;
+    run(600, 200);
+    expect(run(600, 200), {{20e-6 + on, GATE_LOW}, {60e-6 + off, GATE_OFF}});
+    pwm.state[0] = PLANT_LEG_INVERTED;
+    run(600, 200);
+    expect(run(600, 200), {{20e-6 + off, GATE_OFF},
+                           {20e-6 + closing, GATE_LOW},
+                           {60e-6 + off, GATE_OFF},
+                           {60e-6 + closing, GATE_HIGH}});
+}
+
 TEST_F(Gates, HeldLegsIgnoreTheCarrier)
 {
     run(0, 0);

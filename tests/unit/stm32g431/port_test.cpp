@@ -127,8 +127,9 @@ TEST_F(Port, EachStateOfALegHasItsOutputsAndMode)
     const struct {
         pm_leg_t state;
         uint32_t outputs, mode;
-    } rows[] = {{PM_LEG_OFF, 0, 6},   {PM_LEG_PWM, 5, 6},  {PM_LEG_UPPER, 1, 6},
-                {PM_LEG_LOWER, 4, 7}, {PM_LEG_HIGH, 5, 5}, {PM_LEG_LOW, 5, 4}};
+    } rows[] = {{PM_LEG_OFF, 0, 6},      {PM_LEG_PWM, 5, 6},           {PM_LEG_UPPER, 1, 6},
+                {PM_LEG_LOWER, 4, 7},    {PM_LEG_HIGH, 5, 5},          {PM_LEG_LOW, 5, 4},
+                {PM_LEG_INVERTED, 5, 7}, {PM_LEG_LOWER_INVERTED, 4, 6}};
     ASSERT_EQ(bridge_start(hal, &good), HAL_OK);
     EXPECT_EQ(TIM1.CR2 & TIM_CR2_CCPC, TIM_CR2_CCPC);
     for (const auto &row : rows) {
