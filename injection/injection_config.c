@@ -18,7 +18,7 @@ static void check_carrier(maker_t *m)
     if (pm_num_cmp(si(m, DRIVE_PARAM_v_injection), pm_num_mul(linear, pm_num_ratio(3, 5))) > 0) {
         refuse(m, DRIVE_PARAM_v_injection, "leaves too little of v_dc_nominal for control");
     } else if (!carrier_passes(m)) {
-        refuse(m, DRIVE_PARAM_v_injection, "is less than dead time and devices take");
+        refuse(m, DRIVE_PARAM_v_injection, "is lost in dead time");
     } else {
         /* room for both */
     }

@@ -459,17 +459,17 @@ class Rig
     // Would this sample find a crossing of which none ahead was seen?
     bool is_late(const six_step_in_t &in) const
     {
-        zero_crossing_t seen = six_step.crossing;
+        zero_crossing_t copy = six_step.crossing;
         const six_step_plan_t &plan = six_step.plan[0];
         const bool next = plan.commutate_at != 0 && plan.commutate_at < plan.sample_at;
-        if (seen.found || seen.ahead || next) {
+        if (copy.found || copy.ahead || next) {
             return false;
         }
         const zero_instant_t when = {in.now - 2U * machine.plant.inverter.timer_counts + plan.sample_at,
                                      static_cast<zero_legs_t>(plan.legs)};
         zero_expected_t expected = six_step.expected;
         expected.at = when.at; // due
-        return zero_crossing_step(&seen, &config.crossing, &in.sample, when, &expected);
+        return zero_crossing_step(&copy, &config.crossing, &in.sample, when, &expected);
     }
 
     // Up to a count of the period, in parts of it.

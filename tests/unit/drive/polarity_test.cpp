@@ -195,7 +195,9 @@ TEST(Lock, ALoopThatRunsAwayIsRefused)
     drive_params_t p = sine(1);
     p.start_fallback = 0;
     Start x(ipm(), p, 1.0);
-    x.run([](const drive_t &d) { return d.sequence.procedure == PROCEDURE_lock && !lock_looks(&d.beside.lock); });
+    x.run([](const drive_t &d) {
+        return d.sequence.procedure == PROCEDURE_lock && !lock_looks(&d.beside.lock);
+    });
     x.drive().position.pll.omega = PM_Q(0.7);
     for (int k = 0; k < 20; ++k) {
         x.period();
