@@ -69,28 +69,7 @@ drive_params_t sine(int32_t polarity, int32_t v_mV = 35000, int32_t f_mHz = 5000
 drive_params_t sine_of_spm(int32_t polarity)
 {
     drive_params_t p = sine(polarity, 8000);
-    p.pole_pairs = 5;
-    p.R_s = 383000;
-    p.L_d = 3000000;
-    p.L_q = 3300000;
-    p.psi_m = 77600000;
-    p.L_q_rated = 3296600;
-    p.L_dh_rated = 2994300;
-    p.L_qh_rated = 3288000;
-    p.L_dqh_rated = -51600;
-    p.cross_half = -7770;
-    p.leg_capacitance = 2000;
-    p.dead_time = 1000;
-    p.device_drop = 0;
-    p.v_dc_nominal = 36000;
-    p.v_full_scale = 60000;
-    p.v_dc_max = 50000;
-    p.v_dc_derate = 45000;
-    p.v_dc_min = 20000;
-    p.speed_max = 60000;
-    p.speed_trip = 72000;
-    p.speed_low = 4200;
-    p.speed_high = 8400;
+    direct::make_spm(p);
     return p;
 }
 
