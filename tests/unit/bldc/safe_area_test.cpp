@@ -56,8 +56,8 @@ double predicted_A(const Machine &m, const Options &o, double omega, double u)
                                           fixed(emf_Vs * base / kBase_V, PM_Q_BITS)};
     const freewheeling_in_t in = {o.pattern, 1, fixed(u, PM_Q_BITS), fixed(24 / kBase_V, PM_Q_BITS),
                                   fixed(omega / base, PM_Q_BITS)};
-    const double left = 30 * kDegree - ahead_rad(m, omega) -
-                        omega * (o.blank_s + 0.5 / m.plant.inverter.f_pwm_Hz);
+    const double left =
+        30 * kDegree - ahead_rad(m, omega) - omega * (o.blank_s + 0.5 / m.plant.inverter.f_pwm_Hz);
     return real(freewheeling_current(&config, &in, fixed(left, PM_Q_BITS))) * kBase_A;
 }
 
