@@ -16,7 +16,7 @@ static void follow(six_step_t *self)
     self->expected.at = self->commutation.crossing + self->expected.t_60 - (uint32_t)self->phase.shift[next];
 }
 
-static void open(six_step_t *self, const six_step_config_t *config, uint32_t sector, uint32_t since)
+static void open_sector(six_step_t *self, const six_step_config_t *config, uint32_t sector, uint32_t since)
 {
     zero_crossing_open(&self->crossing, sector, self->reverse, since);
     self->expected.threshold = thresholds_at(&self->thresholds, sector, self->reverse) & config->compared;
@@ -46,7 +46,7 @@ static void begin(six_step_t *self, const six_step_config_t *config, uint32_t se
     self->learn = false;
     follow(self);
     six_step_slow(self, config);
-    open(self, config, sector, now);
+    open_sector(self, config, sector, now);
     third_harmonic_open(&self->third, now);
     self->crossing.found = true;
     self->commutated = now;
@@ -113,7 +113,7 @@ static void look(six_step_t *self, const six_step_config_t *config, const six_st
             commutation_missed(&self->commutation);
             follow(self);
         }
-        open(self, config, sector, commutated ? start + plan->commutate_at : self->commutated);
+        open_sector(self, config, sector, commutated ? start + plan->commutate_at : self->commutated);
     }
     if (self->crossing.found) {
         if (self->learn) {
