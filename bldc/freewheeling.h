@@ -1,5 +1,6 @@
-/* How far the rotor turns while the current of the leg that has gone decays, predicted (METHODS.md 10.5.1, 10.5.3 to 10.5.5; rows 116,
- * 118, 119, 120), and the current up to which that leaves the crossing to be seen (10.5.2, 10.6; rows 117, 121).
+/* How far the rotor turns while the current of the leg that has gone decays, predicted (METHODS.md 10.5.1, 10.5.3 to
+ * 10.5.5; rows 116, 118, 119, 120), and the current up to which that leaves the crossing to be seen (10.5.2, 10.6; rows
+ * 117, 121).
  *
  *   theta_f = omega (L / R) ln(1 + 3 R i / x)
  *   x = u v_dc + 2 E          the leg that has come is chopped:     H_PWM_L_ON into odd sectors, H_ON_L_PWM into even

@@ -87,7 +87,7 @@ typedef struct {
     bool reverse;
     bool lost;
     third_harmonic_t third;
-    phase_compensation_t phase; /* all zero without by_instant */
+    phase_compensation_t phase; /* all zero where thresholds are compared */
 } six_step_t;
 
 /* theta at `now`; omega: electrical, per-unit, negative for the other direction; six sectors take less than 2^29 counts.
@@ -128,8 +128,7 @@ void six_step_step(six_step_t *self, const six_step_config_t *config, const six_
                    six_step_out_t *out);
 
 /* At 1 kHz: lag of the third harmonic, shifts of its crossings, the mean of thresholds, and what a sector must show of its swing,
- * an eighth, for its crossing to be one. Without
- * the call a rotor that has stopped may pass for one that turns. */
+ * an eighth, for its crossing to be one. Without the call a rotor that has stopped may pass for one that turns. */
 void six_step_slow(six_step_t *self, const six_step_config_t *config);
 
 void make_six_step(maker_t *m, six_step_config_t *c);

@@ -11,8 +11,8 @@
  * of it are free of each other and of the EMF:
  *   along   -2/N sum x_k cos q                A [1 + kappa cos(6 theta + theta_m)]: polarity by d-current
  *   second   2/N sum x_k e^{-j 2 phi_k-2}     z of zero_second.h: polarity by the second harmonic
- * at 1 kHz, 500 instructions with N = 20, the second twice that. A period may come between two of the samples and renew one: it is of the same
- * phase.
+ * at 1 kHz, 500 instructions with N = 20, the second twice that. A period may come between two of the samples and renew
+ * one: it is of the same phase.
  *
  * Forms, eps, misfit, delay: zero_sequence.h. Functions as injection.h says.
  * Tests: tests/unit/injection/zero_sequence_test.cpp, tests/scenario/zero_rotating.yaml. */

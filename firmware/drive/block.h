@@ -11,14 +11,14 @@
  *      is wanted slower than 3/4 of six_step_speed, or the other way, begins anew with the align.
  * From then on angle and speed come from the zero crossings:
  *   theta = theta of the last crossing + (t - t_z) / turn
- * The voltage must be that of the speed, on average: (u - lost) v_dc - 2 R i within half of the EMF, with what the dead time of
- * one or both legs takes, else crossings are believed that are
- * none, as of a rotor that was stopped. Where diodes carry the off time u v_dc is not the voltage, and this is not looked at.
+ * The voltage must be that of the speed, on average: (u - lost) v_dc - 2 R i within half of the EMF, with what the dead
+ * time of one or both legs takes, else crossings are believed that are none, as of a rotor that was stopped. Where diodes
+ * carry the off time u v_dc is not the voltage, and this is not looked at.
  *
  * A turn whose crossings are not where they belong ends it (missed_crossings): all legs off in the same period. With
  * flying_start the rotor is looked for, caught by the vector path and given back; without, or after resync_tries, the fault
- * is POSITION_LOST. A start whose crossings do not come, or are believed for no longer than 40 ms as those that noise makes of
- * a held rotor, is tried again, as often, and then the fault is STALL.
+ * is POSITION_LOST. A start whose crossings do not come, or are believed for no longer than 40 ms as those that noise makes
+ * of a held rotor, is tried again, as often, and then the fault is STALL.
  *
  * Current limit: i_max, derated as the vector's, and with freewheeling_limit what leaves the crossing to be seen:
  *   theta_f(i) + w (t_blank + T) <= 30 degrees             (freewheeling.h)

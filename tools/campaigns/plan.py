@@ -72,8 +72,9 @@ def laid_over(machine, sections):
 
 
 def chosen(sections):
-    """Without what is `untold`."""
-    return {name: {key: x for key, x in entries.items() if x is not None} for name, entries in sections.items()}
+    """Without what is `untold`, nor sections that have nothing else."""
+    left = {name: {key: x for key, x in entries.items() if x is not None} for name, entries in sections.items()}
+    return {name: entries for name, entries in left.items() if entries}
 
 
 class Campaign(CampaignFile):

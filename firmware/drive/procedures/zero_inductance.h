@@ -1,22 +1,24 @@
-/* dL_0 and L_c0 of a motor whose star point is led out, measured by the drive, and which way the load on the magnet changes them
- * (METHODS.md 6.2.1 and 8.3.2; rows 71 to 77 and 95): what zero_sequence.h must know.
+/* dL_0 and L_c0 of a motor whose star point is led out, measured by the drive, and which way the load on the magnet changes
+ * them (METHODS.md 6.2.1 and 8.3.2; rows 71 to 77 and 95): what zero_sequence.h must know.
  *
- * A current I along phase A, that of the command (rated by default) but psi_m / 2 (L_q - L_d) at most, turns the free rotor to theta = 0. There a carrier V_h e^{j phi} of
- * f_pwm / 20 turns, first with I, then without a current; friction keeps the rotor. Of a whole period of the carrier, with the complex
- * amplitudes I_a, I_b of the currents and Y of the channel, and [A, B] = Im(A* B):
+ * A current I along phase A, that of the command (rated by default) but psi_m / 2 (L_q - L_d) at most, turns the free rotor
+ * to theta = 0. There a carrier V_h e^{j phi} of f_pwm / 20 turns, first with I, then without a current; friction keeps the
+ * rotor. Of a whole period of the carrier, with the complex amplitudes I_a, I_b of the currents and Y of the channel, and
+ * [A, B] = Im(A* B):
  *   v_0 = p psi_0,  psi_0 = -1/2 Re[c i e^{j 2 theta}],  c = dL_0 - j L_c0          zero_sequence.h
  *   dL_0 I_a + L_c0 I_b = W = -K Y,   K = 2 T_s (1 - a q) / ((1 - a)(1 - q)),   a = e^{-T_s / RC},  q = e^{-j 2 pi / 20}
  *   dL_0 = [W, I_b] / [I_a, I_b]
  *   L_c0 = [I_a, W] / [I_a, I_b]
- * of the means without current over 32 values. K takes off the filter, and the differences that make a voltage of a current; dead time,
- * resistance and delay are in both and drop out. A rotor that friction keeps delta beside phase A turns c by 2 delta.
+ * of the means without current over 32 values. K takes off the filter, and the differences that make a voltage of a
+ * current; dead time, resistance and delay are in both and drop out. A rotor that friction keeps delta beside phase A turns
+ * c by 2 delta.
  *   D = |Y| with I - |Y| without,   margin = (|D| - |Y| / 128) / sigma                polarity.h
- * D < 0 beyond five sigma: zero_falls 1, with magnetising current; D > 0: 0. Below, the machine does not saturate: margin 0, and the
- * start cannot tell the poles by it (d_current.h).
+ * D < 0 beyond five sigma: zero_falls 1, with magnetising current; D > 0: 0. Below, the machine does not saturate: margin
+ * 0, and the start cannot tell the poles by it (d_current.h).
  *
- * The rotor must be free and without load; it turns by up to half a turn, electrical. 2.5 s. Each period 170 instructions. The bridge is
- * driven without dead-time compensation (commissioning.h). PM_FAILED_NO_CURRENT: a current does not come, or the carrier has no answer
- * in the currents; PM_FAILED_SALIENCY: none at the neutral, below 1/4000 of the inductance.
+ * The rotor must be free and without load; it turns by up to half a turn, electrical. 2.5 s. Each period 170 instructions.
+ * The bridge is driven without dead-time compensation (commissioning.h). PM_FAILED_NO_CURRENT: a current does not come, or
+ * the carrier has no answer in the currents; PM_FAILED_SALIENCY: none at the neutral, below 1/4000 of the inductance.
  * Tests: tests/unit/drive/zero_inductance_test.cpp. */
 #ifndef DRIVE_PROCEDURES_ZERO_INDUCTANCE_H
 #define DRIVE_PROCEDURES_ZERO_INDUCTANCE_H

@@ -61,6 +61,13 @@ struct Line {
     }
 };
 
+// e_0 of what is said of the open terminal.
+double e_0_V(const zero_sample_t &sample, zero_legs_t legs)
+{
+    const double open = real(virtual_third_terminal(&sample, legs)), n = legs;
+    return kBase_V * (open - n * real(sample.v_dc) / 2) / 3;
+}
+
 struct Signal {
     Line line, bare; // less what the legs put there, and without
 };
@@ -77,8 +84,8 @@ Signal signal_of(const Machine &m, double omega, bool reverse)
         const double off = wrapped_deg(r.seen.angle_rad - (60 + 60.0 * r.seen.sector) * kDegree);
         if (r.seen.there && r.seen.legs == ZERO_LEGS_APART && std::abs(off) < 15) {
             const double e = open_emf_V(r, omega);
-            s.line.add(e, kBase_V * real(virtual_third(&r.seen.sample, ZERO_LEGS_APART)));
-            s.bare.add(e, kBase_V * real(virtual_third(&r.seen.sample, ZERO_LEGS_LOW)));
+            s.line.add(e, e_0_V(r.seen.sample, ZERO_LEGS_APART));
+            s.bare.add(e, e_0_V(r.seen.sample, ZERO_LEGS_LOW));
         }
     }
     EXPECT_FALSE(r.six_step.lost);

@@ -198,6 +198,14 @@ class Files(unittest.TestCase):
         self.assertNotAlmostEqual(run.drawn["told_R"], 1, delta=1e-3)
         self.assertAlmostEqual(float(run.settings["t_end"]), 1 + 2 * machine["drive"]["t_align"], places=6)
 
+    def test_what_is_untold_is_chosen(self):
+        def told(value):
+            text = CAMPAIGN.replace("told:\n", f"told:\n  drive: {{i_pulse: {value}}}\n")
+            return yaml.safe_load(self.campaign(text).run(0).machine)["drive"]["i_pulse"]
+
+        self.assertEqual(told("7 if L > 0 else untold"), 7)
+        self.assertEqual(told("untold if L > 0 else 7"), 20)  # rated current
+
     def test_a_run_does_not_depend_on_others(self):
         campaign = self.campaign()
         forwards = [campaign.run(n) for n in range(4)]

@@ -2,6 +2,7 @@
 import math
 import sys
 import unittest
+import unittest.mock
 from pathlib import Path
 
 import yaml
@@ -97,6 +98,24 @@ class Carrier(unittest.TestCase):
             self.assertEqual(chosen["injection_bandwidth"][0], 10)
             self.assertEqual(chosen["speed_bandwidth"][0], 2.5)
             self.assertIn("predicted", chosen["v_injection"][1])
+
+    def test_a_carrier_that_is_told_is_not_looked_for(self):
+        x = machine("ipm_1000")
+        told = {"v_injection": 50.0, "f_injection": 500.0, "injection_bandwidth": 9.0}
+        x["drive"] = {"injection": carrier.PULSATING, **told}
+        with unittest.mock.patch.object(carrier, "grid", side_effect=AssertionError):
+            chosen = tune.drive(x, tune.complete(x), 0.15)
+            self.assertEqual({name: chosen[name][0] for name in told}, told)
+            del x["drive"]["f_injection"]
+            with self.assertRaises(AssertionError):
+                tune.drive(x, tune.complete(x), 0.15)
+
+    def test_the_second_harmonic_needs_carriers_of_16_periods(self):
+        d = parameters(machine("ipm_1000"), injection=4, v_injection=70.0, injection_bandwidth=10.0)
+        with unittest.mock.patch.object(carrier, "error_deg", return_value=0.0):
+            for polarity, least in ((1, 8), (3, 20)):
+                found = carrier.grid(None, {**d, "polarity": polarity}, 100.0)[1]
+                self.assertEqual(min(d["f_pwm"] / f for _, f in found), least)
 
     def test_a_motor_without_a_carrier_is_refused_with_the_remedy(self):
         x = machine("spm_400")
