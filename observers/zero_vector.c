@@ -30,7 +30,7 @@ static int32_t room_at(const zero_vector_config_t *config, pm_q_t v, pm_q_t v_dc
 static void place(zero_vector_t *self, const zero_vector_config_t *config, int32_t x)
 {
     const int32_t counts = config->counts;
-    self->x = (uint16_t)pm_clamp(x, counts / 16, counts / 2 - (int32_t)config->guard);
+    self->x = (uint16_t)pm_clamp(x, counts / 12, counts / 2 - (int32_t)config->guard);
     self->foreign = IN_FLIGHT;
 }
 

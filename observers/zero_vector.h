@@ -15,7 +15,7 @@
  * T_dt / 2 later than x says, and
  *   x <= T/4 (1 - sqrt(3) |v| / v_dc) - T_dt - t_settle
  * at 1 kHz with T/128 to spare. A pair of which a period had more voltage than that is left out, and as long as none
- * comes the error signal is 0: the loop coasts, and when that takes longer than 20 pairs the misfit is 1. x is at least T/32. Refused when configured: `speed_high`
+ * comes the error signal is 0: the loop coasts, and when that takes longer than 20 pairs the misfit is 1. x is at least T/24. Refused when configured: `speed_high`
  * where w psi_m 2x / L_q without load is below four steps of the converter, `speed_max` where the zero vector
  * of rated current is too short.
  *

@@ -36,7 +36,7 @@ static void require_room(maker_t *m, const zero_vector_config_t *c)
 {
     const pm_num_t drop = pm_num_mul(si(m, DRIVE_PARAM_R_s), si(m, DRIVE_PARAM_i_rated));
     const pm_num_t v = pm_num_add(emf_at(m, DRIVE_PARAM_speed_max), drop);
-    if (pm_num_cmp(distance(m, c, v), pm_num_ratio(1, 16)) < 0) {
+    if (pm_num_cmp(distance(m, c, v), pm_num_ratio(1, 12)) < 0) {
         refuse(m, DRIVE_PARAM_speed_max, "leaves no zero vector to take two samples in");
     }
 }

@@ -39,7 +39,7 @@ drive_params_t params(const Machine &m = bench::kSpmLinear)
     p.device_drop = 0;
     p.speed_low = 3600;
     p.speed_high = 4190;
-    p.speed_max = 36000;
+    p.speed_max = 34000;
     return p;
 }
 
