@@ -30,7 +30,7 @@ static int32_t room_at(const zero_vector_config_t *config, pm_q_t v, pm_q_t v_dc
 static void place(zero_vector_t *self, const zero_vector_config_t *config, int32_t x)
 {
     const int32_t counts = config->counts;
-    self->x = (uint16_t)pm_clamp(x, counts / 12, counts / 2 - (int32_t)config->guard);
+    self->x = (uint16_t)pm_clamp(x, counts / 16, counts / 2 - (int32_t)config->guard);
     self->foreign = IN_FLIGHT;
 }
 
@@ -41,7 +41,7 @@ static void follow(zero_vector_t *self, const zero_vector_config_t *config)
     if (self->square == 0) {
         return;
     }
-    const int32_t spare = config->counts / 64;
+    const int32_t spare = config->counts / 128;
     const pm_q_t v_dc = pm_max(self->v_dc, V_DC_LEAST);
     const pm_q_t v = pm_sqrt(pm_shl(pm_min(self->square, PM_ONE / 4), 4));
     const int32_t room = room_at(config, v, v_dc);
@@ -138,12 +138,24 @@ void zero_vector_step(zero_vector_t *self, const zero_vector_config_t *config, c
     emf->i = in->i;
 }
 
+/* emf.h takes no more than one for the amplitude, so that noise would make the reference too small, by 13 % where
+ * the current changes by four steps of the converter. */
+static pm_q_t amplitude(const zero_vector_t *self, const zero_vector_config_t *config, pm_dq_t i)
+{
+    const emf_t *emf = &self->emf;
+    const pm_q_t relative = pm_shl(pm_sat(pm_mulh(emf->e.q, emf->inverse), 17), PM_Q_BITS - 16);
+    const pm_q_t lack = pm_mul(PM_ONE - relative, emf->psi_ref);
+    return observer_amplitude(&config->emf.model, i, emf->psi_ref, lack);
+}
+
 void zero_vector_slow(zero_vector_t *self, const zero_vector_config_t *config, const obs_in_t *in,
                       const obs_out_t *out, pm_q_t weight)
 {
     (void)out;
     const emf_machine_t machine = machine_of(config, in);
+    const pm_q_t psi = amplitude(self, config, in->i_dq);
     emf_slow(&self->emf, &config->emf, &machine, in, weight);
+    self->emf.psi_ref = weight == 0 ? self->emf.psi_ref : psi;
     follow(self, config);
     adjust(self, config, &machine, in);
 }

@@ -7,20 +7,21 @@
  * i_q falls at its own rate, so that its amplitude is about w psi_m L_d / L_q; and where L_dq is known, its angle
  * is corrected by
  *   tan = lambda (L_q / L_d + R i_q / (w psi_ref)),   lambda = i_q / i_rated (L_dqh / L_qh)_rated
- * R is not adapted: with it e would be to blame for what the saliency takes of the amplitude.
+ * R is not adapted: the amplitude that tells of it lacks what the saliency takes.
  *
  * One further sample a period: in one ahead of t_k, in the next behind t_k, so there is an EMF in every second
  * period, w T old when it is there, as that of emf.h. The lower switches conduct from T_dt behind the last edge
  * on, which compensation of dead time puts up to T_dt / 2 later, until T_dt / 2 before the next one: both instants lie
  * T_dt / 2 later than x says, and
  *   x <= T/4 (1 - sqrt(3) |v| / v_dc) - T_dt - t_settle
- * at 1 kHz with T/128 to spare. A pair of which a period had more voltage than that is left out, and as long as none
- * comes the error signal is 0: the loop coasts, and when that takes longer than 20 pairs the misfit is 1. x is at least T/24. Refused when configured: `speed_high`
- * where w psi_m 2x / L_q without load is below four steps of the converter, `speed_max` where the zero vector
- * of rated current is too short.
+ * at 1 kHz for the largest voltage of the last millisecond, with T/256 to spare; x is at least T/32. A pair of
+ * which a period had more voltage is left out, and as long as none comes the error signal is 0: the loop coasts.
+ * Behind 20 missed pairs the misfit is 1. Refused when configured, as `observer`: where w psi_m 2x / L_q without load is
+ * below four steps of the converter at `speed_high`, and where x at rated current is below T/24 at `speed_max`.
  *
- * Called each period; the result belongs to k. vector: extended EMF. State 136 bytes, code 1,000, 60 instructions
- * a period with its loop. Tests: tests/unit/observers/zero_vector_test.cpp, tests/scenario/zero_vector.yaml. */
+ * Called each period; the result belongs to k. vector: extended EMF. 100 bytes of state and 96 of configuration, 1,110 of
+ * code and 1,680 of its maker; 122 instructions a period with its loop, 152 at most. The samples cost the port and the
+ * drive 50 more. Tests: tests/unit/observers/zero_vector_test.cpp, tests/scenario/zero_vector.yaml. */
 #ifndef OBSERVERS_ZERO_VECTOR_H
 #define OBSERVERS_ZERO_VECTOR_H
 

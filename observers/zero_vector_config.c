@@ -11,7 +11,7 @@ static pm_num_t distance(const maker_t *m, const zero_vector_config_t *c, pm_num
     const pm_num_t used = pm_num_div(pm_num_mul(pm_num_sqrt(pm_num(3)), v), si(m, DRIVE_PARAM_v_dc_nominal));
     const pm_num_t zero = pm_num_mul(pm_num_ratio(1, 2), pm_num_sub(pm_num(1), used));
     const int32_t counts = c->counts;
-    return pm_num_sub(zero, pm_num_ratio((int32_t)c->guard + counts / 64, counts));
+    return pm_num_sub(zero, pm_num_ratio((int32_t)c->guard + counts / 128, counts));
 }
 
 static pm_num_t emf_at(const maker_t *m, drive_param_id_t speed)
@@ -27,17 +27,20 @@ static void require_steps(maker_t *m, const zero_vector_config_t *c)
     const pm_num_t change = pm_num_div(pm_num_mul(emf, time), si(m, DRIVE_PARAM_L_q));
     const pm_num_t steps = pm_num_mul(pm_num_ratio(STEPS, CONVERTER), m->base.i);
     if (pm_num_cmp(change, steps) < 0) {
-        refuse(m, DRIVE_PARAM_speed_high,
-               "below four steps of the current within a zero vector, i_full_scale L_q / (512 psi_m time)");
+        refuse(m, DRIVE_PARAM_observer,
+               "at speed_high sees less than four steps of the current within a zero vector");
     }
 }
 
 static void require_room(maker_t *m, const zero_vector_config_t *c)
 {
-    const pm_num_t drop = pm_num_mul(si(m, DRIVE_PARAM_R_s), si(m, DRIVE_PARAM_i_rated));
-    const pm_num_t v = pm_num_add(emf_at(m, DRIVE_PARAM_speed_max), drop);
+    const pm_num_t i = si(m, DRIVE_PARAM_i_rated);
+    const pm_num_t v_q = pm_num_add(emf_at(m, DRIVE_PARAM_speed_max), pm_num_mul(si(m, DRIVE_PARAM_R_s), i));
+    const pm_num_t omega = pm_num_mul(si(m, DRIVE_PARAM_speed_max), pole_pairs(m));
+    const pm_num_t v_d = mul3(omega, si(m, DRIVE_PARAM_L_q), i);
+    const pm_num_t v = pm_num_sqrt(pm_num_add(square(v_q), square(v_d)));
     if (pm_num_cmp(distance(m, c, v), pm_num_ratio(1, 12)) < 0) {
-        refuse(m, DRIVE_PARAM_speed_max, "leaves no zero vector to take two samples in");
+        refuse(m, DRIVE_PARAM_observer, "at speed_max has no zero vector to take two samples in");
     }
 }
 

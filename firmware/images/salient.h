@@ -6,7 +6,7 @@
 /* clang-format off */
 #define PM_IMAGE_NAME "salient"
 #define PM_IMAGE_TRACE_NUMBERS 3600U
-#define PM_CHANNELS (NEEDS_SECOND_SAMPLE)
+#define PM_CHANNELS 0x0000U
 
 #define PM_WITHOUT_deadbeat 1
 #define PM_WITHOUT_finite_set 1
@@ -32,6 +32,7 @@
 #define PM_WITHOUT_third_integration 1
 #define PM_WITHOUT_third_sogi 1
 #define PM_WITHOUT_third_crossings 1
+#define PM_WITHOUT_zero_vector 1
 #define PM_WITHOUT_pwm_excitation 1
 #define PM_WITHOUT_zero_anti_rotating 1
 #define PM_WITHOUT_zero_rotating 1

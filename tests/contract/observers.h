@@ -67,7 +67,7 @@ inline ObserverCase observer_case(observer_id_t id, const char *name, const Mach
     if (id == OBSERVER_zero_vector) { // sees its EMF at higher speeds only
         p.speed_low = static_cast<int32_t>(0.3 * p.speed_trip);
         p.speed_high = static_cast<int32_t>(0.38 * p.speed_trip);
-        p.speed_max = static_cast<int32_t>(0.7 * p.speed_trip);
+        p.speed_max = static_cast<int32_t>(0.5 * p.speed_trip);
     }
     if (!drive_configure(&config, &p, PM_CHANNELS).ok) {
         p.L_d = p.L_q;

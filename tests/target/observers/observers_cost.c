@@ -59,7 +59,7 @@ static bool configure(observer_id_t id)
     params.psi_3 = 7080000;
     if (id == OBSERVER_zero_vector) { /* sees its EMF at higher speeds only */
         params.speed_high = params.speed_trip / 5 * 2;
-        params.speed_max = params.speed_trip / 5 * 3;
+        params.speed_max = params.speed_trip / 2;
     }
     if (!drive_configure(&config, &params, PM_CHANNELS).ok) { /* for a round machine */
         params.L_q = params.L_d;

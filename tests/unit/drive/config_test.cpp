@@ -331,7 +331,7 @@ TEST(Config, LqBelowLdIsAccepted)
         p.psi_3 = 7080000; // for those that need it
         if (observer == OBSERVER_zero_vector) {
             p.speed_high = p.speed_trip / 5 * 2;
-            p.speed_max = p.speed_trip / 5 * 3;
+            p.speed_max = p.speed_trip / 2;
         }
         drive_config_t one = {};
         const drive_result_t r = drive_configure(&one, &p, PM_CHANNELS);
