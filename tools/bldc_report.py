@@ -8,6 +8,7 @@ usage: bldc_report.py [--out DIR] | --check
 """
 import argparse
 import csv
+import json
 import math
 import re
 import subprocess
@@ -27,7 +28,7 @@ LOADS = (0.1, 0.4)  # of rated torque, beside fan or impeller and friction
 TIMES = {FAN: (1.5, 2.0, 2.4), HS: (0.8, 1.2, 1.4)}  # of the load, of the window
 WITHIN = 0.1  # of the current: METHODS.md 10.5.2
 AREA_SPEEDS = (0.37, 0.47, 0.58)
-AREA_SHARES = (0.6, 0.8, 1.0, 1.2)
+AREA_SHARES = (0.7, 0.85, 1.0, 1.15)
 
 
 def drives(machine):
@@ -49,7 +50,11 @@ def run(text):
         done = subprocess.run([PMSIM, "run", path, "--quiet", "--out", folder], capture_output=True, text=True, check=False)
         if done.returncode > 1:
             fail(done.stderr)
-        head, *rows = csv.reader((Path(folder) / "runs.csv").open(encoding="utf-8"))
+        path = Path(folder) / "runs.csv"
+        if not path.exists():  # a single run
+            items = json.loads((Path(folder) / "result.json").read_text(encoding="utf-8"))["expectations"]
+            return [{item["metric"]: item["value"] for item in items}]
+        head, *rows = csv.reader(path.open(encoding="utf-8"))
     return [dict(zip((name.split("[")[0] for name in head), row)) for row in rows]
 
 
@@ -176,7 +181,6 @@ HEAD = """# Block commutation
 Each pattern of pulses and each way to see the crossings, over speed and load, beside field orientation of the same machine: the whole
 drive on the switching plant, from rest, with the dead time, leg capacitance, converter and noise of the machine's file. Made by
 `tools/bldc_report`. Sections 10.3 to 10.6 of the book; what is asked of each row: [results](../results.md).
-
 """
 
 WHICH = """## Which to take
@@ -191,7 +195,6 @@ WHICH = """## Which to take
 - **field orientation**: where torque must be smooth or losses low: {more:.0f} % more torque of an ampere of BLDC-FAN and {less:.0f} % of the
   torque ripple at {p}. It needs three currents and the flux observer, {vector} instructions a period on average where block
   commutation takes {block} (without current control and interrupt), and an open-loop start that BLDC-HS does not make.
-
 """
 
 
