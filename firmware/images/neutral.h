@@ -39,6 +39,7 @@
 #define PM_WITHOUT_mras_current 1
 #define PM_WITHOUT_mras_voltage 1
 #define PM_WITHOUT_mras_simple 1
+#define PM_WITHOUT_zero_vector 1
 #define PM_WITHOUT_rotating_sine 1
 #define PM_WITHOUT_inform 1
 #define PM_WITHOUT_pwm_excitation 1
