@@ -532,6 +532,8 @@ FAULTS = (
     Fault(18, "BRIDGE_OVERLOAD", 'bridge overloaded', 0x2351, ('the bridge was loaded beyond i_bridge for too long: lower i_max or i_rated, '
  'or cool it and use another board')),
     Fault(19, "OPEN_PHASE", 'a phase or a switch does not conduct', 0x3321, "check the motor's cable and winding, then the switches and their drivers"),
+    Fault(20, "NO_THIRD_HARMONIC", 'no third harmonic at the star point', 0x7307, ('check the lead to the star point and psi_3, or take an observer that needs '
+ 'none')),
 )
 
 # Error codes of 603Fh, 1003h and the emergency message beside those of faults
