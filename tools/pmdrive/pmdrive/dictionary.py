@@ -278,7 +278,7 @@ ENTRIES = (
     Entry(0x2330, 3, "third_notch", "third", "i32", "live", "1", -3, 0, 0, 500, 0, False, True, "machine", "none", {}, ('bandwidth of what takes out the frequency of rotation, of unlike phases and '
  'dividers, over that frequency; 0: off'), "11.6.4 #134"),
     Entry(0x2330, 4, "third_gain", "third", "i32", "live", "1", -3, 0, 200, 2000, 1400, False, True, "machine", "none", {}, 'third_sogi: gain of the integrator; 2: as fast as it can be', "11.4.3 #129"),
-    Entry(0x2330, 5, "third_drift", "third", "i32", "live", "1", -3, 0, 0, 1000, 300, False, True, "machine", "none", {}, ("third_integration: corner of the integration over the third harmonic's "
+    Entry(0x2330, 5, "third_drift", "third", "i32", "live", "1", -3, 0, 0, 1000, 400, False, True, "machine", "none", {}, ("third_integration: corner of the integration over the third harmonic's "
  'frequency; 0: drifts'), "11.4.1 #127"),
     Entry(0x2400, 0, "injection.count", "injection", "u8", "const", "", 0, 0, None, None, 66, False, False, "none", "none", {}, 'highest sub-index', ""),
     Entry(0x2400, 1, "i_pulse", "injection", "i32", "live", "A", -3, 0, 50, 4000000, 4000, False, True, "application", "none", {}, 'peak current of the initial-position pulses', "9.4.2 #101"),
