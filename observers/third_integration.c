@@ -44,11 +44,17 @@ static inline int32_t of_speed(const third_integration_t *self, pm_half_dir_t ph
     return pm_mulh(pm_mulh(pm_shl(pm_mulh(phase.sin, phase.cos), 4), more), lacks) / 4;       /* of Q19 */
 }
 
+static inline pm_q_t eps_of(const third_integration_t *self)
+{
+    return pm_frac(pm_shl(self->seen, PM_Q_BITS - THIRD_Z_BITS), PM_FRAC(1.0 / 3));
+}
+
 void third_integration_reset(third_integration_t *self, const third_integration_config_t *config,
                              const obs_in_t *in)
 {
     third_reset(&self->third, &config->third, in);
     self->share = THIRD_Z_ONE;
+    self->seen = 0;
     set_speed(self, config, in);
     self->x = -third_seed(&config->third, in).q;
     /* psi' = |L / (1 + j x)| (c - h sgn omega s) / (1 + g h), half a period ahead of the present: a period more than the seed */
@@ -68,16 +74,18 @@ void third_integration_step(third_integration_t *self, const third_integration_c
     const int32_t psi = self->psi;
     self->x = x;
     const int32_t rise = pm_mulh(x, config->third.t_s);
-    self->psi = pm_add_sat(pm_mulh_sub(psi, psi + (rise / 2 - expected(self, phase)) / 2, self->leak), rise);
+    self->psi = pm_add_sat(pm_mulh_sub(psi, psi + pm_half(pm_half(rise) - expected(self, phase)), self->leak), rise);
     const int32_t q_30 = pm_shl_sat(pm_mulh(psi, self->lift), 3, 30) - pm_shl(pm_mulh(y, self->back), 2);
     third_compare(&self->third, dir, y, q_30, out);
-    const int32_t q = pm_sat(self->third.last.q + of_speed(self, phase), THIRD_Z_BITS);
-    out->eps = pm_frac(pm_shl(q, PM_Q_BITS - THIRD_Z_BITS), PM_FRAC(1.0 / 3));
+    self->seen = pm_sat(self->third.last.q + of_speed(self, phase), THIRD_Z_BITS);
+    out->eps = eps_of(self);
 }
 
 obs_out_t third_integration_last(const third_integration_t *self)
 {
-    return third_last(&self->third);
+    obs_out_t out = third_last(&self->third);
+    out.eps = eps_of(self);
+    return out;
 }
 
 void third_integration_tie(third_integration_t *self, const third_integration_config_t *config)

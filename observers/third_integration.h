@@ -42,6 +42,7 @@ typedef struct {
     pm_half_dir_t along; /* conjugate of L / (1 + j x), its direction */
     int32_t size;        /* a |L / (1 + j x)|, per-unit, Q30 */
     int32_t share;       /* a, Q17 */
+    int32_t seen;        /* 3 eps of the last step, Q17 */
 } third_integration_t;
 
 void third_integration_reset(third_integration_t *self, const third_integration_config_t *config,
