@@ -101,13 +101,13 @@ def cell(result):
 
 TAKE = """## Which to take
 
-- **No lead to the star point**, or load steps and reversals below 20 % of speed: an observer of the fundamental, `active_flux` first.
-  Its voltages answer to a step at once; the pair that a third-harmonic source is made of takes a part of a cycle to follow the speed.
-- **`third_sogi`**: the star point is led out, R and inductances are not known or change, the speed stays above 10 %. A tenth of the
-  mean error of `active_flux` from there on, at any load, for ten instructions more; noise hardly shows. At 5 % it wants slower
-  loops, 8 and 2 Hz: within 1.5 degrees (`tests/scenario/third_sogi.yaml`), and is lost with those of this page.
-- **`third_integration`**: the same down to 5 % with loops of 10 and 3 Hz, and quicker under load steps; an integral, whose drift is
-  removed (`tests/scenario/third_integration.yaml`).
+- **No lead to the star point**: an observer of the fundamental, `active_flux` first.
+- **`third_integration`**: load steps and reversals at low speed, with a loop of 15 Hz, where it follows better than any observer of
+  the fundamental with the same loop; R and inductances are not known or change; from 5 % of speed on with loops of 10 and 3 Hz.
+  An integral, whose drift is removed (`tests/scenario/third_integration.yaml`, `third_dynamics.yaml`).
+- **`third_sogi`**: the same from 10 % on for speeds that change slowly, thirty instructions less and the least error in steady state, a
+  tenth of the mean of `active_flux` at any load; noise hardly shows. Its pair takes a part of a cycle to follow the speed. At
+  5 % it wants slower loops, 8 and 2 Hz: within 1.5 degrees (`tests/scenario/third_sogi.yaml`), and is lost with those of this page.
 - **`third_crossings`**: a speed that changes slowly, or a comparator instead of a converter: between crossings it knows no more than
   the last speed.
 
