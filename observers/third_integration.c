@@ -74,7 +74,7 @@ void third_integration_step(third_integration_t *self, const third_integration_c
     const int32_t psi = self->psi;
     self->x = x;
     const int32_t rise = pm_mulh(x, config->third.t_s);
-    self->psi = pm_add_sat(pm_mulh_sub(psi, psi - pm_half(expected(self, phase)), self->leak), rise);
+    self->psi = pm_add_sat(pm_mulh_sub(psi, psi + pm_half(pm_half(rise) - expected(self, phase)), self->leak), rise);
     const int32_t q_30 = pm_shl_sat(pm_mulh(psi, self->lift), 3, 30) - pm_shl(pm_mulh(y, self->back), 2);
     third_compare(&self->third, dir, y, q_30, out);
     self->seen = pm_sat(self->third.last.q + of_speed(self, phase), THIRD_Z_BITS);

@@ -23,7 +23,7 @@ static void take_sample(const drive_t *drive, const drive_in_t *in, zero_sample_
 }
 
 #if PM_CARRIES(NEEDS_NEUTRAL)
-static bool starts(const drive_t *drive)
+static bool is_starting(const drive_t *drive)
 {
     return drive->block.six_step.commutation.young != 0U || drive->block_ms < 2U * WRONG_MS;
 }
@@ -33,7 +33,7 @@ PM_APART static void look_for_third(drive_t *drive, const drive_in_t *in, six_st
 {
     block_t *self = &drive->block;
     const six_step_plan_t *plan = &self->six_step.plan[0];
-    if (seen->sampled && plan->commutate_at == 0U && !self->six_step.lost && starts(drive)) {
+    if (seen->sampled && plan->commutate_at == 0U && !self->six_step.lost && is_starting(drive)) {
         take_sample(drive, in, &seen->sample);
         const third_missing_in_t at = {.sample = &seen->sample,
                                        .v_zero = seen->v_zero,

@@ -35,7 +35,8 @@ struct Start {
             const double open = 1.5 * omega * kPsi * std::sin(x) - drop * k / 1000;
             zero_sample_t sample = {};
             sample.v_dc = PM_Q(kLink);
-            sample.v[1] = per_unit((legs * kLink / 2 + open) * (1 + divider) + lsb(noise));
+            sample.v[1] =
+                per_unit((static_cast<double>(legs) * kLink / 2 + open) * (1 + divider) + lsb(noise));
             const double zero = third * 3 * omega * kPsi3 * std::sin(3 * x) + 0.003;
             const third_missing_in_t in = {&sample, per_unit(zero + lsb(noise)), 2, 1, legs};
             third_missing_step(&seen, &kConfig, &in);
