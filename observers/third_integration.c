@@ -62,6 +62,7 @@ void third_integration_reset(third_integration_t *self, const third_integration_
     const pm_half_dir_t lagging = {.cos = phase.cos - pm_shl(pm_mulh(phase.sin, self->back), 2), .sin = 0};
     const pm_q_t per = pm_div(PM_ONE, PM_ONE + pm_mul(config->g, config->lead));
     self->psi = pm_mul(expected(self, lagging), per) + pm_mulh(self->x, config->third.t_s);
+    self->size = config->expects ? self->size : 0;
 }
 
 void third_integration_step(third_integration_t *self, const third_integration_config_t *config,
@@ -74,7 +75,8 @@ void third_integration_step(third_integration_t *self, const third_integration_c
     const int32_t psi = self->psi;
     self->x = x;
     const int32_t rise = pm_mulh(x, config->third.t_s);
-    self->psi = pm_add_sat(pm_mulh_sub(psi, psi + pm_half(pm_half(rise) - expected(self, phase)), self->leak), rise);
+    const int32_t offset = psi + pm_frac(rise, config->centre) - pm_half(expected(self, phase));
+    self->psi = pm_add_sat(pm_mulh_sub(psi, offset, self->leak), rise);
     const int32_t q_30 = pm_shl_sat(pm_mulh(psi, self->lift), 3, 30) - pm_shl(pm_mulh(y, self->back), 2);
     third_compare(&self->third, dir, y, q_30, out);
     self->seen = pm_sat(self->third.last.q + of_speed(self, phase), THIRD_Z_BITS);
@@ -104,4 +106,5 @@ void third_integration_slow(third_integration_t *self, const third_integration_c
         self->share = pm_clamp(share, THIRD_Z_ONE / 2, THIRD_Z_ONE + THIRD_Z_ONE / 2);
     }
     set_speed(self, config, in);
+    self->size = config->expects ? self->size : 0;
 }

@@ -29,7 +29,9 @@ extern "C" {
 typedef struct {
     third_config_t third;
     pm_q_t g;
-    pm_q_t lead; /* h */
+    pm_q_t lead;      /* h */
+    bool expects;     /* else without psi^ and with h = g */
+    pm_frac_t centre; /* of what the period adds, to the instant of what is removed: 1/4, 1/2 without psi^ */
 } third_integration_config_t;
 
 typedef struct {
