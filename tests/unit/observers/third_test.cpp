@@ -28,10 +28,6 @@ drive_params_t params(observer_id_t id)
 {
     drive_params_t p = bench::parameters(bench::kIpmLinear, kB);
     p.observer = id;
-    if (id == OBSERVER_third_crossings) {
-        p.third_drift =
-            300; // without psi^ the second order of 3 omega T grows with it: 0.14 degrees with the preset
-    }
     p.neutral_full_scale = 15000;
     p.neutral_filter = 100000;
     p.speed_low = 3200;
