@@ -33,16 +33,40 @@ static uint32_t between(const zero_crossing_t *self, uint32_t at, pm_q_t y)
     return self->at + (uint32_t)pm_unit((int32_t)(at - self->at), pm_ratio(-self->y, y - self->y));
 }
 
+/* More than 15 degrees before the crossing is due. */
+static bool is_early(uint32_t at, const zero_expected_t *expected)
+{
+    return (int32_t)(expected->at - at) > (int32_t)(expected->t_60 / 4U);
+}
+
+/* With the sample before, within four times what the EMF rises by in the time between and half of `rail`. */
+static bool agrees(const zero_crossing_t *self, const zero_crossing_config_t *config, uint32_t at, pm_q_t y,
+                   const zero_expected_t *expected)
+{
+    const uint32_t t = at - self->at, t_60 = expected->t_60;
+    if (t >= t_60 / 4U) {
+        return true;
+    }
+    const pm_q_t rise =
+        pm_unit(zero_crossing_swing(config, t_60), pm_ratio((pm_q_t)(4U * t), (pm_q_t)t_60));
+    return pm_abs(y - self->y) <= rise + pm_half(config->rail);
+}
+
 /* A first sample past the crossing: not on its way from the rail to the EMF. */
-static bool believed(zero_crossing_t *self, uint32_t at, pm_q_t y, const zero_expected_t *expected,
-                     pm_q_t swing)
+static bool believed(zero_crossing_t *self, const zero_crossing_config_t *config, uint32_t at, pm_q_t y,
+                     const zero_expected_t *expected, pm_q_t swing)
 {
     if (y > swing - pm_frac(swing, PM_FRAC(0.375))) {
         return false;
     }
-    const bool again = self->past;
+    const bool again = self->past && (!is_early(at, expected) || agrees(self, config, at, y, expected));
     self->past = true;
-    return again || (int32_t)(at - expected->at) >= 0;
+    if (again || (int32_t)(at - expected->at) >= 0) {
+        return true;
+    }
+    self->at = at;
+    self->y = y;
+    return false;
 }
 
 typedef struct {
@@ -57,7 +81,7 @@ PM_APART static bool is_late(zero_crossing_t *self, const zero_crossing_config_t
 {
     const uint32_t t_60 = expected->t_60;
     const pm_q_t swing = zero_crossing_swing(config, t_60);
-    if (!self->ahead && !believed(self, in.at, in.y, expected, swing)) {
+    if (!self->ahead && !believed(self, config, in.at, in.y, expected, swing)) {
         return false;
     }
     if (!in.past) {
@@ -116,6 +140,14 @@ bool zero_crossing_step(zero_crossing_t *self, const zero_crossing_config_t *con
         self->y = y;
         self->ahead = true;
         self->cut = cut;
+        self->past = false;
+        return false;
+    }
+    if (self->ahead && is_early(at, expected) && !agrees(self, config, at, y, expected)) {
+        self->ahead = false; /* one of the two was on its way from a rail */
+        self->at = at;
+        self->y = y;
+        self->past = true;
         return false;
     }
     if (self->ahead && !self->cut && !past) {

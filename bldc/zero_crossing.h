@@ -27,6 +27,9 @@
  * Behind it the terminal swings to its EMF with the capacitance of the leg. So a sample that is past the crossing without
  * one ahead of it counts where the crossing is due by then, or where the next one says the same; not further past
  * than 5/8 of the swing, where no rotor in this sector can be.
+ * An EMF beyond the rails drives a current through the diode of the open leg in the off time, too, which ceases in the on
+ * time: where a crossing would be early by 15 degrees, the samples on both sides of it must agree with the slope of the EMF, else
+ * they tell nothing.
  * With both legs high the upper diode holds it above v_dc, and `rail` counts from there upwards: EMFs of either sign are
  * seen, as far as the channel's full scale leaves room. With both low that is beyond a channel which begins at zero: there
  * freewheeling and past look alike at a downward crossing, and a late one is missed. An offset of the channel, or of
@@ -92,8 +95,8 @@ typedef struct {
     uint8_t leg; /* the open one */
     bool rising;
     uint32_t open_since; /* instant of the commutation into it */
-    uint32_t at;         /* instant of the crossing, once found; before, of the last sample ahead of it */
-    pm_q_t y;            /* of that sample, < 0 */
+    uint32_t at;         /* instant of the crossing, once found; before, of the last sample ahead of it, or past */
+    pm_q_t y;            /* of that sample, < 0 ahead of the crossing */
     bool ahead;          /* there was such a sample, */
     bool cut;            /* and a rail has cut it */
     bool past;           /* a sample was past the crossing, without one ahead of it */

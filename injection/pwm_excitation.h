@@ -1,6 +1,6 @@
 /* PWM excitation: the edges of the normal pattern are moved so that the active vectors of the two halves of a
- * period differ, and the current is sampled between them (METHODS.md 4.6.2, of which the derivative within a
- * zero vector is not here).
+ * period differ, and the current is sampled between them (METHODS.md 4.6.2, row 48, of which the derivative within
+ * a zero vector is observers/zero_vector.h).
  *
  * Along the axis u of the period (axes.h) the first half has V_h more and the second V_h less, so that the
  * mean voltage is what control asked for and the current is without carrier at both ends. The sample at the

@@ -16,5 +16,6 @@
 #include "observers/third_crossings.h"
 #include "observers/third_integration.h"
 #include "observers/third_sogi.h"
+#include "observers/zero_vector.h"
 
 #endif

@@ -79,6 +79,17 @@ static inline void observer_step(observer_t *self, const observer_config_t *conf
     }
 }
 
+#if PM_HAS(zero_vector)
+/* After a step: the instant of [k+1, k+2) at which the observer wants a further sample, as pm_instants_t; 0:
+ * none. */
+static inline uint32_t observer_sample_at(const observer_t *self, const observer_config_t *config)
+{
+    return config->id == OBSERVER_zero_vector
+               ? zero_vector_sample_at(&self->zero_vector, &config->zero_vector)
+               : 0U;
+}
+#endif
+
 uint32_t observer_traits(observer_id_t id); /* SOURCE_... */
 
 void make_observer(maker_t *m, observer_config_t *c);

@@ -19,6 +19,8 @@ taken from c_A_Wb5 of `electrical:`, or from L_q_rated of `drive:`. L_q may be b
 `injection: 4` or `1` in `drive:` asks for a sine along d or a rotating one: its amplitude, frequency and loops are then chosen by the
 position error that is predicted for each of twelve carriers without load and at rated current (METHODS.md 5.8.3, row 67). It is
 not asked for where `drive:` tells all three, v_injection, f_injection and injection_bandwidth.
+
+`commutation: 1` in `drive:` asks for block commutation, `trapezoid_flat_deg` in `winding:` says that the EMF is a trapezoid.
 """
 import argparse
 import importlib
@@ -123,29 +125,51 @@ def pwm(told, L):
                f"the EMF at the hand-over is {emf:.2g} V")
 
 
+def in_blocks(x):
+    """Block commutation is asked for."""
+    return float(x["drive"].get("commutation", 0)) == 1
+
+
+def pwm_in_blocks(told, L, C):
+    """Frequency and why: the highest at which an open terminal has rung out within a third of a period."""
+    v, i = told["rated", "v_dc_V"], told["rated", "i_rated_A"]
+    turns_Hz = 1.5 * told["electrical", "pole_pairs"] * told["rated", "speed_rated_rad_s"] / (2 * math.pi)
+    board = 20e3 if v <= LOW_V else 10e3
+    first, last = (next((f for f in PWM_HZ if f >= max(board, x)), PWM_HZ[-1])
+                   for x in (LEAST_PER_TURN * turns_Hz, max(PER_TURN * turns_Hz, v / (RIPPLE * i * L))))
+    able = [f for f in PWM_HZ if first <= f <= last]
+    f = max((f for f in able if f * tune.ringing(L, C) <= tune.BLANK_MOST), default=first)
+    return f, (f"{PER_TURN} periods of a turn of the field, ripple below rated current" if f == last else
+               f"{last / 1e3:g} kHz would have less ripple, but an open terminal rings for {1e6 * tune.ringing(L, C):.0f} us")
+
+
 def complete(x):
     """What is not told of torque, inverter, sensors and link: {section: {key: (value, why)}}."""
     told = {(section, key): number("", section, key, x[section][key]) for section, keys in NEEDED.items() for key in keys}
     v, i = told["rated", "v_dc_V"], told["rated", "i_rated_A"]
     poles = told["electrical", "pole_pairs"]
     low = v <= LOW_V
-    f_pwm, why = pwm(told, min(inductances(x)))
+    L, C = min(inductances(x)), 2e-9 if low else 0.5e-9
+    C = float(x["inverter"].get("c_leg_F", C))
+    f_pwm, why = pwm_in_blocks(told, L, C) if in_blocks(x) else pwm(told, L)
     f_pwm = float(x["inverter"].get("f_pwm_Hz", f_pwm))
+    scale = above(1.5 * v, (1, 1.2, 1.5, 2, 2.5, 3, 4, 4.5, 5, 6, 8))
     chosen = {
         "rated": {"torque_rated_Nm": (1.5 * poles * told["electrical", "psi_m_Wb"] * i, "1.5 pole_pairs psi_m i_rated")},
         "inverter": {
             "f_pwm_Hz": (f_pwm, why),
             "timer_counts": (round(TIMER_HZ / (2 * f_pwm)), "170 MHz timer, centre-aligned"),
             "dead_time_s": dead_time(low, f_pwm),
-            "c_leg_F": (2e-9 if low else 0.5e-9, "output capacitance of a leg"),
+            "c_leg_F": (C, "output capacitance of a leg"),
             "v_switch_V": (0.0 if low else 1.0, "resistive" if low else "of a few amperes"),
             "v_diode_V": (0.0 if low else 1.0, "the channel conducts both ways" if low else "of a few amperes"),
             "r_on_ohm": (0.02 * v / i / 10 if low else 0.0, "0.2 % of the link at rated current" if low else "in the drop"),
         },
         "sensor": {
             "i_full_scale_A": (above(2.5 * i, (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8)), "2.5 times rated"),
-            "v_full_scale_V": (above(1.5 * v, (1, 1.2, 1.5, 2, 2.5, 3, 4, 4.5, 5, 6, 8)), "1.5 times the link"),
+            "v_full_scale_V": (scale, "1.5 times the link"),
             "noise_lsb": (0.5, "of 12 bits"),
+            **({"v_leg_full_scale_V": (float(x["sensor"].get("v_full_scale_V", scale)), "as the link's channel")} if in_blocks(x) else {}),
         },
         "dclink": {
             "r_source_ohm": (0.002 * v / i, "0.2 % of the link at rated current"),
@@ -242,6 +266,7 @@ def drive(x, board, tolerance):
         "speed_max": (1.25 * of("rated", "speed_rated_rad_s"), tune.WHY["speed_max"]),
     }
     known = {name: told.get(name, value) for name, (value, _) in machine.items()}
+    known["commutation"] = told.get("commutation", 0)
     known.update(from_board(x, {}, board))
     out = dict(machine)
     for name, value in tune.limits(known).items():
@@ -249,6 +274,9 @@ def drive(x, board, tolerance):
         known[name] = told.get(name, value)
     out["offset_max"] = 0.03 * known["i_full_scale"], "3 % of the converter's range"
     out.update((name, (value, tune.WHY[name])) for name, value in tune.values(known, tolerance=tolerance).items())
+    if in_blocks(x):
+        out["v_terminal_full_scale"] = of("sensor", "v_leg_full_scale_V"), "the sensor's"
+        out["emf_shape"] = (1.0 if x.get("winding", {}).get("trapezoid_flat_deg") else 0.0), "the winding's; a sine if nothing is told"
     out["flying_start"] = 1.0, "a rotor that wind or its load turns is caught"
     if told.get("injection") in (carrier.ROTATING, carrier.PULSATING) and not SINE <= told.keys():
         out.update(sine(x, {**{name: value for name, (value, _) in out.items()}, **known, **told}))

@@ -249,7 +249,7 @@ enum {
     OD_PARAMETER_T_ALIGN,
     OD_PARAMETER_OPEN_LOOP_ACCELERATION,
     OD_PARAMETER_OBSERVER,
-#if PM_HAS(back_emf) || PM_HAS(extended_emf) || PM_HAS(extended_emf_ab)
+#if PM_HAS(back_emf) || PM_HAS(extended_emf) || PM_HAS(extended_emf_ab) || PM_HAS(zero_vector)
     OD_PARAMETER_EMF_BANDWIDTH,
 #endif
     OD_PARAMETER_POSITION_OBSERVER,

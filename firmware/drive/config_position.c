@@ -42,6 +42,12 @@ static pm_unit_t tied_share(maker_t *m)
 void make_position(maker_t *m, position_config_t *c, bool injection)
 {
     make_observer(m, &c->observer);
+#if PM_HAS(zero_vector) && PM_HAS(pwm_excitation)
+    if (injection && c->observer.id == OBSERVER_zero_vector &&
+        m->params->injection == (int32_t)INJECTION_pwm_excitation) {
+        refuse(m, DRIVE_PARAM_injection, "wants the sample of the observer that is chosen");
+    }
+#endif
 #if PM_CARRIES(NEEDS_NEUTRAL)
     c->traits_high = (uint8_t)observer_traits(c->observer.id);
 #endif

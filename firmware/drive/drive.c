@@ -142,6 +142,7 @@ static inline obs_more_t measure_more(const drive_t *drive, const drive_in_t *in
     more.v_zero = neutral_signal(&drive->neutral, &drive->config.neutral, in->more.v_neutral);
 #endif
 #if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    more.v_dc = drive->status.v_dc;
     for (uint32_t n = 0; n < PM_SAMPLES; n++) {
         if (pm_sampled(&in->more, n)) {
             more.i_sample[n] = pm_clarke(currents(drive, in->more.i_sample[n], drive->zero[2]));
@@ -336,6 +337,12 @@ static inline void control(drive_t *drive, const position_out_t *frame, bool usu
     if (drive->carrier) {
         excite(drive, &frame->carrier, out);
     }
+#if PM_HAS(zero_vector)
+    const uint32_t at = observer_sample_at(&drive->position.observer, &c->position.observer);
+    if (at != 0U) {
+        out->instants.sample_at[0] = (uint16_t)at;
+    }
+#endif
 }
 
 void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)

@@ -20,6 +20,7 @@
 #define PM_WITHOUT_third_integration 1
 #define PM_WITHOUT_third_sogi 1
 #define PM_WITHOUT_third_crossings 1
+#define PM_WITHOUT_zero_vector 1
 #define PM_WITHOUT_pwm_excitation 1
 #define PM_WITHOUT_zero_anti_rotating 1
 #define PM_WITHOUT_zero_rotating 1

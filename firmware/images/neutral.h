@@ -21,8 +21,6 @@
 #define PM_WITHOUT_dual_pulses 1
 #define PM_WITHOUT_three_phase_hf 1
 #define PM_WITHOUT_saliency_map 1
-#define PM_WITHOUT_secondary_voltage 1
-#define PM_WITHOUT_zero_inductance 1
 #define PM_WITHOUT_stored_eds 1
 #define PM_WITHOUT_mismatch 1
 #define PM_WITHOUT_second_harmonic 1
@@ -41,6 +39,7 @@
 #define PM_WITHOUT_mras_current 1
 #define PM_WITHOUT_mras_voltage 1
 #define PM_WITHOUT_mras_simple 1
+#define PM_WITHOUT_zero_vector 1
 #define PM_WITHOUT_rotating_sine 1
 #define PM_WITHOUT_inform 1
 #define PM_WITHOUT_pwm_excitation 1

@@ -46,6 +46,7 @@
 #define PM_WITHOUT_third_integration 1
 #define PM_WITHOUT_third_sogi 1
 #define PM_WITHOUT_third_crossings 1
+#define PM_WITHOUT_zero_vector 1
 #define PM_WITHOUT_rotating_sine 1
 #define PM_WITHOUT_inform 1
 #define PM_WITHOUT_pwm_excitation 1

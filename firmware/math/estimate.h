@@ -27,6 +27,7 @@ typedef struct {
     const pm_measure_t *codes; /* full scales are those of the channel */
 #if PM_CARRIES(NEEDS_SECOND_SAMPLE)
     pm_ab_t i_sample[PM_SAMPLES]; /* per-unit; where codes->sampled says so */
+    pm_q_t v_dc;                  /* at k, per-unit */
 #endif
 #if PM_CARRIES(NEEDS_NEUTRAL)
     pm_q_t

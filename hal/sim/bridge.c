@@ -2,13 +2,17 @@
 
 #include <assert.h>
 
-static plant_leg_state_t switches_of(pm_leg_t state)
+static plant_leg_state_t state_of(pm_leg_t state)
 {
     switch (state) {
     case PM_LEG_UPPER:
         return PLANT_LEG_UPPER;
     case PM_LEG_LOWER:
         return PLANT_LEG_LOWER;
+    case PM_LEG_HIGH:
+        return PLANT_LEG_HIGH;
+    case PM_LEG_LOW:
+        return PLANT_LEG_LOW;
     case PM_LEG_INVERTED:
         return PLANT_LEG_INVERTED;
     case PM_LEG_LOWER_INVERTED:
@@ -18,29 +22,15 @@ static plant_leg_state_t switches_of(pm_leg_t state)
     }
 }
 
-/* A leg that is held is one with the duty 0 or 1, as on a board. */
+/* A leg that is held keeps its duty for what it is after a commutation within the period. */
 static void set_leg(const hal_t *hal, int leg, const drive_out_t *out, plant_pwm_t *pwm)
 {
     const pm_leg_t state = pm_leg(out->legs, (uint32_t)leg);
     assert(state <= PM_LEG_LOWER_INVERTED);
-    const bool held = state == PM_LEG_HIGH || state == PM_LEG_LOW;
-    const uint32_t all = state == PM_LEG_HIGH ? hal->timer_counts : 0U;
-    pwm->compare[leg][0] = held ? all : out->compare[leg][0];
-    pwm->compare[leg][1] = held ? all : out->compare[leg][1];
-    pwm->state[leg] = switches_of(state);
+    pwm->compare[leg][0] = out->compare[leg][0];
+    pwm->compare[leg][1] = out->compare[leg][1];
+    pwm->state[leg] = state_of(state);
     pwm->driven[leg] = state != PM_LEG_OFF && hal->armed;
-}
-
-static plant_leg_state_t state_of(pm_leg_t state)
-{
-    switch (state) {
-    case PM_LEG_HIGH:
-        return PLANT_LEG_HIGH;
-    case PM_LEG_LOW:
-        return PLANT_LEG_LOW;
-    default:
-        return switches_of(state);
-    }
 }
 
 void sim_commutate(hal_t *hal, uint16_t legs)

@@ -9,6 +9,7 @@
 #include <memory>
 #include <ostream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/contract/observers.h"
@@ -46,11 +47,15 @@ const Machine kMachine = bench::kIpmLinear;
 const Base kBase = bench::kIpmBase;
 constexpr int kPeriods = 400;
 
-// What a source is given, with the current in the middle of the period that has ended.
+// What a source is given, with the current in the middle of the period that has ended, and within the zero vectors at its
+// ends: at the distance that the source asks for, behind the beginning and ahead of the end.
 struct Seen : obs_in_t {
-    pm_ab_t between;
+    pm_ab_t between, behind, ahead;
     pm_q_t v_zero; // of the star point
 };
+
+constexpr double kVdc_V = 300;
+constexpr uint16_t kCounts = 8500; // of half a period
 
 // Per-unit.
 struct Carrier {
@@ -73,9 +78,15 @@ class Source
         return {};
     }
 
+    // The instants within the zero vectors at both ends of a period, in periods: behind the first, ahead of the second.
+    virtual std::pair<double, double> within() const
+    {
+        return {0, 0};
+    }
+
     void reset(const obs_in_t &in)
     {
-        asked_[0] = asked_[1] = false;
+        asked_[0] = asked_[1] = 0;
         reset_with(in);
     }
 
@@ -83,25 +94,27 @@ class Source
     obs_out_t step(const Seen &seen)
     {
         pm_measure_t codes = {};
-        codes.sampled = asked_[1] ? 1 : 0;
-        const obs_more_t more = {&codes, {seen.between, {0, 0}}, seen.v_zero};
+        codes.sampled = asked_[1] != 0 ? 1 : 0;
+        const pm_ab_t &sample =
+            asked_[1] == kCounts ? seen.between : (asked_[1] < kCounts ? seen.behind : seen.ahead);
+        const obs_more_t more = {&codes, {sample, {0, 0}}, fixed(kVdc_V / kBase.v_V, 28), seen.v_zero};
         obs_in_t in = seen;
         in.more = &more;
         asked_[1] = asked_[0];
-        asked_[0] = false;
+        asked_[0] = 0;
         return step_with(in);
     }
 
   protected:
     virtual void reset_with(const obs_in_t &in) = 0;
     virtual obs_out_t step_with(const obs_in_t &in) = 0;
-    void ask()
+    void ask(uint32_t instant)
     {
-        asked_[0] = true;
+        asked_[0] = instant;
     }
 
   private:
-    bool asked_[2] = {false, false};
+    uint32_t asked_[2] = {0, 0}; // timer counts; 0: nothing
 };
 
 class Observer : public Source
@@ -110,6 +123,14 @@ class Observer : public Source
     explicit Observer(const observer_config_t &config) : config_(config)
     {
         std::memset(&state_, 0xa5, sizeof state_); // reset owes every member
+    }
+    std::pair<double, double> within() const override
+    {
+        if (config_.id != OBSERVER_zero_vector) {
+            return {0, 0};
+        }
+        const double x = state_.zero_vector.x, later = config_.zero_vector.later;
+        return {(x + later) / (2.0 * kCounts), (x - later) / (2.0 * kCounts)};
     }
 
   protected:
@@ -126,6 +147,7 @@ class Observer : public Source
         observer_step(&state_, &config_, &in, &out);
         const obs_out_t last = observer_last(&state_, &config_);
         EXPECT_EQ(std::memcmp(&out, &last, sizeof out), 0);
+        ask(observer_sample_at(&state_, &config_));
         return out;
     }
 
@@ -174,7 +196,7 @@ class Injection : public Source
         injection_step(&state_, &config_, &given, &out);
         carrier_ = out.carrier;
         if (carrier_.sample_at[0] != 0) {
-            ask();
+            ask(carrier_.sample_at[0]);
         }
         EXPECT_EQ(carrier_.sample_at[1], 0);
         const obs_out_t last = injection_last(&state_, &config_);
@@ -262,11 +284,16 @@ class Drive
     }
 
   private:
+    static Complex current(Complex psi_ab, double theta)
+    {
+        const Complex psi = psi_ab * std::polar(1.0, -theta);
+        const Complex i = {(psi.real() - kMachine.psi_m_Wb) / kMachine.L_d0_H, psi.imag() / kMachine.L_q0_H};
+        return i * std::polar(1.0, theta);
+    }
+
     Complex current() const
     {
-        const Complex psi = psi_ * std::polar(1.0, -theta_);
-        const Complex i = {(psi.real() - kMachine.psi_m_Wb) / kMachine.L_d0_H, psi.imag() / kMachine.L_q0_H};
-        return i * std::polar(1.0, theta_);
+        return current(psi_, theta_);
     }
 
     Seen seen() const
@@ -274,6 +301,8 @@ class Drive
         const Complex i = current() / kBase.i_A;
         Seen in = {};
         in.between = bench::ab(i_between_ / kBase.i_A);
+        in.behind = bench::ab(i_behind_ / kBase.i_A);
+        in.ahead = bench::ab(at_zero_voltage(-source_.within().second) / kBase.i_A);
         in.v = bench::ab(v_mean_ / kBase.v_V);
         const double e_0 = bench::star_point_V(theta_, omega_, i * kBase.i_A * std::polar(1.0, -theta_));
         in.v_zero = fixed((source_.behind_filter() ? v_zero_ : e_0) / kBase.v_V, 28);
@@ -284,9 +313,27 @@ class Drive
         return in;
     }
 
+    // Around the present instant, in periods, the terminals being shorted there.
+    Complex at_zero_voltage(double periods) const
+    {
+        Complex psi = psi_;
+        double theta = theta_;
+        const int n = 20;
+        const double t = periods * kBase.period_s / n;
+        for (int k = 0; k < n; ++k) {
+            const Complex before = psi;
+            const Complex i = current(psi, theta);
+            psi -= t * kMachine.R_ohm * i;
+            theta += omega_ * t;
+            psi = before - t * kMachine.R_ohm * 0.5 * (i + current(psi, theta));
+        }
+        return current(psi, theta);
+    }
+
     void run()
     {
         i_past_ = current();
+        i_behind_ = at_zero_voltage(source_.within().first);
         const int n = 20;
         const double t = kBase.period_s / n;
         for (int k = 0; k < n; ++k) {
@@ -311,7 +358,7 @@ class Drive
     Source &source_;
     double omega_, error_, theta_;
     Complex v_dq_, psi_, applying_, commanded_, v_mean_ = 0, i_past_ = 0;
-    Complex split_ = 0, split_commanded_ = 0, i_between_ = 0;
+    Complex split_ = 0, split_commanded_ = 0, i_between_ = 0, i_behind_ = 0;
     double v_zero_ = 0;
 };
 
@@ -424,6 +471,8 @@ TEST_P(ObserverContract, MirroredInputGivesMirroredOutput)
         x.v.beta = -x.v.beta;
         x.i.beta = -x.i.beta;
         x.between.beta = -x.between.beta;
+        x.behind.beta = -x.behind.beta;
+        x.ahead.beta = -x.ahead.beta;
         x.dir.sin = -x.dir.sin;
         x.omega = -x.omega;
         x.i_dq.q = -x.i_dq.q;
@@ -458,7 +507,9 @@ TEST_P(ObserverContract, TurnedInputGivesTheSame)
         for (Seen &x : turned) {
             x.v = bench::ab(bench::complex(x.v) * std::polar(1.0, turn));
             x.i = bench::ab(bench::complex(x.i) * std::polar(1.0, turn));
-            x.between = bench::ab(bench::complex(x.between) * std::polar(1.0, turn));
+            for (pm_ab_t *i : {&x.between, &x.behind, &x.ahead}) {
+                *i = bench::ab(bench::complex(*i) * std::polar(1.0, turn));
+            }
             const double angle = std::atan2(real(x.dir.sin, 31), real(x.dir.cos, 31));
             x.dir = bench::direction(angle + turn);
         }
@@ -524,7 +575,9 @@ TEST_P(ObserverContract, CornersOfTheConvertersAreHarmless)
             x.dir = bench::direction(random.within(-4, 4));
             x.omega = fixed(end(1.25), 28);
             x.i_dq = bench::dq({end(4.0 / 3), end(4.0 / 3)});
-            x.between = bench::ab({end(4.0 / 3), end(4.0 / 3)});
+            for (pm_ab_t *i : {&x.between, &x.behind, &x.ahead}) {
+                *i = bench::ab({end(4.0 / 3), end(4.0 / 3)});
+            }
             x.v_zero = fixed(end(1), 28);
         }
         source->reset(in[0]);

@@ -64,6 +64,11 @@ inline ObserverCase observer_case(observer_id_t id, const char *name, const Mach
     drive_params_t p = parameters(m, b);
     p.observer = static_cast<int32_t>(id);
     drive_config_t config = {};
+    if (id == OBSERVER_zero_vector) { // sees its EMF at higher speeds only
+        p.speed_low = static_cast<int32_t>(0.3 * p.speed_trip);
+        p.speed_high = static_cast<int32_t>(0.38 * p.speed_trip);
+        p.speed_max = static_cast<int32_t>(0.5 * p.speed_trip);
+    }
     if (!drive_configure(&config, &p, PM_CHANNELS).ok) {
         p.L_d = p.L_q;
         p.L_dh_rated = p.L_qh_rated;

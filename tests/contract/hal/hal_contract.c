@@ -98,13 +98,18 @@ static void wait_us(run_t *run, uint32_t us)
     }
 }
 
+static void set_compare(struct app *app, uint16_t counts)
+{
+    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        app->out.compare[leg][0] = counts;
+        app->out.compare[leg][1] = counts;
+    }
+}
+
 /* Floating legs */
 static void float_all(struct app *app)
 {
-    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
-        app->out.compare[leg][0] = 0;
-        app->out.compare[leg][1] = 0;
-    }
+    set_compare(app, 0);
     app->out.legs = PM_LEGS_OFF;
     app->out.trip = 0;
 }
@@ -260,10 +265,7 @@ static void check_sample_of_pulses(run_t *run)
     struct app *app = &the_app;
     const bool seen = app->in.v_dc > 16000U && (hal_channels(run->hal) & NEEDS_TERMINALS) != 0U;
     const uint16_t half = run->contract->config.timer_counts / 2U;
-    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
-        app->out.compare[leg][0] = half;
-        app->out.compare[leg][1] = half;
-    }
+    set_compare(app, half);
     app->out.instants.sample_at[0] = run->contract->config.timer_counts;
     wait_us(run, 1000);
     for (size_t leg = 0; seen && leg < DRIVE_LEGS; leg++) {
@@ -272,10 +274,7 @@ static void check_sample_of_pulses(run_t *run)
         check_code(run, "and low at its ends", app->in.more.v_terminal[leg], 0, 2000);
     }
     app->out.instants.sample_at[0] = 0;
-    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
-        app->out.compare[leg][0] = 0;
-        app->out.compare[leg][1] = 0;
-    }
+    set_compare(app, 0);
     wait_us(run, 1000);
 }
 #endif
@@ -285,10 +284,7 @@ static void check_sample_of_pulses(run_t *run)
 static void check_held(run_t *run)
 {
     struct app *app = &the_app;
-    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
-        app->out.compare[leg][0] = 0;
-        app->out.compare[leg][1] = 0;
-    }
+    set_compare(app, 0);
     app->out.legs = PM_LEGS_ALL(PM_LEG_HIGH);
     wait_us(run, 1000);
     check(run, "stays armed with all legs held high", hal_bridge_armed(run->hal), 0);
@@ -300,10 +296,7 @@ static void check_held(run_t *run)
                    there ? UINT16_MAX : 0);
     }
 #endif
-    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
-        app->out.compare[leg][0] = run->contract->config.timer_counts;
-        app->out.compare[leg][1] = run->contract->config.timer_counts;
-    }
+    set_compare(app, run->contract->config.timer_counts);
     app->out.legs = PM_LEGS_ALL(PM_LEG_LOW);
     wait_us(run, 1000);
     check(run, "stays armed with all legs held low", hal_bridge_armed(run->hal), 0);
@@ -321,10 +314,7 @@ static void check_held(run_t *run)
 static void check_one_switch(run_t *run)
 {
     struct app *app = &the_app;
-    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
-        app->out.compare[leg][0] = 0;
-        app->out.compare[leg][1] = 0;
-    }
+    set_compare(app, 0);
     app->out.legs = PM_LEGS_ALL(PM_LEG_LOWER);
     wait_us(run, 1000);
     check(run, "stays armed with one switch of each leg", hal_bridge_armed(run->hal), 0);
@@ -375,6 +365,17 @@ static void check_commutate(run_t *run)
         }
 #endif
     }
+#if PM_CARRIES(NEEDS_TERMINALS)
+    /* What was held follows its duty from the commutation on, in the same period. */
+    app->out.legs = PM_LEGS_ALL(PM_LEG_HIGH);
+    app->out.instants.then = PM_LEGS_ALL(PM_LEG_PWM);
+    set_compare(app, 0);
+    wait_us(run, 1000);
+    for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        check_code(run, "a terminal that was high and is chopped", app->in.more.v_terminal[leg], 0, 2000);
+    }
+    app->out.legs = PM_LEGS_ALL(PM_LEG_LOW);
+#endif
     app->out.instants.commutate_at = 0;
     wait_us(run, 1000);
 #if PM_CARRIES(NEEDS_TERMINALS)

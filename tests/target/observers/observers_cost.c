@@ -32,8 +32,9 @@ static bench_t bench;
 
 static void period(observer_id_t id, pm_ab_t v, pm_ab_t i)
 {
-    static const pm_measure_t codes;
-    static const obs_more_t more = {.codes = &codes, .v_zero = PM_Q(0.003)};
+    static const pm_measure_t codes = {.sampled = 1};
+    const obs_more_t more = {
+        .codes = &codes, .i_sample = {{i.alpha, i.beta}}, .v_dc = PM_Q(0.667), .v_zero = PM_Q(0.003)};
     const pm_dir_t dir = pm_dir(bench.pll.theta);
     bench.in = (obs_in_t){
         .v = v, .i = i, .dir = dir, .omega = bench.pll.omega, .i_dq = pm_park(i, dir), .more = &more};
@@ -56,6 +57,10 @@ static bool configure(observer_id_t id)
     drive_params_default(&params);
     params.observer = (int32_t)id;
     params.psi_3 = 7080000;
+    if (id == OBSERVER_zero_vector) { /* sees its EMF at higher speeds only */
+        params.speed_high = params.speed_trip / 5 * 2;
+        params.speed_max = params.speed_trip / 2;
+    }
     if (!drive_configure(&config, &params, PM_CHANNELS).ok) { /* for a round machine */
         params.L_q = params.L_d;
         params.L_q_rated = params.L_d;

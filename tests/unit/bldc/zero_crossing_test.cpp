@@ -219,6 +219,37 @@ TEST(ZeroCrossing, IgnoresTheSwingAfterFreewheeling)
     EXPECT_LT(static_cast<int32_t>(b.self.at), -20000);
 }
 
+// The diode of the open leg has carried a current in the off time, and its terminal is on the way from the rail: one sample
+// past the crossing behind one ahead of it, two of them behind the freewheeling.
+TEST(ZeroCrossing, ASampleOnItsWayFromARailIsNoEarlyCrossing)
+{
+    for (const bool ahead : {true, false}) {
+        Bench bench;
+        bench.open();
+        double at = -45000;
+        if (ahead) {
+            EXPECT_FALSE(bench.step(bench.sample(at)));
+        }
+        for (const double v : {13.0, 15.0, 13.5}) {
+            at += kSpacing;
+            EXPECT_FALSE(bench.step(bench.terminal(at, v))) << v;
+        }
+        while (!bench.step(bench.sample(at)) && at < kT60 / 2.0) {
+            at += kSpacing;
+        }
+        EXPECT_NEAR(static_cast<int32_t>(bench.self.at), 0, kShape_counts) << ahead;
+    }
+}
+
+// A rotor that is accelerated: the crossing comes 18 degrees before it is due, and the samples have the slope of its EMF.
+TEST(ZeroCrossing, AnEarlyCrossingIsOneWhereItsSamplesAgree)
+{
+    zero_expected_t expected = kExpected;
+    expected.at = 30000;
+    Bench bench;
+    EXPECT_NEAR(bench.find(-21000, expected), 0, kShape_counts);
+}
+
 TEST(ZeroCrossing, NoRotorIsThatFarPast)
 {
     Bench b;

@@ -1,6 +1,7 @@
 // The state machine, alone and closed on the plant.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <memory>
@@ -194,6 +195,52 @@ TEST(Drive, WhatACarrierAsksOfThePeriodIsDone)
     EXPECT_EQ(out.instants.sample_at[0], 0);
 }
 
+// The derivative within the zero vectors: ahead of the period's end and behind its beginning in turn, with no carrier.
+TEST(Drive, WhatAnObserverAsksOfThePeriodIsDone)
+{
+    drive_params_t p = direct::params(2);
+    direct::make_spm(p);
+    p.observer = OBSERVER_zero_vector;
+    p.speed_max = 34000;
+    p.i_open_loop = 4500;
+    Closed x(plants::spm_400(), p);
+    const pm_instants_t &instants = x.loop.app.out.instants;
+    EXPECT_EQ(instants.sample_at[0], 0);
+    x.command(true, 20);
+    x.run_ms(2000);
+    ASSERT_EQ(x.state(), DRIVE_RUNNING);
+    const auto whole = static_cast<uint16_t>(2 * p.timer_counts);
+    for (int k = 0; k < 10; ++k) {
+        const uint16_t before = instants.sample_at[0];
+        sim_loop_step(&x.loop);
+        const uint16_t one = std::min(before, instants.sample_at[0]);
+        const uint16_t other = std::max(before, instants.sample_at[0]);
+        EXPECT_GT(one, 0) << k;
+        EXPECT_LT(one, whole / 4) << k;
+        EXPECT_GT(other, whole - whole / 4) << k;
+        EXPECT_LT(other, whole) << k;
+        EXPECT_EQ(instants.sample_at[1], 0) << k;
+    }
+    drive_trip(&x.loop.app.drive, DRIVE_FAULT_REMOTE_LOST);
+    x.run_ms(1);
+    EXPECT_EQ(instants.sample_at[0], 0);
+}
+
+TEST(Drive, TwoThatAskForOneSampleAreRefused)
+{
+    drive_params_t p = direct::params(1);
+    p.observer = OBSERVER_zero_vector;
+    p.speed_low = 50000;
+    p.speed_high = p.speed_trip / 5 * 2;
+    p.speed_max = p.speed_trip / 2;
+    drive_config_t c = {};
+    EXPECT_TRUE(drive_configure(&c, &p, PM_CHANNELS).ok);
+    p.injection = INJECTION_pwm_excitation;
+    const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
+    EXPECT_FALSE(r.ok);
+    EXPECT_EQ(r.param, DRIVE_PARAM_injection);
+}
+
 // One base register reaches all that a control period of the default sources uses: LDRD's offset ends at 1020.
 // Behind them is the window of a sine carrier, or what a source at the neutral keeps of half of one.
 TEST(Drive, StateIsSmall)
@@ -208,9 +255,9 @@ TEST(Drive, StateIsSmall)
     // angle and pole are told, 8 which end of the axis the pulses take for the magnet's, 80 what those keep beside the
     // position sources, 48 how a rotor that turns is caught, 56 what the imposed vector knows of the rotor, 144 how block
     // commutation is configured and what it has learnt, 28 the carrier that rests at standstill, and 220 what the sources at the
-    // neutral and the stages of injection are told, 32 what the second harmonic at the neutral is compared with, and 56 how the
-    // inductances there are measured and were found
-    EXPECT_LE(sizeof(drive_t), 2296U + sizeof(injection_t) + sizeof(saliency_map_result_t));
+    // neutral and the stages of injection are told, 32 what the second harmonic at the neutral is compared with, 56 how the
+    // inductances there are measured and were found, and 16 where within its zero vectors the current is sampled
+    EXPECT_LE(sizeof(drive_t), 2312U + sizeof(injection_t) + sizeof(saliency_map_result_t));
 }
 
 TEST(Drive, StaysOffWithoutACommand)

@@ -161,6 +161,39 @@ class Tune(unittest.TestCase):
         told["rated"].update(speed_rated_rad_s=6800)
         self.assertEqual(yaml.safe_load(self.tune(told).stdout)["inverter"]["f_pwm_Hz"], 60e3)
 
+    def test_blocks_are_led_by_what_the_terminals_show(self):
+        told = motor("2212 drone motor")
+        told["drive"] = {"commutation": 1}
+        told["inverter"] = {"c_leg_F": 1e-9}
+        told["winding"] = {"trapezoid_flat_deg": 120}
+        tuned = yaml.safe_load(self.tune(told).stdout)
+        d, period_s = tuned["drive"], 1 / tuned["inverter"]["f_pwm_Hz"]
+        self.assertEqual((d["start_method"], d["pattern"], d["emf_shape"]), (2, 0, 1))
+        self.assertEqual(d["v_terminal_full_scale"], tuned["sensor"]["v_leg_full_scale_V"])
+        self.assertEqual(d["six_step_speed"], 70)
+        constant_s = 2 * 3 * math.sqrt(1.5 * 20e-6 * 1e-9)  # of the ringing
+        self.assertAlmostEqual(d["t_blank"] / constant_s, 4, delta=0.01)
+        self.assertLess(d["t_blank"], 0.4 * period_s)
+        told["winding"] = {}
+        self.assertEqual(self.drive(told)["emf_shape"], 0)
+        self.assertNotIn("t_blank", self.drive(motor("2212 drone motor")))
+
+    def test_a_terminal_that_rings_for_long_has_longer_periods(self):
+        told = motor("2212 drone motor")
+        told["electrical"]["L_d0_H"] = told["electrical"]["L_q0_H"] = 0.1e-3
+        told["drive"] = {"commutation": 1}
+        for c_leg, f_pwm in ((1e-9, 40e3), (3e-9, 20e3)):
+            told["inverter"] = {"c_leg_F": c_leg}
+            self.assertEqual(yaml.safe_load(self.tune(told).stdout)["inverter"]["f_pwm_Hz"], f_pwm)
+
+    def test_a_rotor_that_is_there_within_a_few_sectors_is_refused(self):
+        told = motor("hub motor")
+        told["drive"] = {"commutation": 1}
+        told["mechanics"]["J_kgm2"] = 0.05
+        self.assertNotEqual(self.tune(told).stdout, "")
+        told["mechanics"]["J_kgm2"] = 0.005
+        self.refused(told, "sectors", "commutation: 0")
+
     def test_small_currents_are_whole_steps(self):
         told = motor("gimbal")
         told["rated"]["i_rated_A"] = 0.4

@@ -4,11 +4,12 @@ The rules are those by which the machine files of sim_plant/machines were set by
 """
 import math
 
-from .errors import UsageError
+from .errors import NotInImage, UsageError
 
 BOARD = ("f_pwm", "i_full_scale", "v_full_scale", "i_noise", "dead_time", "device_drop")
 MACHINE = ("pole_pairs", "i_rated", "i_max", "speed_max", "v_dc_nominal", "v_dc_min", "R_s", "L_d", "L_q", "L_q_rated",
            "L_qh_rated", "psi_m", "J")
+BLOCKS = ("commutation", "leg_capacitance")
 SALIENT = 0.05  # the drive's own limit for injection
 MEASURED = 0.02 # of R, L_d, L_q, psi_m and J: what identification is off by
 TOLD = 0.15     # what a data sheet is
@@ -18,6 +19,10 @@ LAG = 0.12           # rad that the estimate may be behind an acceleration
 STALL_S = 0.6
 HAND_OVER = 0.08     # of rated speed: without injection, where nothing asks for more
 SPEED_MOST = 0.4     # of rated speed: hand-over of a machine whose EMF is small at any speed
+QUALITY = 3.0        # of an open terminal that rings
+DECAY = 4.0          # time constants, after which it has
+BLANK_MOST = 0.4     # of a period
+SECTORS_LEAST = 25   # from rest to rated speed with rated torque
 
 # Why each value is what it is, in a line.
 WHY = {
@@ -50,6 +55,9 @@ WHY = {
     "open_loop_damping": "0.7; less where dead time and drops take more of a leg than 2.5 times the EMF of a rotor that swings",
     "t_align": "half a second",
     "t_stall": "a fault well within a second of a rotor that does not turn",
+    "six_step_speed": "10 % of rated, where an open terminal shows its EMF",
+    "pattern": "both legs chopped: the open terminal shows its EMF for half a period and more, and never beyond the rails",
+    "t_blank": "an open terminal has rung out, at 1/(2 pi sqrt(1.5 L C)) with Q = 3; at most 40 % of a period",
     "open_loop_acceleration": "a tenth of rated torque; hands over within 0.6 s where that allows it",
 }
 
@@ -141,6 +149,25 @@ def _hand_over(x, i_open, leads, tolerance):
     return max(0.04 * rated, 0.5 * high), high
 
 
+def ringing(L, C):
+    """Until an open terminal has rung out, s: at 1/(2 pi sqrt(1.5 L C)) with QUALITY."""
+    return DECAY * 2 * QUALITY * math.sqrt(1.5 * L * C)
+
+
+def _in_blocks(x, speed_bandwidth):
+    """What block commutation has beside the rest. six_step_start 1 goes from the align. Speed is known once in a sector, as the mean
+    of a turn."""
+    rated, jerk = 0.8 * x["speed_max"], 1.5 * x["pole_pairs"] * x["psi_m"] * x["i_rated"] / x["J"]
+    field_Hz = x["pole_pairs"] * rated / (2 * math.pi)
+    sectors = 3 * field_Hz * rated / jerk
+    if sectors < SECTORS_LEAST:
+        raise UsageError(f"rated torque takes this rotor to its speed within {sectors:.0f} sectors, too few for block commutation",
+                         "use field orientation, commutation: 0, or tell the inertia with what the motor turns")
+    return {"six_step_speed": 0.1 * rated, "pattern": 0, "start_method": 2,
+            "t_blank": min(ringing(x["L_d"], x["leg_capacitance"]), BLANK_MOST / x["f_pwm"]),
+            "speed_bandwidth": min(speed_bandwidth, 0.03 * field_Hz), "acceleration": min(0.3 * jerk, 0.02 * field_Hz * rated)}
+
+
 def limits(x):
     """{name: SI value} from i_rated, speed_max, v_dc_nominal and the board's full scales."""
     current, speed, link = x["i_rated"], x["speed_max"], x["v_dc_nominal"]
@@ -156,7 +183,7 @@ def limits(x):
 
 
 def values(x, bandwidth=None, tolerance=MEASURED):
-    """{name: SI value} from {name: SI value} of BOARD and MACHINE. Bandwidth of the current control in Hz; tolerance: by
+    """{name: SI value} from {name: SI value} of BOARD and MACHINE, and BLOCKS where commutation is 1. Bandwidth of the current control in Hz; tolerance: by
     what share of itself each of R, L_d, L_q, psi_m and J may be off."""
     highest = x["f_pwm"] / 10
     if bandwidth is not None and not 10 <= bandwidth <= highest:
@@ -171,7 +198,7 @@ def values(x, bandwidth=None, tolerance=MEASURED):
     ripple = x["v_dc_nominal"] / (x["L_d"] * x["f_pwm"])  # of the current by the pulses: light load must be beyond it
     i_open = _open_loop(x)
     low, high = _hand_over(x, i_open, leads, tolerance)
-    return {
+    out = {
         "current_bandwidth": bandwidth or min(x["f_pwm"] / 20, highest * x["L_qh_rated"] / x["L_q"], 1500.0, _reach(x)),
         "injection_bandwidth": INJECTION_HZ,
         "speed_bandwidth": min(max(6 * jerk / rated_speed / (2 * math.pi), 2.0),
@@ -193,6 +220,7 @@ def values(x, bandwidth=None, tolerance=MEASURED):
         "open_loop_acceleration": min(0.1 * jerk, high / 0.6),
         "t_stall": STALL_S,
     }
+    return {**out, **_in_blocks(x, out["speed_bandwidth"])} if x.get("commutation") == 1 else out
 
 
 def changes(drive, bandwidth=None):
@@ -200,4 +228,8 @@ def changes(drive, bandwidth=None):
     from .identify import raw_values
 
     known = {name: float(drive.get(name)) for name in BOARD + MACHINE}
+    try:
+        known.update((name, float(drive.get(name))) for name in BLOCKS)
+    except NotInImage:  # field orientation alone
+        pass
     return raw_values(values(known, bandwidth))
