@@ -26,6 +26,7 @@
 #include "bldc/patterns.h"
 #include "bldc/phase_compensation.h"
 #include "bldc/third_harmonic.h"
+#include "bldc/third_missing.h"
 #include "bldc/thresholds.h"
 #include "bldc/virtual_third.h"
 #include "bldc/zero_crossing.h"
@@ -49,6 +50,9 @@ typedef struct {
     thresholds_config_t thresholds;
     int32_t compared; /* -1: with what is learnt; 0: it is taken off the instants: phase_compensation.h */
     third_harmonic_config_t third;
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    third_missing_config_t missing;
+#endif
     crossings_id_t crossings;
 } six_step_config_t;
 

@@ -2,7 +2,9 @@
 
 #include "firmware/params/maker.h"
 
-#define RAIL_mV 350
+#define RAIL_mV   350
+#define STEPS     16   /* of the neutral's converter, */
+#define CONVERTER 2048 /* steps of half its range */
 
 static uint16_t counts(maker_t *m, drive_param_id_t id)
 {
@@ -32,7 +34,7 @@ static pm_num_t swing_of_terminal(const maker_t *m)
     const pm_num_t pi_third = pm_num_mul(PM_NUM_TWO_PI, pm_num_ratio(1, 6));
     const pm_num_t sine = pm_num_ratio(3, 2), trapezoid = pm_num_mul(PM_NUM_TWO_PI, pm_num_ratio(1, 4));
     const pm_num_t slope = pm_num_mul(m->params->emf_shape == 0 ? sine : trapezoid, pi_third);
-    static const uint8_t thirds[CROSSINGS_COUNT] = {3, 2, 0, 3};
+    static const uint8_t thirds[CROSSINGS_COUNT] = {3, 2, 3, 3};
     return pm_num_mul(slope, pm_num_ratio(thirds[m->params->zero_reference], 3));
 }
 
@@ -61,6 +63,19 @@ static void make_third_harmonic(maker_t *m, third_harmonic_config_t *c)
     c->trapezoid = p->emf_shape != 0;
     c->negative = p->psi_3 < 0;
 }
+
+#if PM_CARRIES(NEEDS_NEUTRAL)
+/* Half of what a sine's third harmonic swings by beside the open terminal in the middle 60 degrees, a third of a trapezoid's. */
+static void make_third_missing(maker_t *m, const zero_crossing_config_t *crossing, third_missing_config_t *c)
+{
+    const pm_num_t terminal = mul3(pm_num(3), swing_of_terminal(m), si(m, DRIVE_PARAM_psi_m));
+    const pm_num_t full = pm_num_div(si(m, DRIVE_PARAM_neutral_full_scale), m->base.v);
+    c->share = gain(m, pm_num_div(swing_of(m), terminal), Q_BITS, DRIVE_PARAM_psi_3);
+    c->least =
+        fixed(m, pm_num_mul(pm_num_ratio(STEPS, CONVERTER), full), Q_BITS, DRIVE_PARAM_neutral_full_scale);
+    c->rail = crossing->rail;
+}
+#endif
 
 static uint32_t needs_of(int32_t id)
 {
@@ -102,6 +117,11 @@ void make_six_step(maker_t *m, six_step_config_t *c)
         make_third_harmonic(m, &c->third);
     }
     make_crossing(m, c->commutation.turn_base, &c->crossing);
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    if (m->result.ok && c->crossings == CROSSINGS_third_harmonic) {
+        make_third_missing(m, &c->crossing, &c->missing);
+    }
+#endif
     const pm_num_t vertical = pm_num_mul(pm_num_ratio(3, 2), si(m, DRIVE_PARAM_learn_vertical));
     c->thresholds.k_V = fixed(m, vertical, FRAC_BITS, DRIVE_PARAM_learn_vertical);
     c->thresholds.k_H =

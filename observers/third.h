@@ -117,9 +117,9 @@ static inline void third_describe(pm_dq_t z, obs_out_t *out)
     out->misfit = pm_shl(pm_sat(THIRD_Z_ONE - z.d, THIRD_Z_BITS), lift);
 }
 
-static inline void third_compare(third_t *self, const obs_in_t *in, int32_t y, int32_t q, obs_out_t *out)
+/* dir: of three times the position. */
+static inline void third_compare(third_t *self, pm_half_dir_t dir, int32_t y, int32_t q, obs_out_t *out)
 {
-    const pm_half_dir_t dir = third_dir(in->dir);
     const int32_t a = pm_shl_sat(pm_mulh_sub(pm_mulh(q, dir.cos), y, dir.sin), 3, 30); /* Q31 */
     const int32_t b = pm_shl_sat(pm_mulh_add(pm_mulh(q, dir.sin), y, dir.cos), 3, 30);
     const pm_dq_t n = pm_pair_dq(&self->scale);

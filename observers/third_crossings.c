@@ -57,7 +57,7 @@ void third_crossings_step(third_crossings_t *self, const third_crossings_config_
     const bool above = is_above(self, in);
     if (above != self->above && pm_abs(self->travelled + self->ahead) >= LEAST) {
         self->above = above;
-        take(self, out->eps);
+        take(self, third_last(&self->flux.third).eps);
     }
     self->ahead = pm_clamp(self->ahead, -MOST, MOST);
     out->eps = self->ahead;

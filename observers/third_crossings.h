@@ -5,8 +5,8 @@
  *   omega^  = (theta_k - theta_k-1) / t_d
  *   theta^  = theta_k + omega^ (t - t_k)
  *   eps     = theta^ - theta
- * The flux is that of third_integration.h with shift and lag taken out; the crossing is located between two samples by its
- * slope, v_zero. omega^ is the mean of the last 60 degrees, so that under a ramp a the angle falls behind by up to
+ * The flux is that of third_integration.h with shift and lag taken out, without psi^, with h = g and g = 3/4 third_drift; the
+ * crossing is located between two samples by its slope, v_zero. omega^ is the mean of the last 60 degrees, so that under a ramp a the angle falls behind by up to
  *   a t_d^2
  * with position_observer 1, by which the position is this one; the PLL smooths it. The turn of theta between two periods is seen
  * in its direction. While another source leads, theta^ is theta.

@@ -25,7 +25,7 @@ void third_sogi_step(third_sogi_t *self, const third_sogi_config_t *config, cons
     const int32_t x = third_seen(&self->third, in);
     pm_sogi_step(&self->sogi, pm_pair_dir(&self->turn), self->k, x);
     third_learn(&self->third, in, x - self->sogi.y);
-    third_compare(&self->third, in, self->sogi.y, self->sogi.q, out);
+    third_compare(&self->third, third_dir(in->dir), self->sogi.y, self->sogi.q, out);
 }
 
 obs_out_t third_sogi_last(const third_sogi_t *self)

@@ -1,6 +1,7 @@
 #include "firmware/drive/block.h"
 
 #include "firmware/drive/drive_parts.h"
+#include "firmware/math/compiler.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
 
@@ -20,6 +21,30 @@ static void take_sample(const drive_t *drive, const drive_in_t *in, zero_sample_
     sample->v_dc = pm_shl(in->more.v_dc_sample[0], (uint32_t)drive->config.protection.v_bits);
     sample->v_neutral = 0;
 }
+
+#if PM_CARRIES(NEEDS_NEUTRAL)
+static bool is_starting(const drive_t *drive)
+{
+    return drive->block.six_step.commutation.young != 0U || drive->block_ms < 2U * WRONG_MS;
+}
+
+/* Whether the third harmonic is there shows beside the open terminal, at the start; the crossings are not the terminal's. */
+PM_APART static void look_for_third(drive_t *drive, const drive_in_t *in, six_step_in_t *seen)
+{
+    block_t *self = &drive->block;
+    const six_step_plan_t *plan = &self->six_step.plan[0];
+    if (seen->sampled && plan->commutate_at == 0U && !self->six_step.lost && is_starting(drive)) {
+        take_sample(drive, in, &seen->sample);
+        const third_missing_in_t at = {.sample = &seen->sample,
+                                       .v_zero = seen->v_zero,
+                                       .sector = plan->sector,
+                                       .leg = sector_legs(plan->sector, self->six_step.reverse).open,
+                                       .legs = (zero_legs_t)plan->legs};
+        third_missing_step(&self->missing, &drive->config.block.six_step.missing, &at);
+    }
+    seen->sampled = false;
+}
+#endif
 
 /* Of the rotor at t_k, by the last crossing. */
 static pm_angle_t angle(const block_t *self)
@@ -41,8 +66,10 @@ void block_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
 
     six_step_in_t seen = {.now = self->now, .sampled = pm_sampled(&in->more, 0), .u = self->current.u};
 #if PM_CARRIES(NEEDS_NEUTRAL)
-    seen.sampled = seen.sampled && c->six_step.crossings != CROSSINGS_third_harmonic;
     seen.v_zero = neutral_signal(&drive->neutral, &drive->config.neutral, in->more.v_neutral);
+    if (pm_rarely(c->six_step.crossings == CROSSINGS_third_harmonic)) {
+        look_for_third(drive, in, &seen);
+    }
 #endif
     if (seen.sampled) {
         take_sample(drive, in, &seen.sample);
@@ -219,6 +246,16 @@ static block_result_t lost(const drive_t *drive)
     const bool starts = drive->block.six_step.commutation.young != 0U ||
                         (drive->config.block.from_rest && drive->block_ms < 2U * WRONG_MS);
     return starts ? BLOCK_STALLED : BLOCK_LOST;
+}
+
+drive_fault_t block_fault(const drive_t *drive, drive_fault_t fault)
+{
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    return drive->block.missing.missing ? DRIVE_FAULT_NO_THIRD_HARMONIC : fault;
+#else
+    (void)drive;
+    return fault;
+#endif
 }
 
 block_result_t block_slow(drive_t *drive)

@@ -18,7 +18,8 @@
  * A turn whose crossings are not where they belong ends it (missed_crossings): all legs off in the same period. With
  * flying_start the rotor is looked for, caught by the vector path and given back; without, or after resync_tries, the fault
  * is POSITION_LOST. A start whose crossings do not come, or are believed for no longer than 40 ms as those that noise makes
- * of a held rotor, is tried again, as often, and then the fault is STALL.
+ * of a held rotor, is tried again, as often, and then the fault is STALL. By the third harmonic of a rotor that turns and shows none
+ * (third_missing.h) either is NO_THIRD_HARMONIC.
  *
  * Current limit: i_max, derated as the vector's, and with freewheeling_limit what leaves the crossing to be seen:
  *   theta_f(i) + w (t_blank + T) <= 30 degrees             (freewheeling.h)
@@ -62,6 +63,9 @@ typedef struct {
     uint32_t rate;     /* of the angle, per count */
     pm_q_t i;          /* at t_k */
     uint16_t wrong_ms; /* for which the voltage has spoken against the speed */
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    third_missing_t missing;
+#endif
 } block_t;
 
 void make_block(maker_t *m, block_config_t *c);

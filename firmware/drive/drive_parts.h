@@ -72,6 +72,7 @@ void protection_slow(drive_t *drive);   /* 1 kHz: temperature, speed, position, 
 void protection_heat(drive_t *drive);   /* 1 kHz, in every state: what windings and bridge bear */
 void protection_phases(drive_t *drive); /* 1 kHz, while the references are those of the currents */
 
+drive_fault_t protection_fault_of_lost(const drive_t *drive); /* POSITION_LOST, or what it was lost for */
 bool protection_cause_present(const drive_t *drive); /* of the faults that show with the bridge off */
 
 /* Limits of the q-axis current after derating, for the present direction of rotation. */
@@ -114,6 +115,7 @@ bool block_from_rest(
     drive_t *drive); /* in STAGE_OPEN_LOOP, at rest behind the align; false: not its kind of start */
 void block_step(drive_t *drive, const drive_in_t *in, drive_out_t *out);
 block_result_t block_slow(drive_t *drive);
+drive_fault_t block_fault(const drive_t *drive, drive_fault_t fault); /* or what it was for */
 #endif
 
 /* open_loop.c: align, open-loop start, current mode, hand-over to the observer and back. */

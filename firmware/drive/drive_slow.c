@@ -107,13 +107,13 @@ static void run_block(drive_t *drive)
         break;
     case BLOCK_LOST:
         if (may_look(drive)) {
-            try_again(drive, DRIVE_FAULT_POSITION_LOST);
+            try_again(drive, block_fault(drive, DRIVE_FAULT_POSITION_LOST));
         } else {
-            drive_trip(drive, DRIVE_FAULT_POSITION_LOST);
+            drive_trip(drive, block_fault(drive, DRIVE_FAULT_POSITION_LOST));
         }
         break;
     case BLOCK_STALLED:
-        try_again(drive, DRIVE_FAULT_STALL);
+        try_again(drive, block_fault(drive, DRIVE_FAULT_STALL));
         break;
     default:
         break;

@@ -27,6 +27,7 @@ static bool leaves_low_switches(drive_fault_t fault)
     case DRIVE_FAULT_UNDER_VOLTAGE:
     case DRIVE_FAULT_OVER_SPEED:
     case DRIVE_FAULT_POSITION_LOST:
+    case DRIVE_FAULT_NO_THIRD_HARMONIC:
     case DRIVE_FAULT_STALL:
     case DRIVE_FAULT_OVERLOAD:
     case DRIVE_FAULT_REMOTE_LOST:
@@ -47,7 +48,9 @@ static pm_q_t link(const drive_t *drive)
 static bool begins(drive_t *drive, drive_fault_t fault)
 {
     const drive_config_t *c = &drive->config;
-    const pm_q_t omega = fault == DRIVE_FAULT_POSITION_LOST ? drive->status.omega_ref : drive->pll.omega;
+    const bool lost = fault == DRIVE_FAULT_POSITION_LOST ||
+                      (PM_CARRIES(NEEDS_NEUTRAL) != 0 && fault == DRIVE_FAULT_NO_THIRD_HARMONIC);
+    const pm_q_t omega = lost ? drive->status.omega_ref : drive->pll.omega;
     drive->fault_short =
         (fault_short_t){.flux = PM_ONE, .turn = pm_half(pm_omega_to_angle(omega, c->k_theta))};
     return c->fault_short.k != 0 && drive->stage >= STAGE_OPEN_LOOP &&

@@ -241,7 +241,7 @@ static void hand_over_in_time(drive_t *drive)
     if (drive->agree_ms > AGREE_MS) {
         hand_over(drive);
     } else if (drive->wait_ms > WAIT_MS) {
-        drive_trip(drive, DRIVE_FAULT_POSITION_LOST);
+        drive_trip(drive, protection_fault_of_lost(drive));
     } else {
         /* not yet */
     }

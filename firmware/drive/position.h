@@ -8,6 +8,10 @@
  * both keep the contract of firmware/math/estimate.h. The low-speed source steps first: it separates the
  * fundamental current, which the observer takes, from the answer to its carrier.
  * Quality: 1 while the sources agree with the measurement, 0 when the position is lost.
+ *
+ * A high-speed source of the third harmonic (SOURCE_THIRD_TURN) must have shown it before its weight rises: the mean of its vector
+ * along the position, which is one with what it was told, over 64 ms, above a half. Until then the low-speed source goes on, also
+ * above omega_high; where that lasts for POSITION_ABSENT_MS from omega_low on the drive stops (METHODS.md 11.6.2, row 132).
  * Tests: tests/unit/drive/position_test.cpp, tests/scenario. */
 #ifndef DRIVE_POSITION_H
 #define DRIVE_POSITION_H
@@ -71,6 +75,11 @@ typedef struct {
     pm_q_t misfit_mean;
     pm_q_t quality;
     slip_t slip;
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    pm_q_t shown;       /* mean of the observer's vector along the position, */
+    pm_q_t square;      /* and of its square */
+    uint16_t absent_ms; /* for which it could not lead, as less than half was shown */
+#endif
 } position_t;
 
 /* Starts at standstill with the rotor at theta; `carrier`: one will be injected, if the configuration says
@@ -143,6 +152,13 @@ void position_turn(position_t *self, const position_config_t *config, pm_angle_t
 /* No carrier, and the position stays what it is at speed zero, until `rests` is taken back before a
  * position_slow(). */
 void position_rest(position_t *self);
+#endif
+
+#if PM_CARRIES(NEEDS_NEUTRAL)
+#define POSITION_ABSENT_MS 150U
+
+/* A position that was lost at a speed that was right: there is no third harmonic, a quarter of its amplitude at most. */
+bool position_lacks_third(const position_t *self, const position_config_t *config);
 #endif
 
 /* config_position.c; injection: a low-speed source leads at low speed. */

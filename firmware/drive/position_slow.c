@@ -75,11 +75,51 @@ void position_force(position_t *self, const position_config_t *config, const pm_
     self->gains.ki = 0;
 }
 
+#if PM_CARRIES(NEEDS_NEUTRAL)
+static bool knows_third(const position_config_t *config)
+{
+    return (config->traits_high & (uint8_t)SOURCE_THIRD_TURN) != 0U;
+}
+
+bool position_lacks_third(const position_t *self, const position_config_t *config)
+{
+    return knows_third(config) && self->square < PM_Q(0.0625) &&
+           pm_abs(self->omega_mean) >= config->omega_low;
+}
+
+static void set_shown(position_t *self, pm_dq_t vector)
+{
+    const pm_q_t d = pm_clamp(vector.d, -2 * PM_ONE, 2 * PM_ONE);
+    const pm_q_t q = pm_clamp(vector.q, -PM_ONE, PM_ONE);
+    (void)pm_lp1(&self->shown, d, K_MEAN_NOISE);
+    (void)pm_lp1(&self->square, pm_mul(d, d) + pm_mul(q, q), K_MEAN);
+}
+
+/* The low-speed source keeps the lead. */
+static bool is_held(position_t *self, const position_config_t *config)
+{
+    const bool held = knows_third(config) && self->inject && self->weight == 0 && self->shown < PM_ONE / 2;
+    const bool late = held && pm_abs(self->omega_mean) >= config->omega_low;
+    self->absent_ms = late ? (uint16_t)(self->absent_ms + 1U) : 0U;
+    return held;
+}
+#else
+static bool is_held(const position_t *self, const position_config_t *config)
+{
+    (void)self;
+    (void)config;
+    return false;
+}
+#endif
+
 static void set_weight(position_t *self, const position_config_t *config, const obs_in_t *in)
 {
     const pm_q_t speed = pm_abs(pm_lp1(&self->omega_mean, self->pll.omega, K_SPEED));
     if (!self->carrier) {
         self->weight = PM_ONE;
+        return;
+    }
+    if (is_held(self, config)) {
         return;
     }
     self->weight = pm_max(0, pm_small_gain(pm_small(speed - config->omega_low), config->per_span));
@@ -194,6 +234,9 @@ void position_slow(position_t *self, const position_config_t *config, pm_ab_t i,
 #endif
     const obs_in_t in = {.dir = pm_dir(self->pll.theta), .omega = self->pll.omega, .i = i, .i_dq = i_dq};
     const obs_out_t seen = observer_last(&self->observer, &config->observer);
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    set_shown(self, seen.vector);
+#endif
     set_weight(self, config, &in);
     if (self->inject) {
         injection_slow(&self->injection, &config->injection, &in);

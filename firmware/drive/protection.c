@@ -52,6 +52,20 @@ bool protection_cause_present(const drive_t *drive)
            !pm_within(drive->status.v_dc, c->v_dc_min, c->v_dc_max);
 }
 
+drive_fault_t protection_fault_of_lost(const drive_t *drive)
+{
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    const bool right = drive->stage == STAGE_VECTOR ||
+                       pm_abs(drive->position.pll.omega - drive->omega_ramp) < pm_abs(drive->omega_ramp) / 4;
+    if (right && position_lacks_third(&drive->position, &drive->config.position)) {
+        return DRIVE_FAULT_NO_THIRD_HARMONIC;
+    }
+#else
+    (void)drive;
+#endif
+    return DRIVE_FAULT_POSITION_LOST;
+}
+
 /* Counts while a condition holds; true when it has held for longer than `limit` ms. */
 static bool lasts(uint16_t *timer, bool condition, uint16_t limit)
 {
@@ -104,8 +118,13 @@ void protection_slow(drive_t *drive)
     const bool judged = drive->state >= DRIVE_RUNNING && drive->command.mode < DRIVE_MODE_CURRENT && !ramp &&
                         drive->stage != STAGE_SIX_STEP; /* which knows at once (block.h) */
     if (lasts(&drive->lost_ms, judged && drive->position.quality == 0, c->lost_ms)) {
-        drive_trip(drive, DRIVE_FAULT_POSITION_LOST);
+        drive_trip(drive, protection_fault_of_lost(drive));
     }
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    if (drive->stage == STAGE_VECTOR && drive->position.absent_ms > POSITION_ABSENT_MS) {
+        drive_trip(drive, DRIVE_FAULT_NO_THIRD_HARMONIC);
+    }
+#endif
     if (lasts(&drive->stall_ms, is_blocked(drive), c->stall_ms)) {
         drive_trip(drive, DRIVE_FAULT_STALL);
     }

@@ -21,10 +21,10 @@ constexpr double kFullScale_A = 12, kTrip = 3 * 180;             // of speed_tri
 constexpr double kPeriod_s = 1e-4;
 constexpr double kLink_V = 130;
 
-const std::set<int> kBearing = {DRIVE_FAULT_OVER_VOLTAGE,  DRIVE_FAULT_UNDER_VOLTAGE,
-                                DRIVE_FAULT_POSITION_LOST, DRIVE_FAULT_STALL,
-                                DRIVE_FAULT_OVER_SPEED,    DRIVE_FAULT_REMOTE_LOST,
-                                DRIVE_FAULT_OVERLOAD,      DRIVE_FAULT_TEMPERATURE_SENSOR};
+const std::set<int> kBearing = {
+    DRIVE_FAULT_OVER_VOLTAGE, DRIVE_FAULT_UNDER_VOLTAGE,      DRIVE_FAULT_POSITION_LOST,
+    DRIVE_FAULT_STALL,        DRIVE_FAULT_OVER_SPEED,         DRIVE_FAULT_REMOTE_LOST,
+    DRIVE_FAULT_OVERLOAD,     DRIVE_FAULT_TEMPERATURE_SENSOR, DRIVE_FAULT_NO_THIRD_HARMONIC};
 
 drive_params_t params(int32_t fault_short = 1)
 {

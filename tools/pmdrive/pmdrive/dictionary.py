@@ -278,7 +278,7 @@ ENTRIES = (
     Entry(0x2330, 3, "third_notch", "third", "i32", "live", "1", -3, 0, 0, 500, 0, False, True, "machine", "none", {}, ('bandwidth of what takes out the frequency of rotation, of unlike phases and '
  'dividers, over that frequency; 0: off'), "11.6.4 #134"),
     Entry(0x2330, 4, "third_gain", "third", "i32", "live", "1", -3, 0, 200, 2000, 1400, False, True, "machine", "none", {}, 'third_sogi: gain of the integrator; 2: as fast as it can be', "11.4.3 #129"),
-    Entry(0x2330, 5, "third_drift", "third", "i32", "live", "1", -3, 0, 0, 1000, 300, False, True, "machine", "none", {}, ("third_integration: corner of the integration over the third harmonic's "
+    Entry(0x2330, 5, "third_drift", "third", "i32", "live", "1", -3, 0, 0, 1000, 400, False, True, "machine", "none", {}, ("third_integration: corner of the integration over the third harmonic's "
  'frequency; 0: drifts'), "11.4.1 #127"),
     Entry(0x2400, 0, "injection.count", "injection", "u8", "const", "", 0, 0, None, None, 66, False, False, "none", "none", {}, 'highest sub-index', ""),
     Entry(0x2400, 1, "i_pulse", "injection", "i32", "live", "A", -3, 0, 50, 4000000, 4000, False, True, "application", "none", {}, 'peak current of the initial-position pulses', "9.4.2 #101"),
@@ -532,6 +532,8 @@ FAULTS = (
     Fault(18, "BRIDGE_OVERLOAD", 'bridge overloaded', 0x2351, ('the bridge was loaded beyond i_bridge for too long: lower i_max or i_rated, '
  'or cool it and use another board')),
     Fault(19, "OPEN_PHASE", 'a phase or a switch does not conduct', 0x3321, "check the motor's cable and winding, then the switches and their drivers"),
+    Fault(20, "NO_THIRD_HARMONIC", 'no third harmonic at the star point', 0x7307, ('check the lead to the star point and psi_3, or take an observer that needs '
+ 'none')),
 )
 
 # Error codes of 603Fh, 1003h and the emergency message beside those of faults
