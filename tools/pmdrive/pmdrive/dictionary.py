@@ -528,11 +528,11 @@ FAULTS = (
     Fault(15, "TEMPERATURE_SENSOR", 'temperature sensor broken or shorted', 0x4320, 'check the sensor and its cable'),
     Fault(16, "OVERLOAD", 'windings overloaded', 0x2350, ('the windings were loaded beyond i_rated for too long: let them cool, check '
  'load, i_rated and t_winding')),
-    Fault(17, "SENSOR_REFERENCE", 'reference of the converters off by 5 % or more', 0x5212, "check the processor's supply: currents and voltages are measured against it"),
+    Fault(17, "SENSOR_REFERENCE", "converters' reference off by 5 %", 0x5212, "check the processor's supply: currents and voltages are measured against it"),
     Fault(18, "BRIDGE_OVERLOAD", 'bridge overloaded', 0x2351, ('the bridge was loaded beyond i_bridge for too long: lower i_max or i_rated, '
  'or cool it and use another board')),
-    Fault(19, "OPEN_PHASE", 'a phase or a switch does not conduct', 0x3321, "check the motor's cable and winding, then the switches and their drivers"),
-    Fault(20, "NO_THIRD_HARMONIC", 'no third harmonic at the star point', 0x7307, ('check the lead to the star point and psi_3, or take an observer that needs '
+    Fault(19, "OPEN_PHASE", 'open phase or switch', 0x3321, "check the motor's cable and winding, then the switches and their drivers"),
+    Fault(20, "NO_THIRD_HARMONIC", 'no third harmonic', 0x7307, ('check the lead to the star point and psi_3, or take an observer that needs '
  'none')),
 )
 
