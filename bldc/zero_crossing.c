@@ -47,9 +47,8 @@ static bool agrees(const zero_crossing_t *self, const zero_crossing_config_t *co
     if (t >= t_60 / 4U) {
         return true;
     }
-    const pm_q_t rise =
-        pm_unit(zero_crossing_swing(config, t_60), pm_ratio((pm_q_t)(4U * t), (pm_q_t)t_60));
-    return pm_abs(y - self->y) <= rise + pm_half(config->rail);
+    const pm_q_t most = pm_unit(zero_crossing_swing(config, t_60), pm_ratio((pm_q_t)(4U * t), (pm_q_t)t_60));
+    return pm_abs(y - self->y) <= most + pm_half(config->rail);
 }
 
 /* A first sample past the crossing: not on its way from the rail to the EMF. */

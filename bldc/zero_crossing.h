@@ -95,11 +95,11 @@ typedef struct {
     uint8_t leg; /* the open one */
     bool rising;
     uint32_t open_since; /* instant of the commutation into it */
-    uint32_t at;         /* instant of the crossing, once found; before, of the last sample ahead of it, or past */
-    pm_q_t y;            /* of that sample, < 0 ahead of the crossing */
-    bool ahead;          /* there was such a sample, */
-    bool cut;            /* and a rail has cut it */
-    bool past;           /* a sample was past the crossing, without one ahead of it */
+    uint32_t at; /* instant of the crossing, once found; before, of the last sample ahead of it, or past */
+    pm_q_t y;    /* of that sample, < 0 ahead of the crossing */
+    bool ahead;  /* there was such a sample, */
+    bool cut;    /* and a rail has cut it */
+    bool past;   /* a sample was past the crossing, without one ahead of it */
     bool found;
 } zero_crossing_t;
 

@@ -123,7 +123,7 @@ void zero_vector_step(zero_vector_t *self, const zero_vector_config_t *config, c
     self->square = pm_max(self->square, square | 1);
     self->v_dc = more->v_dc;
     const bool valid = pm_sampled(more->codes, 0) && self->foreign == 0U && square <= self->most;
-    self->foreign = (uint8_t)(self->foreign >> 1);
+    self->foreign = (uint8_t)(self->foreign / 2U);
     if (!self->behind) {
         self->before = more->i_sample[0];
         self->held = valid;

@@ -279,8 +279,9 @@ class Files(unittest.TestCase):
         for path in [*(ROOT / "tests/campaign").glob("*.yaml"), HERE / "smoke.yaml"]:
             if "\nscenario:" in path.read_text(encoding="utf-8"):
                 campaign = Campaign(path)
-                for number in range(len(campaign.groups)):
-                    self.assertTrue(campaign.run(number).machine, f"{path}: {number}")
+                groups = len(campaign.groups)
+                for number in range(groups):  # a machine may be refused, not each of a group
+                    self.assertTrue(any(campaign.run(number + k * groups).machine for k in range(5)), f"{path}: {number}")
 
 
 if __name__ == "__main__":
