@@ -189,7 +189,7 @@ WHICH = """## Which to take
 - **`pattern` 0, H_PWM-L_PWM**: where the crossings are hard to see (short on times at low speed, terminals that ring): on times of half a
   period and more at any speed. It costs ripple: 1.6 times the current's of the others, {both} W for {one} W on BLDC-HS at {p}.
 - **PWM-ON and ON-PWM**: both switches of a leg share the losses. ON-PWM freewheels for the shortest angle, PWM-ON for the longest: rank
-  by current, from the [safe area](#safe-area). With PWM-ON BLDC-HS at light load shows its terminals still ringing.
+  by current, from the [safe area](#safe-area).
 - **both in turn**: half of the ripple, at twice the frequency; on times are half as long. Not where crossings must be seen at low speed.
 - **third harmonic**: where the star point is led out: no blanking, also through the freewheeling and without pulses.
 - **field orientation**: where torque must be smooth or losses low: {more:.0f} % more torque of an ampere of BLDC-FAN and {less:.0f} % of the
