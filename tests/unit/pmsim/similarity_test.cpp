@@ -35,6 +35,7 @@ TEST(Similarity, FactorsFollowFromTheUnits)
     EXPECT_EQ(s.of_key("B_Nms"), 6.0);
     EXPECT_DOUBLE_EQ(s.of_key("c_leg_F"), 1.5);
     EXPECT_DOUBLE_EQ(s.of_key("c_A_Wb5"), 3.0 / 32);
+    EXPECT_DOUBLE_EQ(s.of_unit("A/Wb^2"), 3.0 / 4);
     for (const char *same :
          {"speed_rated_rad_s", "dead_time_s", "f_pwm_Hz", "pole_pairs", "gain_error", "alpha_R_1_K"}) {
         EXPECT_EQ(s.of_key(same), 1.0) << same;
