@@ -250,6 +250,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
         make_start(&m, config);
     }
     make_open_loop(&m, &config->open_loop);
+    PM_IN_IMAGE(torque_polarity, make_torque_polarity(&m, &config->torque_polarity);)
     make_protection(&m, &config->protection);
     make_fault_short(&m, &config->fault_short);
     PM_IN_IMAGE(six_step, make_block(&m, &config->block);)

@@ -17,6 +17,7 @@
 #include "firmware/drive/procedures/flying_start.h"
 #include "firmware/drive/procedures/saliency_map.h"
 #include "firmware/drive/procedures/sequence.h"
+#include "firmware/drive/procedures/torque_polarity.h"
 #include "firmware/drive/procedures/zero_inductance.h"
 #include "firmware/drive/rest.h"
 #include "firmware/math/image.h"
@@ -86,6 +87,7 @@ typedef struct {
 #if SEQUENCE_HAS_POLARITY
     polarity_config_t polarity;
     PM_IN_IMAGE(dual_pulses, dual_pulses_config_t dual_pulses;)
+    PM_IN_IMAGE(torque_polarity, torque_polarity_config_t torque_polarity;)
     PM_IN_IMAGE(secondary_voltage, zero_second_config_t zero_second;)
     PM_IN_IMAGE(three_phase_hf, three_phase_hf_config_t three_phase_hf;)
 #endif

@@ -24,6 +24,7 @@
 #define PM_WITHOUT_saliency_map 1
 #define PM_WITHOUT_secondary_voltage 1
 #define PM_WITHOUT_zero_inductance 1
+#define PM_WITHOUT_torque_polarity 1
 #define PM_WITHOUT_stored_eds 1
 #define PM_WITHOUT_mismatch 1
 #define PM_WITHOUT_second_harmonic 1

@@ -35,6 +35,7 @@
 #include "firmware/drive/procedures/saliency_map.h"
 #include "firmware/drive/procedures/secondary_current.h"
 #include "firmware/drive/procedures/secondary_voltage.h"
+#include "firmware/drive/procedures/torque_polarity.h"
 #include "firmware/drive/procedures/zero_inductance.h"
 #include "firmware/math/pll.h"
 #include "firmware/math/procedure.h"

@@ -21,14 +21,25 @@
         SEQUENCE_FIND, 4, 4, round, SEQUENCE_FAULT                                                           \
     }
 
+/* The axis is known and its pole is not: `align` is the step of the align. */
+#define NO_POLE(align) (PM_HAS(torque_polarity) ? (align) + 1 : (align))
+#define TURN_FORTH_AND_BACK                                                                                  \
+    {                                                                                                        \
+        PROCEDURE_torque_polarity, SEQUENCE_RUN, FAULT_ALWAYS                                                \
+    }
+
 static const sequence_step_t steps[SEQUENCE_KINDS][SEQUENCE_STEPS] = {
     [SEQUENCE_align] = {CALIBRATE, LOOK, CHARGE, {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
     [SEQUENCE_pulses] = {CALIBRATE, LOOK, CHARGE, {SEQUENCE_FIND, SEQUENCE_RUN, FAULT_ALWAYS}},
     [SEQUENCE_pulses_align] = {CALIBRATE,
                                LOOK,
                                CHARGE,
-                               {SEQUENCE_FIND, SEQUENCE_RUN, 4, 4, SEQUENCE_FAULT},
-                               {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
+                               {SEQUENCE_FIND, SEQUENCE_RUN, NO_POLE(4), 4, SEQUENCE_FAULT},
+                               {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS},
+#if PM_HAS(torque_polarity)
+                               TURN_FORTH_AND_BACK
+#endif
+    },
     [SEQUENCE_identify] = {{PROCEDURE_calibrate, 2, FAULT_ALWAYS},
                            {PROCEDURE_NONE, 2, FAULT_ALWAYS},
                            CHARGE,
@@ -40,8 +51,9 @@ static const sequence_step_t steps[SEQUENCE_KINDS][SEQUENCE_STEPS] = {
                              LOOK,
                              CHARGE,
                              FIND_AXIS(5),
-                             {SEQUENCE_POLE, SEQUENCE_RUN, 5, SEQUENCE_FAULT, SEQUENCE_FAULT},
-                             {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS}},
+                             {SEQUENCE_POLE, SEQUENCE_RUN, NO_POLE(5), SEQUENCE_FAULT, SEQUENCE_FAULT},
+                             {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS},
+                             TURN_FORTH_AND_BACK},
 #endif
 };
 

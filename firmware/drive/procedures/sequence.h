@@ -2,14 +2,15 @@
  *
  *   align          calibrate, look, charge, align
  *   pulses         calibrate, look, charge, find
- *   pulses_align   calibrate, look, charge, find; align, if that found no polarity or no saliency
+ *   pulses_align   calibrate, look, charge, find; align, if that found no saliency, or torque_polarity, if no polarity
  *   identify       calibrate, charge, identify
  *   pole           calibrate, look, charge, find; then, whether that found a polarity or not, pole
- *   pole_align     the same; align, if pole found none or find no saliency
+ *   pole_align     the same; align, if find found no saliency, or torque_polarity, if pole found none
  * find and pole are the procedures of drive_config_t. look, flying_start.h, catches a rotor that turns, and the drive runs
  * from there; it is passed over, without a period of its own, unless the parameter flying_start is set, and in current
  * mode. So is charge on boards without PM_BOOTSTRAP.
- * The fall-back is for what alignment can replace. A machine that shows no saliency is round, whatever it was told: it runs
+ * The fall-back is for what alignment, or which way a torque turns the rotor, can replace; an image without torque_polarity
+ * aligns for it, too. A machine that shows no saliency is round, whatever it was told: it runs
  * as one without injection does, by open loop and hand-over, until the next start. Without a current nothing is connected:
  * a fault in all of them.
  * Tests: tests/unit/drive/sequence_test.cpp, tests/scenario/start_fallback.yaml, start_round.yaml. */
@@ -39,10 +40,10 @@ typedef enum {
 /* Whether the image has a step for the polarity alone. */
 #define SEQUENCE_HAS_POLARITY                                                                                \
     (PM_HAS(d_current) || PM_HAS(secondary_current) || PM_HAS(secondary_voltage) || PM_HAS(dual_pulses) ||   \
-     PM_HAS(three_phase_hf))
+     PM_HAS(three_phase_hf) || PM_HAS(torque_polarity))
 
 #if SEQUENCE_HAS_POLARITY
-#define SEQUENCE_STEPS 6
+#define SEQUENCE_STEPS 7
 #define SEQUENCE_KINDS SEQUENCE_COUNT
 #else
 #define SEQUENCE_STEPS 5

@@ -50,7 +50,7 @@ TEST(Sequence, LeadsWhereItSays)
                 expected = SEQUENCE_WAIT;
             } else if ((reason == PM_FAILED_POLARITY || reason == PM_FAILED_NOT_TURNING) &&
                        (id == SEQUENCE_pulses_align || poles(sequence))) {
-                expected = 4;
+                expected = poles(sequence) ? 4 : 5;
             } else if (reason == PM_FAILED_SALIENCY && id == SEQUENCE_pulses_align) {
                 expected = 4;
             } else if (reason == PM_FAILED_SALIENCY && id == SEQUENCE_pole_align) {
@@ -64,14 +64,17 @@ TEST(Sequence, LeadsWhereItSays)
     for (const sequence_id_t id : {SEQUENCE_pole, SEQUENCE_pole_align}) {
         EXPECT_EQ(sequence_step(id, 4)->procedure, SEQUENCE_POLE);
         EXPECT_EQ(next(id, 4, PM_DONE), uint32_t(SEQUENCE_RUN));
-        EXPECT_EQ(next(id, 4, PM_FAILED_POLARITY), id == SEQUENCE_pole ? uint32_t(SEQUENCE_FAULT) : 5U);
+        EXPECT_EQ(next(id, 4, PM_FAILED_POLARITY), id == SEQUENCE_pole ? uint32_t(SEQUENCE_FAULT) : 6U);
         EXPECT_EQ(next(id, 4, PM_FAILED_TIMEOUT), uint32_t(SEQUENCE_FAULT));
     }
-    EXPECT_EQ(sequence_step(SEQUENCE_pole_align, 5)->procedure, PROCEDURE_align);
-    EXPECT_EQ(next(SEQUENCE_pole_align, 5, PM_DONE), uint32_t(SEQUENCE_RUN));
-    EXPECT_EQ(sequence_step(SEQUENCE_pulses_align, 4)->procedure, PROCEDURE_align);
-    EXPECT_EQ(next(SEQUENCE_pulses_align, 4, PM_DONE), uint32_t(SEQUENCE_RUN));
-    EXPECT_EQ(next(SEQUENCE_pulses_align, 4, PM_FAILED_POLARITY), uint32_t(SEQUENCE_FAULT));
+    for (const auto &[id, align] : {std::pair{SEQUENCE_pulses_align, 4U}, {SEQUENCE_pole_align, 5U}}) {
+        EXPECT_EQ(sequence_step(id, align)->procedure, PROCEDURE_align);
+        EXPECT_EQ(sequence_step(id, align + 1)->procedure, PROCEDURE_torque_polarity);
+        for (const uint32_t step : {align, align + 1}) {
+            EXPECT_EQ(next(id, step, PM_DONE), uint32_t(SEQUENCE_RUN));
+            EXPECT_EQ(next(id, step, PM_FAILED_NOT_TURNING), uint32_t(SEQUENCE_FAULT));
+        }
+    }
 }
 
 // Calibrated, with the pulses at work.
@@ -98,14 +101,21 @@ TEST(Sequence, ARefusalIsAFaultOrLeadsToTheFallBack)
             EXPECT_EQ(drive_status(&x.d)->refusal.reason, reason);
             const bool round = reason == PM_FAILED_SALIENCY;
             // the pulses themselves never say PM_FAILED_NOT_TURNING: for the sequence it is of the same kind
-            if (fall_back && (reason == PM_FAILED_POLARITY || reason == PM_FAILED_NOT_TURNING || round)) {
+            if (fall_back && (reason == PM_FAILED_POLARITY || reason == PM_FAILED_NOT_TURNING)) {
+                EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+                EXPECT_EQ(x.d.sequence.procedure, PROCEDURE_torque_polarity);
+                EXPECT_EQ(x.d.stage, STAGE_VECTOR);
+                EXPECT_TRUE(x.d.position.carrier);
+                continue;
+            }
+            if (fall_back && round) {
                 EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
                 EXPECT_EQ(x.d.sequence.procedure, PROCEDURE_align);
                 EXPECT_EQ(x.d.stage, STAGE_OPEN_LOOP);
                 x.run_ms(301);
-                // injection goes on from there, or the vector turns a machine that has no saliency
-                EXPECT_EQ(x.d.stage, round ? STAGE_OPEN_LOOP : STAGE_VECTOR);
-                EXPECT_EQ(x.d.position.carrier, !round);
+                // the vector turns a machine that has no saliency
+                EXPECT_EQ(x.d.stage, STAGE_OPEN_LOOP);
+                EXPECT_FALSE(x.d.position.carrier);
                 EXPECT_EQ(x.d.sequence.procedure, PROCEDURE_NONE);
                 continue;
             }

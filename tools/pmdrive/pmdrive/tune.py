@@ -47,7 +47,7 @@ WHY = {
     "i_d_light": "a tenth of rated: light load stays out of what dead time does to small currents",
     "i_fw_max": "half of rated",
     "comp_zone": "a dozen steps of the converter",
-    "v_injection": "seven steps of the converter as an answer, 14 times what a leg loses; as the link leaves room",
+    "v_injection": "seven steps of the converter as an answer, 14 times what a leg loses; as the link and i_trip leave room",
     "i_pulse": "rated current, which saturates",
     "start_method": "0: pulses and injection, as the saliency is sure and seen; 2: align and open loop, as it is not",
     "i_open_loop": "0.8 of rated, bears half the rated torque 39 degrees behind; at most psi_m/(2 (L_q - L_d)), or saliency "
@@ -74,9 +74,10 @@ def largest_carrier(x):
 
 def _injection(x, tolerance):
     """Seven steps of the converter as an answer 45 degrees off, and fourteen times what a leg loses, which at light load
-    comes and goes with the carrier; as far as the link leaves room. And whether it may lead."""
+    comes and goes with the carrier; as far as the link leaves room, and i_trip beside i_max. And whether it may lead."""
     step, dL = 2 * x["i_full_scale"] / STEPS, x["L_q"] - x["L_d"]
-    top = largest_carrier(x)
+    beside = max(0.9 * limits(x)["i_trip"] - x["i_max"], 0.25 * x["i_rated"])
+    top = min(largest_carrier(x), 2 * x["L_d"] * x["f_pwm"] * beside)
     if dL <= max(SALIENT, 2 * tolerance / (1 + tolerance)) * x["L_q"]:  # both may be off, either way
         return 0.2 * top, False
     v = max(7 * step * 2 * x["L_d"] * x["L_q"] * x["f_pwm"] / dL, 14 * _lost(x))

@@ -1,0 +1,113 @@
+#include "firmware/drive/procedures/injected.h"
+#include "firmware/math/compiler.h"
+
+#if PM_HAS(torque_polarity)
+
+#define LOCK_MS  60U
+#define PULSE_MS 24U
+#define FALL_MS  8U
+#define REST_MS  8U
+#define ALL_MS   (PULSE_MS + FALL_MS + REST_MS)
+#define SEEN     ((int32_t)PM_TURN(1.0 / 16))
+#define FAR      ((int32_t)PM_TURN(3.0 / 8)) /* no pulse turns it so far */
+#define MOST     64U
+
+enum { PART_LOCK, PART_FORTH, PART_BACK, PART_TOLD };
+
+void procedure_torque_polarity_begin(drive_t *drive)
+{
+    drive->beside.torque_polarity = (torque_polarity_t){.part = PART_LOCK};
+    inject_at(drive, drive->sequence.theta);
+}
+
+/* A direction begins from where the rotor is. */
+static void turn_from_here(drive_t *drive, uint8_t part)
+{
+    torque_polarity_t *self = &drive->beside.torque_polarity;
+    self->theta = drive->position.pll.theta;
+    self->i = drive->config.torque_polarity.step;
+    self->pulses = 0;
+    self->part = part;
+}
+
+static void give_current(drive_t *drive, bool pulse)
+{
+    const torque_polarity_t *self = &drive->beside.torque_polarity;
+    const pm_q_t along = self->part == (uint8_t)PART_FORTH ? self->i : -self->i;
+    const pm_q_t step = (self->i / (int32_t)FALL_MS) + 1;
+    drive->i_ref.q += pm_clamp((pulse ? along : 0) - drive->i_ref.q, -step, step);
+}
+
+static int32_t turned_by(const drive_t *drive)
+{
+    return pm_angle_diff(drive->position.pll.theta, drive->beside.torque_polarity.theta);
+}
+
+/* The other way than before, it counts from the farthest that it has come. */
+static bool has_turned(drive_t *drive, bool rests)
+{
+    torque_polarity_t *self = &drive->beside.torque_polarity;
+    const int32_t turned = turned_by(drive);
+    if (self->part == (uint8_t)PART_FORTH) {
+        return pm_abs(turned) >= SEEN;
+    }
+    if (rests && (turned > 0) == self->forwards) {
+        self->theta = drive->position.pll.theta;
+    }
+    return (self->forwards ? -turned : turned) >= SEEN;
+}
+
+static pm_procedure_t look(drive_t *drive, bool turned)
+{
+    torque_polarity_t *self = &drive->beside.torque_polarity;
+    const torque_polarity_config_t *c = &drive->config.torque_polarity;
+    self->ms = 0;
+    if (!turned) {
+        self->i = pm_min(self->i + c->step, drive->config.i_max);
+        self->pulses++;
+        return self->pulses < MOST ? PM_RUNNING : PM_FAILED_NOT_TURNING;
+    }
+    if (self->part == (uint8_t)PART_FORTH) {
+        self->forwards = turned_by(drive) > 0;
+        turn_from_here(drive, PART_BACK);
+        return PM_RUNNING;
+    }
+    leave_polarity(drive, drive->sequence.margin, self->part == (uint8_t)PART_TOLD || self->forwards);
+    return PM_DONE;
+}
+
+PM_APART pm_procedure_t procedure_torque_polarity_slow(drive_t *drive)
+{
+    torque_polarity_t *self = &drive->beside.torque_polarity;
+    self->ms++;
+    if (self->part == (uint8_t)PART_LOCK) {
+        if (self->ms >= LOCK_MS) {
+            self->ms = 0;
+            turn_from_here(drive, PART_FORTH);
+        }
+        return PM_RUNNING;
+    }
+    if (pm_abs(drive->position.pll.omega) > PM_ONE / 2) {
+        return PM_FAILED_SALIENCY;
+    }
+    if (drive->position.slip.count != 0U && self->part != (uint8_t)PART_TOLD) {
+        self->part = PART_TOLD; /* the frame has been turned to the pole that the EMF shows */
+        self->ms = PULSE_MS;
+    }
+    if (self->part != (uint8_t)PART_TOLD && pm_abs(turned_by(drive)) > FAR) {
+        return PM_FAILED_TURNED;
+    }
+    const bool turned = self->part == (uint8_t)PART_TOLD || has_turned(drive, self->ms > PULSE_MS + FALL_MS);
+    if (turned && self->ms < PULSE_MS) {
+        self->ms = PULSE_MS;
+    }
+    give_current(drive, self->ms < PULSE_MS);
+    return self->ms < ALL_MS ? PM_RUNNING : look(drive, turned);
+}
+
+void procedure_torque_polarity_abort(drive_t *drive)
+{
+    (void)drive;
+}
+
+#endif

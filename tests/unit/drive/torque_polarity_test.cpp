@@ -1,0 +1,118 @@
+// Polarity by which way a torque turns the rotor, as the drive runs it behind pulses that have found no pole: on a machine
+// that does not saturate, with what hinders or moves its rotor.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/plants.h"
+#include "tests/unit/drive/direct.h"
+#include "tests/unit/drive/start.h"
+
+namespace
+{
+
+using bench::kDegree;
+using start::Start;
+
+constexpr int kAngles = 12;
+constexpr double kRated_Nm = 1.5 * 3 * 0.12 * 4;
+
+// (L_q - L_d) i > psi_m from 1.3 A on.
+plant_config_t weak_magnets()
+{
+    plant_config_t c = plants::ipm_1000();
+    c.machine.c_A_Wb5 = 0;
+    c.machine.L_d0_H = 40e-3;
+    c.machine.L_q0_H = 130e-3;
+    c.machine.psi_m_Wb = 0.12;
+    c.inverter.c_leg_F = 0.5e-9;
+    c.mech.T_coulomb_Nm = 0.02;
+    return c;
+}
+
+drive_params_t told()
+{
+    drive_params_t p = direct::params(1);
+    p.L_d = p.L_dh_rated = 40000000;
+    p.L_q = p.L_q_rated = p.L_qh_rated = 130000000;
+    p.L_dqh_rated = 0;
+    p.cross_half = 0;
+    p.psi_m = 120000000;
+    p.speed_bandwidth = 2000;
+    p.leg_capacitance = 500;
+    return p;
+}
+
+double angle(int k)
+{
+    return (360.0 * k / kAngles + 7) * kDegree;
+}
+
+int reason(Start &x)
+{
+    const drive_refusal_t &refusal = drive_status(&x.drive())->refusal;
+    return refusal.procedure == PROCEDURE_torque_polarity ? int(refusal.reason) : int(PM_RUNNING);
+}
+
+TEST(TorquePolarity, BehindABrakeTheCurrentGrowsUntilTheRotorTurns)
+{
+    plant_config_t braked = weak_magnets();
+    braked.mech.T_coulomb_Nm = 0.6 * kRated_Nm;
+    for (int k = 0; k < kAngles; ++k) {
+        Start x(braked, told(), angle(k));
+        x.run_past(PROCEDURE_torque_polarity);
+        EXPECT_EQ(drive_status(&x.drive())->fault, DRIVE_FAULT_NONE) << k;
+        EXPECT_LE(std::abs(x.error_rad()), 20 * kDegree) << k;
+    }
+}
+
+TEST(TorquePolarity, AHeldRotorIsRefusedNotGuessed)
+{
+    for (int k = 0; k < kAngles; ++k) {
+        plant_config_t held = weak_magnets();
+        held.mech.locked = true;
+        held.sensor.seed = static_cast<uint64_t>(k) + 1;
+        Start x(held, told(), angle(k));
+        x.run_to(PROCEDURE_torque_polarity);
+        x.run([](const drive_t &d) { return d.fault != DRIVE_FAULT_NONE; });
+        x.run([](const drive_t &d) { return d.fault != DRIVE_FAULT_NONE; });
+        EXPECT_EQ(drive_status(&x.drive())->fault, DRIVE_FAULT_POSITION_NOT_FOUND) << k;
+        EXPECT_EQ(reason(x), PM_FAILED_NOT_TURNING) << k;
+    }
+}
+
+// A weight that falls with the free rotor: the pole is found, shown by the EMF, or the start is refused.
+TEST(TorquePolarity, ALoadThatTurnsTheRotorIsNotTakenForThePole)
+{
+    for (const double load : {-0.9, -0.3, 0.3, 0.9}) {
+        int found = 0;
+        for (int k = 0; k < kAngles; ++k) {
+            Start x(weak_magnets(), told(), angle(k));
+            plant_set_load(x.plant(), load * kRated_Nm);
+            x.run_past(PROCEDURE_torque_polarity);
+            if (drive_status(&x.drive())->fault == DRIVE_FAULT_NONE) {
+                EXPECT_LE(std::abs(x.error_rad()), 60 * kDegree) << load << ' ' << k;
+                ++found;
+            } else {
+                EXPECT_EQ(reason(x), PM_FAILED_TURNED) << load << ' ' << k;
+            }
+        }
+        EXPECT_GE(found, kAngles / 2) << load;
+    }
+}
+
+// A frame that the EMF turns round meanwhile has the pole.
+TEST(TorquePolarity, WhatTheEmfHasShownStands)
+{
+    Start x(weak_magnets(), told(), 190 * kDegree);
+    x.run([](const drive_t &d) {
+        return d.sequence.procedure == PROCEDURE_torque_polarity && d.beside.torque_polarity.pulses > 0U;
+    });
+    x.drive().position.slip.count = 1;
+    const pm_angle_t theta = x.drive().position.pll.theta;
+    x.run_past(PROCEDURE_torque_polarity);
+    EXPECT_EQ(drive_status(&x.drive())->fault, DRIVE_FAULT_NONE);
+    EXPECT_LE(std::abs(pm_angle_diff(x.drive().position.pll.theta, theta)), int32_t(PM_TURN(1.0 / 12)));
+}
+
+} // namespace
