@@ -10,7 +10,7 @@
 #define ALL_MS   (PULSE_MS + FALL_MS + REST_MS)
 #define SEEN     ((int32_t)PM_TURN(1.0 / 16))
 #define FAR      ((int32_t)PM_TURN(3.0 / 8)) /* no pulse turns it so far */
-#define MOST     64U
+#define MOST     8U                          /* pulses of i_max */
 
 enum { PART_LOCK, PART_FORTH, PART_BACK, PART_TOLD };
 
@@ -63,8 +63,8 @@ static pm_procedure_t look(drive_t *drive, bool turned)
     const torque_polarity_config_t *c = &drive->config.torque_polarity;
     self->ms = 0;
     if (!turned) {
+        self->pulses = (uint8_t)(self->pulses + (self->i == drive->config.i_max ? 1U : 0U));
         self->i = pm_min(self->i + c->step, drive->config.i_max);
-        self->pulses++;
         return self->pulses < MOST ? PM_RUNNING : PM_FAILED_NOT_TURNING;
     }
     if (self->part == (uint8_t)PART_FORTH) {

@@ -6,18 +6,18 @@
  *   d is the north    if it has turned forwards with +i_q and backwards with -i_q,
  *   d is the south    if it has turned backwards with +i_q and forwards with -i_q.
  * One of the two without the other is the load's doing, and decides nothing. Where the rotor becomes so fast that the EMF shows
- * the pole (slip.h), that is it. The current lies across the axis, where a machine
- * has no torque of reluctance whose sign is not that of the magnet's; a vector that stands still (align.h) is no witness on a
- * machine with (L_q - L_d) i > psi_m, whose rotor rests to either side of it. The angle is looked at 8 ms after each pulse, without
- * current: with it, cross-saturation moves the axis that injection sees.
+ * the pole (slip.h), that is it. Across the axis a current makes no torque of reluctance; on a vector that stands still (align.h)
+ * it does, and with (L_q - L_d) i > psi_m the rotor rests to either side of it. The angle is looked at 8 ms after each pulse,
+ * without current: with it, cross-saturation moves the axis that injection sees.
  *
  * A rotor that comes off its friction is turned by one step too much; injection follows it while
- *   3/2 p^2 psi_m step / J <= 1/4 rad (2 pi injection_bandwidth)^2            i_max / 32 <= step <= i_max / 8
+ *   3/2 p^2 psi_m step / J <= 1/4 rad (2 pi injection_bandwidth)^2            i_max / 16 <= step <= i_max / 8
  *
- * 60 ms for injection, 40 ms a pulse: 0.2 s at rest without load, 2.6 s for the heaviest. Peak current: what turns it, i_max at most,
- * and the carrier. PM_FAILED_NOT_TURNING: not within 32 pulses more than it takes to i_max; PM_FAILED_TURNED: by 135 degrees within a
- * pulse, as a load does it; PM_FAILED_SALIENCY: the frame turns
- * as fast as half of speed_trip, as one that nothing holds. No division. State 16 bytes.
+ * 60 ms for injection, 40 ms a pulse: 0.2 s at rest without load, 1.2 s and as much again for the heaviest; 1 s until a rotor that is
+ * held is refused. Movement: 22.5 electrical degrees forth and what it goes on by itself, 105 at most for a free IPM-1000. Peak current:
+ * what turns it, i_max at most, and the carrier. PM_FAILED_NOT_TURNING: not within eight pulses of i_max; PM_FAILED_TURNED: by 135
+ * degrees within a pulse, as a load does it; PM_FAILED_SALIENCY: the frame turns as fast as half of speed_trip, as one that nothing
+ * holds. No division. State 16 bytes.
  * Tests: tests/unit/drive/torque_polarity_test.cpp, tests/scenario/start_fallback.yaml, start_weak_magnets.yaml. */
 #ifndef DRIVE_PROCEDURES_TORQUE_POLARITY_H
 #define DRIVE_PROCEDURES_TORQUE_POLARITY_H
@@ -36,7 +36,7 @@ typedef struct {
     pm_angle_t theta; /* from which on it turns */
     pm_q_t i;         /* of this pulse */
     uint16_t ms;
-    uint8_t pulses; /* in this direction */
+    uint8_t pulses; /* of i_max, in this direction */
     uint8_t part;
     bool forwards; /* it turned with +i_q */
 } torque_polarity_t;
