@@ -77,6 +77,10 @@ METHODS = {
                           ("secondary_current_t", "polarity_config_t"), "L_d, L_q, L_d_falls", "three currents, injection 4",
                           "where nothing but the carrier may flow: no current of its own, no movement; wants a strong carrier "
                           "of low frequency"),
+    "six pulses, torque": ("100", "position_pulses: 0, start_fallback: 1", 0, ("initial_pulses", "torque_polarity", *PULSES),
+                           ("initial_pulses_t", "pulses_config_t"), "L_d, L_q, L_d_falls; J", "three currents",
+                           "as it comes: where six pulses refuse the pole, which way a torque turns the rotor shows it, also of a "
+                           "machine that does not saturate; the rotor must be free to turn"),
     "three-phase HF": ("106, 107; pole 96", "position_find: 2, polarity: 3", 4,
                        ("three_phase_hf", "three_phase_hf_config", "secondary_current", "polarity", "polarity_config"),
                        ("three_phase_hf_t", "three_phase_hf_config_t"), "L_d, L_q, R, L_d_falls", "three currents",
@@ -84,7 +88,7 @@ METHODS = {
 }
 
 PROFILE = """profile:
-  - {t_s: 0.0, mode: torque, torque_rel: 0, enable: true}
+  - {{t_s: 0.0, mode: {}, enable: true}}
 """
 EXPECT = [("fault", "equals: NONE"), ("start_refusal", "equals: none"), ("found_angle_error_deg", "max_abs: 360"), ("pulses_angle_error_deg", "max_abs: 360"),
           ("start_margin_sigma", "min: 0"), ("start_s", "max: 9"), ("travel_max_deg_mech", "max: 360"), ("current_peak_A", "max: 1e4")]
@@ -109,12 +113,15 @@ def scenario(kind, method, cases):
         values = {"theta": x["theta"], "R": k["R"] * x["R"], "L_d": k["L_d0"] * x["L_d"], "L_q": k["L_q0"] * x["L_q"],
                   "psi": k["psi"] * x["psi"], **{key: x[key] for key in ("ga", "gb", "gc")}}
         rows.append(f"  - {{name: m{n}, " + ", ".join(f"{key}: {value:.7g}" for key, value in values.items()) + "}")
-    drive = f"start_method: 1, start_fallback: 0, injection: {carrier}, {k['drive']}{choice}, {SINES[carrier]}".format(**k)
+    falls_back = "start_fallback" in choice
+    held = "speed, speed_rel: 0" if falls_back else "torque, torque_rel: 0"  # a torque leaves a free rotor turning
+    choice += "" if falls_back else ", start_fallback: 0"
+    drive = f"start_method: 1, injection: {carrier}, {k['drive']}{choice}, {SINES[carrier]}".format(**k)
     link = "dclink: {r_source_ohm: 1, c_F: 470.0e-6}\n" if method == "DC-link voltage" else ""
     expect = "".join(f"  - {{metric: {metric}, {bound}, book: \"8.1\"}}\n" for metric, bound in EXPECT)
     return (f"title: start\nmachine: {k['file']}\nstart: {{theta_e_deg: $theta}}\nelectrical: {{R_s_ohm: $R, L_d0_H: $L_d, "
             f"L_q0_H: $L_q, psi_m_Wb: $psi, c_A_Wb5: {k['c']}}}\nsensor: {{gain_error: [$ga, $gb, $gc]}}\n{link}"
-            f"drive: {{{drive}}}\nduration_s: 0.5\nafter_fault_s: 0\ncases:\n" + "\n".join(rows) + f"\n{PROFILE}expect:\n{expect}")
+            f"drive: {{{drive}}}\nduration_s: {1.2 if falls_back else 0.5}\nafter_fault_s: 0\ncases:\n" + "\n".join(rows) + f"\n{PROFILE.format(held)}expect:\n{expect}")
 
 
 def submit(pool, kind, method, cases):
@@ -194,8 +201,8 @@ def of(rs, metric):
 
 
 def own(method):
-    """The error of what the method itself has found: those with a lock go on from it, the others are followed by injection."""
-    return "found_angle_error_deg" if "lock" in METHODS[method][3] else "pulses_angle_error_deg"
+    """The error of what the method itself has found: those with a lock or a torque go on from it, the others are followed by injection."""
+    return "found_angle_error_deg" if {"lock", "torque_polarity"} & set(METHODS[method][3]) else "pulses_angle_error_deg"
 
 
 def cell(rs, metric):
@@ -274,7 +281,7 @@ def page(found, told, noise, count, plot_name):
     code, state = code_bytes(), state_bytes()
     text = [HEAD + f"{count} random machines of each class: R, L_d and psi_m of the plant within {100 * OTHER:.0f} % of what the "
             f"drive is told, each for itself, and L_q / L_d, of SPM-400 within 2 %; gains of the current sensors within {100 * GAIN:.0f} %, any angle. There is no "
-            "fall-back here: what is refused is told with its reason.\n"]
+            "fall-back here but that of `six pulses, torque`: what is refused is told with its reason.\n"]
     text.append("## Which to take\n")
     for method, (*_, take) in METHODS.items():
         if method in found:
