@@ -14,7 +14,7 @@
 #define TURN_MS   800U /* with the current: the rotor comes to rest */
 #define FREE_MS   200U /* without */
 #define LATEST_MS 5000U
-#define SHARE     64   /* of |Y|: a difference that is none */
+#define SHARE     64   /* of S: a difference that is none */
 #define LEAST     4000 /* of the machine's inductance */
 
 enum { TURN, WITH, FREE, WITHOUT };
@@ -87,7 +87,7 @@ static void add(pm_dq_t *sum, pm_q_t cosine, pm_q_t sine)
     sum->q -= sine;
 }
 
-/* |Y| of as much current as there would be without resistance and dead time. */
+/* S: |Y| of as much current as there would be without resistance and dead time. */
 static pm_q_t size_of(pm_q_t y, pm_dq_t i_cos, pm_dq_t i_sin)
 {
     return pm_mul(y, pm_div(pm_hypot(i_cos.d, i_sin.d), i_cos.d));

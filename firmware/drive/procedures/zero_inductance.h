@@ -56,7 +56,7 @@ typedef struct {
     commissioning_hold_t hold;
     pm_q_t i;                /* that is held, along phase A */
     pm_dq_t a, b, y;         /* sums of I_a, I_b, Y */
-    polarity_mean_t size[2]; /* of |Y|, with I and without; beside `first` */
+    polarity_mean_t size[2]; /* S, with I and without; beside `first` */
     pm_q_t first;
     uint16_t ms; /* of this part */
     uint8_t part;
