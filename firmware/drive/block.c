@@ -133,6 +133,13 @@ static void prepare(drive_t *drive, pm_q_t i_q)
                          pm_max(drive->status.v_dc, V_DC_LEAST));
 }
 
+void block_take_duty(drive_t *drive)
+{
+    const pm_q_t emf = pm_mul(drive->config.machine.psi_m, LINE_OF_PHASES); /* at base speed */
+    const pm_q_t omega = pm_div(pm_mul(pm_abs(drive->duty_target), drive->status.v_dc), emf);
+    drive->omega_target = drive->duty_target < 0 ? -omega : omega;
+}
+
 bool block_may_begin(const drive_t *drive)
 {
     const block_config_t *c = &drive->config.block;
@@ -258,6 +265,23 @@ drive_fault_t block_fault(const drive_t *drive, drive_fault_t fault)
 #endif
 }
 
+/* The voltage is given, and the current is what it makes. */
+static void follow_duty(drive_t *drive, pm_q_t i_min, pm_q_t i_max)
+{
+    block_t *self = &drive->block;
+    const bool reverse = self->six_step.reverse;
+    const pm_q_t step = drive->config.block.duty_step;
+    self->duty += pm_clamp(drive->duty_target - self->duty, -step, step);
+    prepare(drive, reverse ? i_min : i_max);
+    line_current_give(&self->current, pm_max(reverse ? -self->duty : self->duty, 0),
+                      pm_mul(reverse ? -i_max : i_min, LINE_OF_Q));
+    drive->status.limits |= self->current.held ? DRIVE_LIMIT_CURRENT : 0U;
+    self->current.held = false;
+    const pm_q_t i_q = pm_mul(reverse ? -self->i : self->i, Q_OF_LINE);
+    speed_control_reset(&drive->speed, self->pll.omega, pm_clamp(i_q, i_min, i_max));
+    report(drive, i_q);
+}
+
 block_result_t block_slow(drive_t *drive)
 {
     const block_config_t *c = &drive->config.block;
@@ -285,6 +309,9 @@ block_result_t block_slow(drive_t *drive)
     if (is_wrong(drive)) {
         return lost(drive);
     }
+    if (drive->block_ms == 0U) { /* the ramp begins at the voltage that there is */
+        self->duty = self->six_step.reverse ? -self->current.u : self->current.u;
+    }
     if (drive->block_ms < BLOCK_SETTLED_MS) {
         drive->block_ms++;
     } else {
@@ -294,9 +321,13 @@ block_result_t block_slow(drive_t *drive)
     pm_q_t i_min;
     pm_q_t i_most;
     reference_range(drive, c->limit ? pm_min(most_of(drive), i_max) : i_max, &i_min, &i_most);
-    const pm_q_t i_q = reference_torque(drive, self->pll.omega, i_min, i_most);
-    prepare(drive, i_q);
-    report(drive, i_q);
+    if (drive->command.mode == DRIVE_MODE_DUTY && drive->state != DRIVE_STOPPING) {
+        follow_duty(drive, i_min, i_most);
+    } else {
+        const pm_q_t i_q = reference_torque(drive, self->pll.omega, i_min, i_most);
+        prepare(drive, i_q);
+        report(drive, i_q);
+    }
     self->current.limited = false;
     return BLOCK_RUNS;
 }
