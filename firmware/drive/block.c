@@ -100,21 +100,38 @@ static void look(block_t *self, const block_config_t *c)
     self->rate = UINT32_MAX / seen->sum;
 }
 
-/* The current up to which a crossing is seen in time, where the freewheeling lasts longest: into a sector whose new leg is
- * chopped. */
-static pm_q_t most_of(const drive_t *drive)
+static bool follows_duty(const drive_t *drive)
+{
+    return drive->command.mode == DRIVE_MODE_DUTY && drive->state != DRIVE_STOPPING;
+}
+
+/* With less the rotor would not keep its speed. */
+static pm_q_t in_q(const drive_t *drive, pm_q_t i)
+{
+    return pm_max(pm_mul_sat(i, Q_OF_LINE), drive->config.i_max / 8);
+}
+
+/* Narrowed to the currents with which a crossing is seen in time, where the freewheeling lasts longest: of one that drives into a
+ * sector whose new leg is chopped, of one that brakes into one whose is not. What a speed or a torque brakes with is the user's. */
+static void narrow(const drive_t *drive, pm_q_t *i_min, pm_q_t *i_max)
 {
     const block_config_t *c = &drive->config.block;
     const block_t *self = &drive->block;
     const pattern_id_t pattern = c->six_step.pattern.id;
-    const freewheeling_in_t in = {.pattern = pattern,
-                                  .sector = pattern_chops_incoming(pattern, 1) ? 1U : 0U,
-                                  .u = self->current.u,
-                                  .v_dc = drive->status.v_dc,
-                                  .omega = pm_max(pm_abs(self->pll.omega), 1)};
-    const pm_q_t left = PM_Q(0.5235987755982988) - pm_mul(in.omega, c->blind);
-    const pm_q_t i = pm_mul_sat(freewheeling_current(&c->freewheeling, &in, pm_max(left, 0)), Q_OF_LINE);
-    return pm_max(i, drive->config.i_max / 8); /* with less it would not keep its speed */
+    freewheeling_in_t in = {.pattern = pattern,
+                            .sector = pattern_chops_incoming(pattern, 1) ? 1U : 0U,
+                            .u = self->current.u,
+                            .v_dc = drive->status.v_dc,
+                            .omega = pm_max(pm_abs(self->pll.omega), 1)};
+    const pm_q_t left = pm_max(PM_Q(0.5235987755982988) - pm_mul(in.omega, c->blind), 0);
+    const pm_q_t drives = in_q(drive, freewheeling_current(&c->freewheeling, &in, left));
+    pm_q_t brakes = drives;
+    if (follows_duty(drive)) {
+        in.sector = pattern_chops_incoming(pattern, 0) ? 1U : 0U;
+        brakes = in_q(drive, freewheeling_braking(&c->freewheeling, &in, left));
+    }
+    *i_min = pm_max(*i_min, self->six_step.reverse ? -drives : -brakes);
+    *i_max = pm_min(*i_max, self->six_step.reverse ? brakes : drives);
 }
 
 /* Between the two legs, of the speed that the crossings say. */
@@ -317,14 +334,16 @@ block_result_t block_slow(drive_t *drive)
     } else {
         drive->block_tries = 0;
     }
-    const pm_q_t i_max = drive->config.i_max;
     pm_q_t i_min;
-    pm_q_t i_most;
-    reference_range(drive, c->limit ? pm_min(most_of(drive), i_max) : i_max, &i_min, &i_most);
-    if (drive->command.mode == DRIVE_MODE_DUTY && drive->state != DRIVE_STOPPING) {
-        follow_duty(drive, i_min, i_most);
+    pm_q_t i_max;
+    reference_range(drive, drive->config.i_max, &i_min, &i_max);
+    if (c->limit) {
+        narrow(drive, &i_min, &i_max);
+    }
+    if (follows_duty(drive)) {
+        follow_duty(drive, i_min, i_max);
     } else {
-        const pm_q_t i_q = reference_torque(drive, self->pll.omega, i_min, i_most);
+        const pm_q_t i_q = reference_torque(drive, self->pll.omega, i_min, i_max);
         prepare(drive, i_q);
         report(drive, i_q);
     }
