@@ -404,7 +404,7 @@ TEST(BusProfile, DutyModeGivesTheShareOfTheLink)
     Bench x;
     drive_params_t params = defaults();
     params.commutation = 1;
-    params.i_open_loop = 3000;
+    plant_sensor(x.plant())->v_leg_full_scale_V = 450;
     x.boot(&params);
     x.run_ms(5);
     ASSERT_EQ(x.set(0x1602, 0, 0), 0U);

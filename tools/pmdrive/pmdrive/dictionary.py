@@ -351,8 +351,7 @@ ENTRIES = (
     Entry(0x2500, 14, "t_lead", "six_step", "i32", "off", "s", -9, 0, 0, 100000, 1000, False, True, "application", "none", {}, 'from the sample of the terminals to the edge of a switch that follows', "10.3.2.1 #110"),
     Entry(0x2500, 15, "v_terminal_full_scale", "six_step", "i32", "off", "V", -3, 0, 5000, 1200000, 40000, False, True, "application", "none", {}, 'terminal voltage at full scale of the converter', ""),
     Entry(0x2500, 16, "six_step_start", "six_step", "i32", "off", "1", 0, 0, 0, 1, 1, False, True, "application", "none", {0: 'open loop and flux observer of the vector, up to six_step_speed', 1: 'from the align by the crossings, with i_open_loop and J'}, 'what leads to block commutation', "10.2.3 #108"),
-    Entry(0x2500, 17, "duty_ramp", "six_step", "i32", "off", "1/s", -3, 0, 10, 1000000, 10000, False, True, "application", "none", {}, ("slope of the voltage's share of v_dc in mode duty: 10 takes 0.1 s from "
- 'nothing to all'), "1.4.2 #9"),
+    Entry(0x2500, 17, "t_duty", "six_step", "i32", "off", "s", -3, 0, 1, 100000, 100, False, True, "application", "none", {}, "mode duty: ramp of the voltage's share of v_dc, from nothing to all", "1.4.2 #9"),
     Entry(0x2600, 0, "protections.count", "protections", "u8", "const", "", 0, 0, None, None, 12, False, False, "none", "none", {}, 'highest sub-index', ""),
     Entry(0x2600, 1, "i_trip", "protections", "i32", "locked", "A", -3, 0, 100, 4000000, 9000, False, True, "application", "none", {}, 'over-current fault, instantaneous, any phase', ""),
     Entry(0x2600, 2, "v_dc_max", "protections", "i32", "locked", "V", -3, 0, 5000, 1200000, 400000, False, True, "application", "none", {}, 'DC over-voltage fault', ""),
