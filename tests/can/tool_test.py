@@ -387,7 +387,8 @@ class Motion(Bench):
         with self.connect() as drive, motion.Motion(drive, "duty", duty=-2500):
             self.assertEqual((drive.read("mode_display"), drive.read("target_duty")), (-3, -2500))
         self.json("run", "duty", "30%", "--for", "0.3")
-        self.assertEqual(self.node["target_duty"], 3000)
+        with self.connect() as drive:
+            self.assertEqual(drive.read("target_duty"), 3000)
         _, err = self.command("run", "duty", "101%", "--for", "0.3", code=1)
         self.assertIn("above the most", err)
 
