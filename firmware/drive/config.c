@@ -198,6 +198,14 @@ static void make_limits(maker_t *m, drive_config_t *config)
     config->machine.psi_m = per_unit(m, DRIVE_PARAM_psi_m, m->base.psi);
 }
 
+static void make_units(const maker_t *m, drive_config_t *config)
+{
+    const pm_num_t mechanical = pm_num_div(m->base.omega, config->pole_pairs);
+    config->per_mrad_s = pm_num_div(pm_num_dec(1, -3), mechanical);
+    config->per_uNm = pm_num_div(pm_num_dec(1, -6), m->base.torque);
+    config->per_mA = pm_num_div(pm_num_dec(1, -3), m->base.i);
+}
+
 /* What is beyond the range is refused by those who use it. */
 static pm_q_t i_d_rated(const maker_t *m, const mtpa_config_t *mtpa)
 {
@@ -255,5 +263,6 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     make_fault_short(&m, &config->fault_short);
     PM_IN_IMAGE(six_step, make_block(&m, &config->block);)
     make_limits(&m, config);
+    make_units(&m, config);
     return m.result;
 }

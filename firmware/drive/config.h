@@ -95,10 +95,11 @@ typedef struct {
     fault_short_config_t fault_short;
     PM_IN_IMAGE(six_step, block_config_t block;)
     pm_num_t pole_pairs;
-    uint32_t slow_divider; /* periods per drive_slow(): the nearest to 1 ms */
-    bool injection;        /* injection leads at low speed; else open-loop start */
-    uint8_t start;         /* SEQUENCE_...: how the initial position is found ... */
-    uint8_t find;          /* PROCEDURE_...: ... by which of them ... */
+    pm_num_t per_mrad_s, per_uNm, per_mA; /* units of a command in per-unit */
+    uint32_t slow_divider;                /* periods per drive_slow(): the nearest to 1 ms */
+    bool injection;                       /* injection leads at low speed; else open-loop start */
+    uint8_t start;                        /* SEQUENCE_...: how the initial position is found ... */
+    uint8_t find;                         /* PROCEDURE_...: ... by which of them ... */
 #if SEQUENCE_HAS_POLARITY
     uint8_t pole; /* PROCEDURE_...: ... and what tells the pole afterwards, or none */
 #endif

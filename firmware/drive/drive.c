@@ -20,7 +20,6 @@ PM_RARE drive_result_t drive_init(drive_t *drive, const drive_params_t *params, 
     if (!result.ok) {
         drive_trip(drive, DRIVE_FAULT_PARAMETERS);
     }
-    reference_units(drive);
     return result;
 }
 
@@ -43,7 +42,6 @@ PM_RARE void drive_reconfigure(drive_t *drive, const drive_config_t *config)
 {
     const observer_id_t before = drive->config.position.observer.id;
     drive->config = *config;
-    reference_units(drive);
     drive->references_ready = false;
     const position_config_t *position = &drive->config.position;
     if (position->observer.id != before && drive->stage >= STAGE_OPEN_LOOP) {

@@ -85,7 +85,6 @@ void fault_short_step(drive_t *drive, drive_out_t *out);
 void fault_short_slow(drive_t *drive); /* 1 kHz: ends it */
 
 /* reference.c: at 1 kHz, from the command to current references. */
-void reference_units(drive_t *drive);  /* for a new configuration: what reference_take() multiplies with */
 void reference_take(drive_t *drive);   /* command to per-unit */
 void reference_vector(drive_t *drive); /* speed or torque -> i_ref */
 void reference_range(drive_t *drive, pm_q_t most, pm_q_t *i_min,

@@ -99,7 +99,6 @@ struct drive {
     fault_short_t fault_short;
 
     /* not of a control period */
-    pm_num_t per_mrad_s, per_uNm, per_mA; /* units of a command in per-unit */
     drive_command_t command;
     drive_fault_record_t record;
     commissioning_report_t commissioning_report;

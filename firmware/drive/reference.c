@@ -13,18 +13,9 @@ static pm_q_t to_signal(int32_t value, pm_num_t unit)
 void reference_take(drive_t *drive)
 {
     const drive_command_t *command = &drive->command;
-    drive->omega_target = to_signal(command->speed_mrad_s, drive->per_mrad_s);
-    drive->torque_target = to_signal(command->torque_uNm, drive->per_uNm);
-    drive->i_target = to_signal(command->current_mA, drive->per_mA);
-}
-
-void reference_units(drive_t *drive)
-{
-    const drive_base_t *base = &drive->config.base;
-    const pm_num_t mechanical = pm_num_div(base->omega, drive->config.pole_pairs);
-    drive->per_mrad_s = pm_num_div(pm_num_dec(1, -3), mechanical);
-    drive->per_uNm = pm_num_div(pm_num_dec(1, -6), base->torque);
-    drive->per_mA = pm_num_div(pm_num_dec(1, -3), base->i);
+    drive->omega_target = to_signal(command->speed_mrad_s, drive->config.per_mrad_s);
+    drive->torque_target = to_signal(command->torque_uNm, drive->config.per_uNm);
+    drive->i_target = to_signal(command->current_mA, drive->config.per_mA);
 }
 
 void reference_reset(drive_t *drive, pm_q_t i_q)

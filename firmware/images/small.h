@@ -5,7 +5,7 @@
 
 /* clang-format off */
 #define PM_IMAGE_NAME "small"
-#define PM_IMAGE_TRACE_NUMBERS 3600U
+#define PM_IMAGE_TRACE_NUMBERS 3584U
 #define PM_CHANNELS 0x0000U
 
 #define PM_WITHOUT_deadbeat 1

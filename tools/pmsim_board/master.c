@@ -11,7 +11,15 @@
 #define RPDO1_ID  (0x200U + NODE_ID)
 #define RPDO2_ID  (0x300U + NODE_ID)
 #define SDO_ID    (0x600U + NODE_ID)
+#define ANSWER_ID (0x580U + NODE_ID)
 #define NMT_START 1U
+
+/* identification.command, as bytes of an SDO behind its first */
+#define COMMAND_LOW  0x00
+#define COMMAND_HIGH 0x30
+#define COMMAND_SUB  0x01
+
+enum { SDO_DOWNLOAD_1 = 0x2F, SDO_ABORT = 0x80 };
 
 enum { SHUTDOWN = 0x06, SWITCH_ON = 0x07, ENABLE_OPERATION = 0x0F, FAULT_RESET = 0x80 };
 
@@ -44,6 +52,19 @@ static void send_control(master_t *master, const drive_command_t *command, int c
     put_number(&frame.data[2], 1, mode_number(command->mode));
     put_number(&frame.data[3], 4, command->speed_mrad_s);
     (void)board_can_send(master->board, &frame);
+}
+
+/* What to identify: the node takes it while the drive is off. */
+static void send_routines(master_t *master, const drive_command_t *command)
+{
+    const bool identifies = command->mode == DRIVE_MODE_IDENTIFY;
+    if (identifies && command->routines != master->routines) {
+        board_frame_t frame = {
+            .id = SDO_ID, .length = 8, .data = {SDO_DOWNLOAD_1, COMMAND_LOW, COMMAND_HIGH, COMMAND_SUB}};
+        put_number(&frame.data[4], 1, command->routines);
+        (void)board_can_send(master->board, &frame);
+        master->routines = command->routines;
+    }
 }
 
 static void send_targets(master_t *master, const drive_command_t *command, int controlword)
@@ -80,11 +101,18 @@ void master_send(master_t *master, const drive_command_t *command)
     const int now = master->enabled ? ENABLE_OPERATION : SWITCH_ON;
     send_targets(master, command, command->enable ? now : SWITCH_ON);
     if (starts) {
+        send_routines(master, command);
         send_control(master, command, SHUTDOWN);
         send_control(master, command, SWITCH_ON);
     }
     master->enabled = command->enable;
     send_control(master, command, master->enabled ? ENABLE_OPERATION : SWITCH_ON);
+}
+
+bool master_is_refused(const board_frame_t *frame)
+{
+    return frame->id == ANSWER_ID && frame->data[0] == SDO_ABORT && frame->data[1] == COMMAND_LOW &&
+           frame->data[2] == COMMAND_HIGH && frame->data[3] == COMMAND_SUB;
 }
 
 void master_clear_fault(master_t *master, const drive_command_t *command)

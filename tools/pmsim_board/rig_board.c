@@ -295,6 +295,11 @@ static void take_frames(rig_t *rig)
     board_frame_t frame;
     while (board_can_receive(rig->board, &frame)) {
         load_take(&rig->load, &frame);
+        if (master_is_refused(&frame)) {
+            fprintf(stderr, "pmsim board: routine %d of the identification is not in this image (%s)\n",
+                    rig->sent.routines, rig->watch.twin->name);
+            exit(2);
+        }
     }
 }
 

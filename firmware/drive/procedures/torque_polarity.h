@@ -10,11 +10,11 @@
  * it does, and with (L_q - L_d) i > psi_m the rotor rests to either side of it. The angle is looked at 8 ms after each pulse,
  * without current: with it, cross-saturation moves the axis that injection sees.
  *
- * A rotor that comes off its friction is turned by one step too much; injection follows it while
- *   3/2 p^2 psi_m step / J <= 1/4 rad (2 pi injection_bandwidth)^2            i_max / 16 <= step <= i_max / 8
+ * A rotor that comes off its friction is turned by one step too much; injection follows it, and it does not go far by itself, while
+ *   3/2 p^2 psi_m step / J <= 1/16 rad (2 pi injection_bandwidth)^2           i_max / 32 <= step <= i_max / 8
  *
- * 60 ms for injection, 40 ms a pulse: 0.2 s at rest without load, 1.2 s and as much again for the heaviest; 1 s until a rotor that is
- * held is refused. Movement: 22.5 electrical degrees forth and what it goes on by itself, 105 at most for a free IPM-1000. Peak current:
+ * 60 ms for injection, 40 ms a pulse: 0.2 s at rest without load, 1.7 s and as much again for the heaviest; 0.7 to 1.7 s until a rotor
+ * that is held is refused. Movement: 22.5 electrical degrees forth and what it goes on by itself, 105 at most for a free IPM-1000. Peak current:
  * what turns it, i_max at most, and the carrier. PM_FAILED_NOT_TURNING: not within eight pulses of i_max; PM_FAILED_TURNED: by 135
  * degrees within a pulse, as a load does it; PM_FAILED_SALIENCY: the frame turns as fast as half of speed_trip, as one that nothing
  * holds. No division. State 16 bytes.

@@ -14,7 +14,7 @@
 #define TURN_MS   800U /* with the current: the rotor comes to rest */
 #define FREE_MS   200U /* without */
 #define LATEST_MS 5000U
-#define SHARE     128  /* of |Y|: a difference that is none */
+#define SHARE     64   /* of S: a difference that is none */
 #define LEAST     4000 /* of the machine's inductance */
 
 enum { TURN, WITH, FREE, WITHOUT };
@@ -72,8 +72,12 @@ static bool holds(drive_t *drive)
     const zero_inductance_config_t *c = &drive->config.zero_inductance;
     const bool with = self->part <= (uint8_t)WITH;
     const pm_q_t i = current(drive);
-    self->i = commissioning_approach(self->i, with ? i : 0, i / RISE_MS + 1);
+    const pm_q_t wanted = with ? i : 0;
+    self->i = commissioning_approach(self->i, wanted, i / RISE_MS + 1);
     commissioning_hold(drive, &self->hold, (pm_ab_t){self->i, 0}, sine_mean(&self->sine, &c->sine), c->omega);
+    if (self->i != wanted) { /* what lags behind a ramp is even, too */
+        self->hold.still = 0;
+    }
     return self->hold.still >= (with ? TURN_MS : FREE_MS);
 }
 
@@ -81,6 +85,12 @@ static void add(pm_dq_t *sum, pm_q_t cosine, pm_q_t sine)
 {
     sum->d += cosine;
     sum->q -= sine;
+}
+
+/* S: |Y| of as much current as there would be without resistance and dead time. */
+static pm_q_t size_of(pm_q_t y, pm_dq_t i_cos, pm_dq_t i_sin)
+{
+    return pm_mul(y, pm_div(pm_hypot(i_cos.d, i_sin.d), i_cos.d));
 }
 
 /* Whether these were all. */
@@ -92,7 +102,7 @@ static bool add_value(drive_t *drive)
     const pm_dq_t i_sin = window_sine(&self->sine.window, per_n);
     const pm_q_t y_cos = window_cosine(&self->neutral, per_n).d;
     const pm_q_t y_sin = window_sine(&self->neutral, per_n).d;
-    const pm_q_t size = pm_hypot(y_cos, y_sin);
+    const pm_q_t size = size_of(pm_hypot(y_cos, y_sin), i_cos, i_sin);
     polarity_mean_t *mean = &self->size[self->part == (uint8_t)WITH ? 0 : 1];
     if (self->part == (uint8_t)WITH && mean->count == 0U) {
         self->first = size;

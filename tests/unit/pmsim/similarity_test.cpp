@@ -1,12 +1,14 @@
 #include "tools/pmsim/similarity.h"
 
 #include <cmath>
+#include <set>
 
 #include <gtest/gtest.h>
 
 #include "firmware/drive/config.h"
 #include "firmware/params/parameters.h"
 #include "tests/unit/pmsim/support.h"
+#include "tools/pmsim/metrics.h"
 #include "tools/pmsim/runner.h"
 #include "tools/pmsim/scenario_file.h"
 
@@ -39,6 +41,23 @@ TEST(Similarity, FactorsFollowFromTheUnits)
     for (const char *same :
          {"speed_rated_rad_s", "dead_time_s", "f_pwm_Hz", "pole_pairs", "gain_error", "alpha_R_1_K"}) {
         EXPECT_EQ(s.of_key(same), 1.0) << same;
+    }
+}
+
+// A unit that is in no list would be left as it is, like that of b + c, and the drive be told another machine.
+TEST(Similarity, EveryUnitIsEitherScaledOrKept)
+{
+    const std::set<std::string> kept = {
+        "",    "1",   "s",    "Hz",   "bit/s",         "rad/s",       "rad/s2",
+        "rad", "deg", "turn", "degC", "rated current", "rated torque"};
+    const auto known = [&kept](const std::string &unit) {
+        return kept.count(unit) != 0 || Similarity{2.0, 3.0}.of_unit(unit) != 1.0;
+    };
+    for (const drive_param_text_t &text : drive_param_text) {
+        EXPECT_TRUE(known(text.unit)) << text.unit;
+    }
+    for (const MetricInfo &metric : metric_infos()) {
+        EXPECT_TRUE(known(metric.unit)) << metric.name << ' ' << metric.unit;
     }
 }
 
