@@ -2,6 +2,9 @@
 
 #include "firmware/math/root.h"
 
+/* Of an EMF that is E at the commutation, 2 E per rad. */
+#define FALLS PM_Q(1.8)
+
 /* x / 2 */
 static pm_q_t half_volts(const freewheeling_config_t *config, const freewheeling_in_t *in)
 {
@@ -34,4 +37,14 @@ pm_q_t freewheeling_current(const freewheeling_config_t *config, const freewheel
     series = PM_ONE + pm_mul(e, series);
     const pm_q_t i = pm_mul_sat(pm_mul_sat(half_volts(config, in), turned), series);
     return pm_mul_sat(i, PM_Q(2.0 / 3));
+}
+
+pm_q_t freewheeling_braking(const freewheeling_config_t *config, const freewheeling_in_t *in, pm_q_t angle)
+{
+    const pm_q_t emf = pm_mul_sat(in->omega, config->emf);
+    const pm_q_t left = pm_max(in->v_dc - emf, 0);
+    pm_q_t v = pattern_chops_both(in->pattern) ? left : 0;
+    v = pattern_chops_incoming(in->pattern, in->sector) && v == 0 ? 2 * left : v;
+    v += pm_mul(pm_mul_sat(emf, angle), FALLS / 2);
+    return pm_div(pm_mul_sat(v, angle), pm_mul_sat(3 * PM_ONE, pm_mul_sat(in->omega, config->L)));
 }

@@ -48,6 +48,12 @@ static bool carrier_agrees(const hal_t *hal, const drive_params_t *params)
     return (off < 0 ? -off : off) <= (int64_t)2 * params->f_pwm;
 }
 
+static int16_t mode_of(const app_t *app)
+{
+    const cia402_t *profile = &app->cia402;
+    return cia402_on(profile) ? profile->active_mode : profile->mode;
+}
+
 app_ready_t app_ready(const app_t *app)
 {
     if (app->batch) {
@@ -59,15 +65,18 @@ app_ready_t app_ready(const app_t *app)
     if (app->restart) {
         return APP_RESTART;
     }
+#if PM_HAS(six_step)
+    if (mode_of(app) == CIA402_MODE_DUTY && app->params.commutation == 0) {
+        return APP_MODE;
+    }
+#endif
     return app->stored ? APP_READY : APP_NOT_STORED;
 }
 
 bool app_may_run(const app_t *app)
 {
     const app_ready_t ready = app_ready(app);
-    const cia402_t *profile = &app->cia402;
-    const int16_t mode = cia402_on(profile) ? profile->active_mode : profile->mode;
-    return ready == APP_READY || (ready == APP_NOT_STORED && mode == CIA402_MODE_IDENTIFY);
+    return ready == APP_READY || (ready == APP_NOT_STORED && mode_of(app) == CIA402_MODE_IDENTIFY);
 }
 
 drive_result_t app_configure(app_t *app, hal_t *hal, const drive_params_t *params, bool stored)

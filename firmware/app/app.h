@@ -49,6 +49,7 @@ typedef enum {
     APP_REFUSED, /* by the drive, or the hardware */
     APP_RESTART, /* the hardware is set up with other values */
     APP_BATCH,   /* parameters are being written together */
+    APP_MODE,    /* CIA402_MODE_DUTY, and the drive is one with field orientation */
 } app_ready_t;
 
 struct app {

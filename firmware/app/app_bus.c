@@ -166,18 +166,19 @@ void node_host_reset(void *context)
 
 static drive_command_t command_of(const app_t *app, const cia402_out_t *out)
 {
-    drive_command_t command = {
-        .enable = out->enable,
-        .coast = out->coast,
-        .mode = DRIVE_MODE_SPEED,
-        .speed_mrad_s = out->velocity,
-        .torque_uNm = app_torque_uNm(app, out->torque),
-        .current_mA = out->current,
-    };
+    drive_command_t command = {.enable = out->enable,
+                               .coast = out->coast,
+                               .mode = DRIVE_MODE_SPEED,
+                               .speed_mrad_s = out->velocity,
+                               .torque_uNm = app_torque_uNm(app, out->torque),
+                               .current_mA = out->current,
+                               PM_IN_IMAGE(six_step, .duty_ppm = 100 * out->duty)};
     if (out->mode == CIA402_MODE_TORQUE) {
         command.mode = DRIVE_MODE_TORQUE;
     } else if (out->mode == CIA402_MODE_CURRENT) {
         command.mode = DRIVE_MODE_CURRENT;
+    } else if (PM_HAS(six_step) != 0 && out->mode == CIA402_MODE_DUTY) {
+        command.mode = DRIVE_MODE_DUTY;
     } else if (out->mode == CIA402_MODE_IDENTIFY) {
         app_identify_command(app, &command);
     } else {
@@ -188,6 +189,11 @@ static drive_command_t command_of(const app_t *app, const cia402_out_t *out)
 
 static bool same(const cia402_out_t *a, const cia402_out_t *b)
 {
+#if PM_HAS(six_step)
+    if (a->duty != b->duty) {
+        return false;
+    }
+#endif
     return a->enable == b->enable && a->coast == b->coast && a->mode == b->mode &&
            a->velocity == b->velocity && a->torque == b->torque && a->current == b->current;
 }

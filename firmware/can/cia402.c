@@ -137,6 +137,9 @@ static void give_targets(const cia402_t *self, cia402_out_t *out)
     if (!halted) {
         out->velocity = self->active_mode == CIA402_MODE_TORQUE ? 0 : self->target_velocity;
         out->torque = self->active_mode == CIA402_MODE_TORQUE ? self->target_torque : 0;
+#if PM_HAS(six_step)
+        out->duty = self->active_mode == CIA402_MODE_DUTY ? self->target_duty : 0;
+#endif
     }
     out->current = self->active_mode < CIA402_MODE_NONE ? self->target_current : 0;
 }

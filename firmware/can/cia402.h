@@ -1,7 +1,8 @@
 /* Drive profile CiA 402: from the controlword to commands for the drive, and back to the statusword.
  *
  * Modes: profile velocity (3), profile torque (4), -1: current vector of a given amplitude that turns at the
- * target velocity, and -2: identification of the machine with that current up to that velocity. Option codes
+ * target velocity, -2: identification of the machine with that current up to that velocity, and in images with
+ * block commutation -3: duty, a share of the DC link's voltage (drive/block.h); halt is a duty of 0. Option codes
  * that the drive supports: quick stop 0, 1, 5; shutdown 0, 1; disable operation 0, 1; halt 1; fault reaction
  * 0 (the bridge opens at once, always).
  *
@@ -16,6 +17,7 @@
 #include <stdint.h>
 
 #include "firmware/can/dictionary.h"
+#include "firmware/math/image.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -33,6 +35,7 @@ typedef enum {
 } cia402_state_t;
 
 enum {
+    CIA402_MODE_DUTY = -3,
     CIA402_MODE_IDENTIFY = -2,
     CIA402_MODE_CURRENT = -1,
     CIA402_MODE_NONE = 0,
@@ -57,9 +60,10 @@ typedef struct {
     bool coast; /* when not enabled: the bridge opens at once; else the drive stops first */
     bool clear_fault;
     int8_t mode;
-    int32_t velocity; /* mrad/s */
-    int32_t torque;   /* permille of the rated torque */
-    int32_t current;  /* mA */
+    int32_t velocity;                    /* mrad/s */
+    int32_t torque;                      /* permille of the rated torque */
+    int32_t current;                     /* mA */
+    PM_IN_IMAGE(six_step, int32_t duty;) /* 1e-4 of v_dc */
 } cia402_out_t;
 
 typedef struct {
@@ -71,6 +75,7 @@ typedef struct {
     int16_t quick_stop_option, shutdown_option, disable_option;
     uint16_t window, threshold; /* mrad/s */
     int32_t target_velocity, target_torque, target_current;
+    PM_IN_IMAGE(six_step, int32_t target_duty;)
 } cia402_t;
 
 void cia402_init(cia402_t *self);

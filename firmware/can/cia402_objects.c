@@ -47,6 +47,11 @@ bool cia402_get(const cia402_t *self, uint16_t slot, int32_t *value)
     case OD_LIVE_TARGET_CURRENT:
         *value = self->target_current;
         return true;
+#if PM_HAS(six_step)
+    case OD_LIVE_TARGET_DUTY:
+        *value = self->target_duty;
+        return true;
+#endif
     default:
         return false;
     }
@@ -63,7 +68,8 @@ static uint32_t put_option(int16_t *place, int32_t value, int32_t other)
 
 static uint32_t put_mode(cia402_t *self, int32_t value)
 {
-    const bool own = value == CIA402_MODE_IDENTIFY || value == CIA402_MODE_CURRENT;
+    const bool own = value == CIA402_MODE_IDENTIFY || value == CIA402_MODE_CURRENT ||
+                     (PM_HAS(six_step) != 0 && value == CIA402_MODE_DUTY);
     if (!own && value != CIA402_MODE_NONE && value != CIA402_MODE_VELOCITY && value != CIA402_MODE_TORQUE) {
         return INVALID;
     }
@@ -119,6 +125,11 @@ bool cia402_put(cia402_t *self, uint16_t slot, int32_t value, uint32_t *code)
     case OD_LIVE_TARGET_CURRENT:
         self->target_current = value;
         return true;
+#if PM_HAS(six_step)
+    case OD_LIVE_TARGET_DUTY:
+        self->target_duty = value;
+        return true;
+#endif
     default:
         return put_option_code(self, slot, value, code);
     }

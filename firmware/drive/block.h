@@ -23,9 +23,20 @@
  *
  * Current limit: i_max, derated as the vector's, and with freewheeling_limit what leaves the crossing to be seen:
  *   theta_f(i) + w (t_blank + T) <= 30 degrees             (freewheeling.h)
+ * in mode duty also of a current that brakes: a duty that is taken back asks for all there is.
+ *
+ * Mode duty: u = |duty| (patterns.h), after a ramp of t_duty from 0 to 1, in place of what the current wants. Steadily, with
+ * the dead time's share `lost`,
+ *   (u - lost) v_dc = (3 sqrt(3) / pi) psi_m w + 2 R i + (3 / pi) L w i        the last: commutation, L i of each 60 degrees
+ * The current stays within the limits above, and the duty gives way (DRIVE_LIMIT_CURRENT, line_current.h). A duty for the other
+ * direction brakes with u = 0 down to 3/4 of six_step_speed, from where the start goes on in that direction; none brakes to there and
+ * holds the rotor. At rest, and where the vector turns the rotor, the speed that the duty is without a load is what is wanted:
+ *   w = duty v_dc / ((3 sqrt(3) / pi) psi_m)
+ * A stop slows down with `acceleration`, as in the other modes. With field orientation the drive does not start in this mode.
  *
  * block_step(): one period, currents and DC link have been checked. block_slow(): 1 kHz.
- * Tests: tests/scenario/six_step.yaml, six_step_patterns.yaml, bldc_demo.yaml. */
+ * Tests: tests/unit/drive/block_test.cpp, block_duty_test.cpp, tests/scenario/six_step.yaml, six_step_patterns.yaml, six_step_duty.yaml,
+ * bldc_demo.yaml. */
 #ifndef DRIVE_BLOCK_H
 #define DRIVE_BLOCK_H
 
@@ -45,6 +56,7 @@ typedef struct {
     bool from_rest;   /* six_step_start = 1 */
     uint32_t t_30;    /* counts */
     pm_q_t i_start;   /* as i_q */
+    pm_q_t duty_step; /* change of the duty per call of 1 kHz */
     pm_q_t omega_on;  /* six_step_speed ... */
     pm_q_t omega_off; /* ... and 3/4 of it */
     pm_q_t per_code;  /* per-unit volts of a terminal at full scale */
@@ -62,6 +74,7 @@ typedef struct {
     uint32_t now;      /* counts at t_k */
     uint32_t rate;     /* of the angle, per count */
     pm_q_t i;          /* at t_k */
+    pm_q_t duty;       /* mode duty: after the ramp, negative for the other direction */
     uint16_t wrong_ms; /* for which the voltage has spoken against the speed */
 #if PM_CARRIES(NEEDS_NEUTRAL)
     third_missing_t missing;

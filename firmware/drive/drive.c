@@ -62,6 +62,9 @@ PM_RARE void drive_command(drive_t *drive, const drive_command_t *command)
                                  command->torque_uNm == last->torque_uNm &&
                                  command->current_mA == last->current_mA;
     drive->references_ready = drive->references_ready && same_references;
+#if PM_HAS(six_step)
+    drive->references_ready = drive->references_ready && command->duty_ppm == last->duty_ppm;
+#endif
     drive->command = *command;
     drive->command.mode = mode;
     if (drive->state == DRIVE_OFF) {

@@ -24,6 +24,7 @@
 #include "firmware/drive/config.h"
 #include "firmware/drive/fault.h"
 #include "firmware/math/frames.h"
+#include "firmware/math/image.h"
 #include "firmware/math/legs.h"
 #include "firmware/math/measure.h"
 
@@ -82,6 +83,7 @@ typedef enum {
 typedef enum {
     DRIVE_MODE_SPEED,
     DRIVE_MODE_TORQUE,
+    DRIVE_MODE_DUTY, /* share of v_dc between the two legs of block commutation (block.h); without it the drive stays off */
     DRIVE_MODE_CURRENT, /* current vector at a given angle that turns at the speed reference: commissioning */
     DRIVE_MODE_IDENTIFY, /* the drive measures its machine, with that current up to that speed, then waits */
 } drive_mode_t;
@@ -91,14 +93,15 @@ typedef struct {
     drive_mode_t mode;    /* taken when the drive starts */
     int32_t speed_mrad_s; /* mechanical, signed */
     int32_t torque_uNm;
-    int32_t current_mA; /* current mode, identification */
-    uint8_t routines;   /* COMMISSIONING_...: what to identify */
-    bool coast;         /* when not enabled: off at once, without a stop */
+    int32_t current_mA;                      /* current mode, identification */
+    PM_IN_IMAGE(six_step, int32_t duty_ppm;) /* of v_dc, signed */
+    uint8_t routines;                        /* COMMISSIONING_...: what to identify */
+    bool coast;                              /* when not enabled: off at once, without a stop */
 } drive_command_t;
 
 /* Limits at work: information, not faults. */
 enum {
-    DRIVE_LIMIT_CURRENT = 1 << 0,     /* torque reference at the current limit */
+    DRIVE_LIMIT_CURRENT = 1 << 0,     /* torque reference at the current limit, or the duty gives way to it */
     DRIVE_LIMIT_VOLTAGE = 1 << 1,     /* modulator at its limit */
     DRIVE_LIMIT_TEMPERATURE = 1 << 2, /* current derated by temperature */
     DRIVE_LIMIT_DC_VOLTAGE = 1 << 3,  /* regeneration derated by the DC-link voltage */

@@ -108,6 +108,7 @@ typedef enum {
 
 #define BLOCK_SETTLED_MS 1000U /* after these a loss of synchronism is the first one */
 
+void block_take_duty(drive_t *drive);       /* mode duty: its speed without a load is what is wanted */
 bool block_may_begin(const drive_t *drive); /* in STAGE_VECTOR */
 void block_begin(drive_t *drive);
 bool block_from_rest(

@@ -169,6 +169,17 @@ static void stop(drive_t *drive)
     }
 }
 
+/* A mode that the commutation does not have. */
+static bool is_refused(const drive_t *drive)
+{
+#if PM_HAS(six_step)
+    return drive->command.mode == DRIVE_MODE_DUTY && !drive->config.block.on;
+#else
+    (void)drive;
+    return false;
+#endif
+}
+
 static void move(drive_t *drive)
 {
     const bool enable = drive->command.enable;
@@ -178,7 +189,7 @@ static void move(drive_t *drive)
     }
     switch (drive->state) {
     case DRIVE_OFF:
-        if (enable) {
+        if (enable && !is_refused(drive)) {
             PM_IN_IMAGE(six_step, drive->block_tries = 0;)
             start_begin(drive);
         }
@@ -268,6 +279,11 @@ void drive_slow(drive_t *drive, const drive_slow_in_t *in)
             reference_take(drive);
             drive->references_ready = true;
         }
+#if PM_HAS(six_step)
+        if (drive->command.mode == DRIVE_MODE_DUTY) {
+            block_take_duty(drive);
+        }
+#endif
         drive->state_ms = (uint16_t)(drive->state_ms + (drive->state_ms < UINT16_MAX ? 1U : 0U));
         move(drive);
         if (drive->stage == STAGE_VECTOR) {

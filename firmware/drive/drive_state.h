@@ -88,6 +88,7 @@ struct drive {
     follow_t follow;
     PM_IN_IMAGE(six_step, uint16_t block_ms; /* in STAGE_SIX_STEP */
                 uint8_t block_tries;         /* to find synchronism again */
+                pm_q_t duty_target;          /* -1 ... 1 */
                 thresholds_t thresholds;)    /* learnt, from start to start */
     int32_t temperature_dC;
     pm_q_t heat;        /* of the windings: the current's square, through the low-pass of t_winding */

@@ -16,6 +16,9 @@ void reference_take(drive_t *drive)
     drive->omega_target = to_signal(command->speed_mrad_s, drive->config.per_mrad_s);
     drive->torque_target = to_signal(command->torque_uNm, drive->config.per_uNm);
     drive->i_target = to_signal(command->current_mA, drive->config.per_mA);
+#if PM_HAS(six_step)
+    drive->duty_target = pm_clamp(to_signal(command->duty_ppm, pm_num_dec(1, -6)), -PM_ONE, PM_ONE);
+#endif
 }
 
 void reference_reset(drive_t *drive, pm_q_t i_q)

@@ -417,8 +417,9 @@ def sheet(text):
         values = {key: int(value, 0) if re.fullmatch(r"0x[0-9A-F]+|-?[1-9][0-9]*|0", value) else value
                   for key, value in parser.items(section) if key != "Description"}
         if "DataType" in values:
-            values = {"ObjectType": 7, "PDOMapping": 0} | values
-        said[section] = values
+            values = {"ObjectType": 7, "PDOMapping": 0} | ({"Factor": 1} if "Unit" in values else {}) | values
+        said[section] = {key: value for key, value in values.items() if not re.match("(Creation|Modification)(Time|Date)|ModifiedBy", key)}
+    said.pop("Comments", None)
     return said
 
 
@@ -463,6 +464,11 @@ class Made(unittest.TestCase):
         whole = self.files[f"{generate.PACKAGE}/pmdrive.eds"]
         self.assertEqual(sheet(text), sheet(whole))
         self.assertLess(len(data), 5000)  # of 64 KiB of flash; was 3.7 KB
+
+    def test_bits_of_an_image(self):
+        entry = next(e for e in self.dictionary.entries if e.index == 0x6502)
+        self.assertEqual(entry.preset, sum(1 << (mode - 1) for mode in (3, 4)) + sum(1 << (15 - mode) for mode in (-1, -2, -3)))
+        self.assertIn(" + 262144 * PM_HAS(six_step),", self.files["firmware/can/dictionary_table.c"])
 
     def test_same_source_same_files(self):
         self.assertEqual(self.files, generate.files(ROOT))

@@ -50,7 +50,7 @@ class Cia402In(c.Structure):
 
 class Cia402Out(c.Structure):
     _fields_ = [("enable", c.c_bool), ("coast", c.c_bool), ("clear_fault", c.c_bool), ("mode", c.c_int8),
-                ("velocity", c.c_int32), ("torque", c.c_int32), ("current", c.c_int32)]
+                ("velocity", c.c_int32), ("torque", c.c_int32), ("current", c.c_int32), ("duty", c.c_int32)]
 
 
 PARAMETER, LIVE = 2, 3

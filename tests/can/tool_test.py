@@ -383,6 +383,15 @@ class Motion(Bench):
         self.wait(lambda: self.node["velocity_actual"] == 0)
         self.assertIsNone(self.node.enabled_at)
 
+    def test_run_by_duty(self):
+        with self.connect() as drive, motion.Motion(drive, "duty", duty=-2500):
+            self.assertEqual((drive.read("mode_display"), drive.read("target_duty")), (-3, -2500))
+        self.json("run", "duty", "30%", "--for", "0.3")
+        with self.connect() as drive:
+            self.assertEqual(drive.read("target_duty"), 3000)
+        _, err = self.command("run", "duty", "101%", "--for", "0.3", code=1)
+        self.assertIn("above the most", err)
+
     def test_never_unattended(self):
         with mock.patch.object(sys, "stdin", io.StringIO()):
             _, err = self.command("run", "speed", "200rpm", code=2)

@@ -48,7 +48,11 @@ def c_flags(entry):
 
 def c_values(entry):
     """Least, preset, most."""
-    return tuple(c_int32(value or 0) for value in (entry.least, entry.preset, entry.most))
+    least, preset, most = (c_int32(value or 0) for value in (entry.least, entry.preset, entry.most))
+    if entry.image_bits:
+        bits = entry.image_bits.items()
+        preset = " + ".join([c_int32(entry.preset - sum(entry.image_bits.values())), *(f"{b} * PM_HAS({m})" for m, b in bits)])
+    return least, preset, most
 
 
 def all_values(dictionary):

@@ -26,7 +26,7 @@ BOOK = re.compile(r"(\d+(\.\d+)*|A|B) #(\d+)")
 ROWS = 152  # of METHODS.md
 
 TAKEN_OVER = ("type", "lives", "access", "stored", "group", "map", "unit", "exp10", "exp2")
-ENTRY_KEYS = TAKEN_OVER + ("name", "help", "range", "values", "list", "preset", "book", "alias")
+ENTRY_KEYS = TAKEN_OVER + ("name", "help", "range", "values", "list", "preset", "image_bits", "book", "alias")
 MEMBER_KEYS = ENTRY_KEYS + ("sub", "repeat")
 OBJECT_KEYS = ENTRY_KEYS + ("index", "members", "sub0", "form", "flat")
 
@@ -48,6 +48,7 @@ class Entry:
     least: Optional[int] = None  # None: the type's own limit
     most: Optional[int] = None
     preset: Optional[int] = None
+    image_bits: dict = field(default_factory=dict)  # method: what only an image that has it adds to the preset
     text: str = ""  # constant bytes: the string, or $eds
     node_id: bool = False  # preset is relative to it
     stored: bool = False

@@ -40,6 +40,10 @@ def _preset(table, entry, device):
         entry.preset = device[text[1:]]
     else:
         entry.preset = table.integer("preset")
+    if "image_bits" in table.nodes:
+        bits = table.table("image_bits")
+        entry.image_bits = {name: bits.integer(name) for name in bits.nodes}
+        entry.preset += sum(entry.image_bits.values())
 
 
 def _name(table, pattern=model.NAME):

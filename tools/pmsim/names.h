@@ -17,7 +17,7 @@ inline const std::vector<std::string> &state_names()
 
 inline const std::vector<std::string> &mode_names()
 {
-    static const std::vector<std::string> names = {"speed",    "torque",   "current",
+    static const std::vector<std::string> names = {"speed",    "torque",   "duty",   "current",
                                                    "identify", "saliency", "neutral"};
     return names;
 }

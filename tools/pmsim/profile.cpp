@@ -181,6 +181,10 @@ void Profile::apply(Channel channel, double value)
         command_.current_A = value;
         command_changed_ = true;
         break;
+    case Channel::duty:
+        command_.duty = value;
+        command_changed_ = true;
+        break;
     case Channel::v_source_V:
         plant_set_source(plant, value);
         break;
@@ -241,7 +245,12 @@ int Profile::direction() const
     if (!command_.enable) {
         return 0;
     }
-    const double sense = command_.mode == RIG_TORQUE ? command_.torque_Nm : command_.speed_rad_s;
+    double sense = command_.speed_rad_s;
+    if (command_.mode == RIG_TORQUE) {
+        sense = command_.torque_Nm;
+    } else if (command_.mode == RIG_DUTY) {
+        sense = command_.duty;
+    }
     return sense > 0.0 ? 1 : (sense < 0.0 ? -1 : 0);
 }
 

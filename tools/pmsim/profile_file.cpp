@@ -24,6 +24,7 @@ const ChannelKey channel_keys[] = {
     {"torque_rel", Channel::torque_Nm, -10, 10, [](const Setup &s) { return s.rated.torque_rated_Nm; }},
     {"current_A", Channel::current_A, -1e5, 1e5, nullptr},
     {"current_rel", Channel::current_A, -10, 10, [](const Setup &s) { return s.rated.i_rated_A; }},
+    {"duty_rel", Channel::duty, -1, 1, [](const Setup &) { return 1.0; }}, // of v_dc
     {"load_Nm", Channel::load_Nm, -1e5, 1e5, nullptr},
     {"load_rel", Channel::load_Nm, -10, 10, [](const Setup &s) { return s.rated.torque_rated_Nm; }},
     {"load_fan_Nm", Channel::load_fan_Nm, 0, 1e5, nullptr},

@@ -14,7 +14,7 @@
 
 #include <stdint.h>
 
-#define RECORD_MAGIC "PMREC002"
+#define RECORD_MAGIC "PMREC003"
 #define RECORD_LEGS  3
 
 enum { RECORD_LAYOUT = 27 }; /* figures of record_layout() */
@@ -34,7 +34,7 @@ typedef struct {
     uint8_t hw_fault;
     uint8_t given;        /* RECORD_...: done before the step */
     uint8_t enable, mode; /* drive_command_t */
-    int32_t speed_mrad_s, torque_uNm, current_mA;
+    int32_t speed_mrad_s, torque_uNm, current_mA, duty_ppm;
     int32_t temperature_dC;           /* drive_slow_in_t */
     uint16_t compare[RECORD_LEGS][2]; /* drive_out_t */
     uint8_t driven[RECORD_LEGS];

@@ -48,8 +48,8 @@ void put_period(Bytes &bytes, const record_period_t &period)
     for (const uint8_t byte : {period.hw_fault, period.given, period.enable, period.mode}) {
         bytes.put(byte);
     }
-    for (const int32_t word :
-         {period.speed_mrad_s, period.torque_uNm, period.current_mA, period.temperature_dC}) {
+    for (const int32_t word : {period.speed_mrad_s, period.torque_uNm, period.current_mA, period.duty_ppm,
+                               period.temperature_dC}) {
         bytes.put(word);
     }
     for (const auto &leg : period.compare) {
@@ -64,7 +64,7 @@ void put_period(Bytes &bytes, const record_period_t &period)
 
 } // namespace
 
-static_assert(sizeof(record_period_t) == 44 && sizeof(record_header_t) == 24 + 4 * RECORD_LAYOUT,
+static_assert(sizeof(record_period_t) == 48 && sizeof(record_header_t) == 24 + 4 * RECORD_LAYOUT,
               "record.h must have no holes");
 
 Recording record_scenario(const Scenario &scenario, uint64_t most_periods)

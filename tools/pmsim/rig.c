@@ -160,6 +160,7 @@ void rig_record(const rig_t *rig, record_period_t *record)
         .speed_mrad_s = rig->command.speed_mrad_s,
         .torque_uNm = rig->command.torque_uNm,
         .current_mA = rig->command.current_mA,
+        .duty_ppm = rig->command.duty_ppm,
         .temperature_dC = rig->loop.hal.temperature_dC,
     };
     rig_record_legs(&rig->loop.app.in, &rig->loop.app.out, record);

@@ -20,6 +20,7 @@ enum { RIG_OFF, RIG_CALIBRATING, RIG_FINDING, RIG_RUNNING, RIG_STOPPING, RIG_FAU
 enum {
     RIG_SPEED,
     RIG_TORQUE,
+    RIG_DUTY,
     RIG_CURRENT,
     RIG_IDENTIFY,
     RIG_SALIENCY,
@@ -33,6 +34,7 @@ typedef struct {
     double speed_rad_s; /* mechanical */
     double torque_Nm;
     double current_A;
+    double duty; /* of v_dc */
 } rig_command_t;
 
 /* Incremental inductances at a point of currents. */

@@ -9,7 +9,7 @@ _Static_assert((int)RIG_OFF == (int)DRIVE_OFF && (int)RIG_CALIBRATING == (int)DR
                    (int)RIG_STOPPING == (int)DRIVE_STOPPING && (int)RIG_FAULT == (int)DRIVE_FAULT,
                "states");
 _Static_assert((int)RIG_SPEED == (int)DRIVE_MODE_SPEED && (int)RIG_TORQUE == (int)DRIVE_MODE_TORQUE &&
-                   (int)RIG_CURRENT == (int)DRIVE_MODE_CURRENT &&
+                   (int)RIG_DUTY == (int)DRIVE_MODE_DUTY && (int)RIG_CURRENT == (int)DRIVE_MODE_CURRENT &&
                    (int)RIG_IDENTIFY == (int)DRIVE_MODE_IDENTIFY,
                "modes");
 
@@ -45,14 +45,13 @@ drive_command_t rig_drive_command(const rig_command_t *command)
 {
     const uint8_t alone[] = {COMMISSIONING_SALIENCY, COMMISSIONING_NEUTRAL}; /* RIG_SALIENCY and the next */
     const bool is_alone = command->mode >= RIG_SALIENCY;
-    return (drive_command_t){
-        .enable = command->enable,
-        .mode = is_alone ? DRIVE_MODE_IDENTIFY : (drive_mode_t)command->mode,
-        .routines = is_alone ? alone[command->mode - RIG_SALIENCY] : (uint8_t)0,
-        .speed_mrad_s = rig_whole(1e3 * command->speed_rad_s),
-        .torque_uNm = rig_whole(1e6 * command->torque_Nm),
-        .current_mA = rig_whole(1e3 * command->current_A),
-    };
+    return (drive_command_t){.enable = command->enable,
+                             .mode = is_alone ? DRIVE_MODE_IDENTIFY : (drive_mode_t)command->mode,
+                             .routines = is_alone ? alone[command->mode - RIG_SALIENCY] : (uint8_t)0,
+                             .speed_mrad_s = rig_whole(1e3 * command->speed_rad_s),
+                             .torque_uNm = rig_whole(1e6 * command->torque_Nm),
+                             .current_mA = rig_whole(1e3 * command->current_A),
+                             PM_IN_IMAGE(six_step, .duty_ppm = rig_whole(1e6 * command->duty))};
 }
 
 /* The status is renewed at 1 kHz; the record says at once. */

@@ -18,6 +18,7 @@ enum class Channel {
     speed_rad_s, // references
     torque_Nm,
     current_A,
+    duty,        // of v_dc
     load_Nm,     // constant torque, opposes positive rotation
     load_fan_Nm, // at rated speed; grows with the square of the speed and always opposes it
     v_source_V,

@@ -341,6 +341,7 @@ void rig_record(const rig_t *rig, record_period_t *record)
         .speed_mrad_s = rig->sent.speed_mrad_s,
         .torque_uNm = rig->sent.torque_uNm,
         .current_mA = rig->sent.current_mA,
+        .duty_ppm = rig->sent.duty_ppm,
     };
     rig->watch.twin->record(rig->watch.image, record);
 }

@@ -59,7 +59,8 @@ static void give(const record_period_t *r)
                                          .mode = (drive_mode_t)r->mode,
                                          .speed_mrad_s = r->speed_mrad_s,
                                          .torque_uNm = r->torque_uNm,
-                                         .current_mA = r->current_mA};
+                                         .current_mA = r->current_mA,
+                                         PM_IN_IMAGE(six_step, .duty_ppm = r->duty_ppm)};
         drive_command(&drive, &command);
     }
     if ((r->given & RECORD_CLEAR) != 0U) {

@@ -398,6 +398,64 @@ TEST(BusProfile, TorqueModeGivesThePermilleOfTheRatedTorque)
     EXPECT_NEAR(x.loop.app.drive.command.torque_uNm, 0.1e6 * 1.5 * 3 * 0.236 * 4, 100);
 }
 
+// By process data of its own, and by SDO; what it makes of the link: tests/unit/drive/block_duty_test.cpp.
+TEST(BusProfile, DutyModeGivesTheShareOfTheLink)
+{
+    Bench x;
+    drive_params_t params = defaults();
+    params.commutation = 1;
+    plant_sensor(x.plant())->v_leg_full_scale_V = 450;
+    x.boot(&params);
+    x.run_ms(5);
+    ASSERT_EQ(x.set(0x1602, 0, 0), 0U);
+    ASSERT_EQ(x.set(0x1602, 1, 0x60400010), 0U);
+    ASSERT_EQ(x.set(0x1602, 2, 0x28000210), 0U);
+    ASSERT_EQ(x.set(0x1602, 0, 2), 0U);
+    ASSERT_EQ(x.set(0x1402, 1, 0x401), 0U);
+    x.give(0, {1, 0});
+    for (const uint16_t word : {uint16_t(0x06), uint16_t(0x07), uint16_t(0x0F)}) {
+        x.control(word, -3, 0);
+    }
+    x.run_ms(10);
+    EXPECT_EQ(x.get(0x2010, 3) & 0xFF, uint32_t(APP_READY));
+    EXPECT_EQ(x.get(0x6061) & 0xFF, 0xFDU);
+    EXPECT_EQ(x.loop.app.drive.command.mode, DRIVE_MODE_DUTY);
+    EXPECT_TRUE(x.loop.app.drive.command.enable);
+    x.give(0x401, {0x0F, 0x00, 0x0C, 0xFE}); // -500
+    x.run_ms(5);
+    EXPECT_EQ(x.loop.app.drive.command.duty_ppm, -50000);
+    EXPECT_NEAR(x.loop.app.drive.duty_target / double(PM_ONE), -0.05, 1e-7);
+    ASSERT_EQ(x.set(0x2800, 2, 10000), 0U);
+    EXPECT_EQ(x.set(0x2800, 2, 10001), TOO_HIGH);
+    x.run_ms(5);
+    EXPECT_EQ(x.loop.app.drive.command.duty_ppm, 1000000);
+    x.control(0x10F, -3, 0); // halt
+    x.run_ms(5);
+    EXPECT_EQ(x.loop.app.drive.command.duty_ppm, 0);
+    EXPECT_EQ(x.loop.app.drive.fault, DRIVE_FAULT_NONE);
+}
+
+TEST(BusProfile, DutyModeOfFieldOrientationSaysWhyItDoesNotStart)
+{
+    Bench x;
+    drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_ms(5);
+    EXPECT_EQ(x.get(0x2010, 3) & 0xFF, uint32_t(APP_READY));
+    x.give(0, {1, 0});
+    for (const uint16_t word : {uint16_t(0x06), uint16_t(0x07), uint16_t(0x0F)}) {
+        x.control(word, -3, 0);
+    }
+    x.run_ms(10);
+    EXPECT_EQ(x.get(0x2010, 3) & 0xFF, uint32_t(APP_MODE));
+    EXPECT_EQ(x.statusword() & 0x6F, 0x40); // switch on disabled
+    EXPECT_EQ(x.loop.app.drive.state, DRIVE_OFF);
+    x.send(true);
+    x.run_ms(10);
+    EXPECT_EQ(x.get(0x2010, 3) & 0xFF, uint32_t(APP_READY));
+    EXPECT_EQ(x.statusword() & 0x6F, 0x27);
+}
+
 // Four signals, every period, by block upload
 TEST(BusTrace, RecordsTheStart)
 {

@@ -17,7 +17,7 @@ constexpr double kPeriods = 1;     // else
 constexpr double kSweep = 0.05;    // rows 118 to 120
 constexpr double kCurrent = 0.011; // of the inverse
 
-constexpr double kBase_V = 40, kBase_A = 40;
+constexpr double kBase_V = 40, kBase_A = 40, kPi = 3.141592653589793;
 
 int32_t fixed(double x)
 {
@@ -323,6 +323,67 @@ TEST(Freewheeling, OfThePlantFollowsTheDuty)
             before = p.angle_rad;
         }
     }
+}
+
+// Current that has just decayed at `rad` behind a commutation into a leg that is not chopped, while the machine brakes: of the phase that
+// goes, backwards in small steps, with its EMF e and v = u v_dc less the other two's in
+//   3 L di/dt = 3 R |i| + v - 2 e (trapezoid), v - 3 e (sine);   v = mean EMF of the line less 2 R |i|
+double braking_A(const Case &c, bool sine, double omega, double rad)
+{
+    const int steps = 20000;
+    double least = 0, most = 100;
+    while (most - least > 1e-6) {
+        const double i_A = (least + most) / 2;
+        double i = i_A;
+        for (int n = 0; n < steps && i > 0; ++n) {
+            const double theta = rad * n / steps, emf_V = c.emf_Vs * omega;
+            const double e_V =
+                sine ? 2 * emf_V * std::sin(kPi * 5 / 6 + theta) : emf_V * (1 - 6 / kPi * theta);
+            const double mean_V = sine ? emf_V / 1.5 * 3 * std::sqrt(3.0) / kPi : emf_V;
+            const double fall_V = mean_V - 2 * c.R_ohm * i_A - e_V + 3 * c.R_ohm * i;
+            i -= fall_V / (3 * c.L_H) * rad / steps / omega;
+        }
+        (i > 0 ? most : least) = i_A;
+    }
+    return least;
+}
+
+// Of a sine less, by what its line has on average above its EMF at the commutation.
+TEST(Freewheeling, BrakingCurrentIsThatOfTheFallingEmf)
+{
+    for (const bool sine : {false, true}) {
+        const Case &c = sine ? kHs : kFan;
+        const freewheeling_config_t config = c.config();
+        for (const double share : {0.2, 0.5, 1.0}) {
+            const double omega = share * c.base_rad_s;
+            for (const double rad : {0.2, 0.35, 0.5}) {
+                const freewheeling_in_t in = c.in(PATTERN_H_PWM_L_ON, 2, 0.5, omega);
+                const double i_A = kBase_A * real(freewheeling_braking(&config, &in, fixed(rad)));
+                const double exact_A = braking_A(c, sine, omega, rad);
+                EXPECT_LT(i_A, exact_A * 1.11) << share << ' ' << rad;
+                EXPECT_GT(i_A, exact_A * (sine ? 0.6 : 0.9)) << share << ' ' << rad;
+            }
+        }
+    }
+}
+
+// Where the leg that has come is chopped the link helps, twice as much as where both are, and all the more below its voltage.
+TEST(Freewheeling, BrakingCurrentByThePattern)
+{
+    const freewheeling_config_t config = kFan.config();
+    const auto braking = [&](pattern_id_t pattern, uint32_t sector, double omega) {
+        const freewheeling_in_t in = kFan.in(pattern, sector, 0.5, omega);
+        return real(freewheeling_braking(&config, &in, fixed(0.3)));
+    };
+    const double held = braking(PATTERN_H_PWM_L_ON, 2, 600);
+    const double more = kBase_A * (braking(PATTERN_H_PWM_L_PWM, 0, 600) - held);
+    const double left_V = 24 - kFan.emf_Vs * 600;
+    EXPECT_NEAR(more, 0.3 * left_V / (3 * 600 * kFan.L_H), 0.01);
+    EXPECT_NEAR(kBase_A * (braking(PATTERN_H_PWM_L_ON, 1, 600) - held), 2 * more, 0.01);
+    EXPECT_EQ(braking(PATTERN_H_ON_L_PWM, 1, 600), held);
+    EXPECT_EQ(braking(PATTERN_PWM_ON, 0, 600), braking(PATTERN_H_PWM_L_ON, 1, 600));
+    EXPECT_EQ(braking(PATTERN_ON_PWM, 0, 600), held);
+    EXPECT_EQ(braking(PATTERN_PWM_ON, 0, 2500), braking(PATTERN_ON_PWM, 0, 2500)) << "an EMF above the link";
 }
 
 } // namespace

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 #include "tests/unit/bldc/rig.h"
 
@@ -18,6 +19,7 @@ constexpr double kBase_V = 40, kBase_A = 10, kT_s = 50e-6;
 constexpr double kR_ohm = 0.4, kL_H = 0.5e-3, kV_dc = 24;
 constexpr double kBandwidth = 2 * bldc_rig::kPi * 800;
 constexpr double kRest_A = 0.01;
+constexpr double kIntegral_V = 0.02; // 2^-23 / ki of an error
 
 line_current_config_t config()
 {
@@ -40,6 +42,11 @@ struct Line {
     {
         line_current_prepare(&self, fixed(i / kBase_A, 28), fixed(emf_V / kBase_V, 28),
                              fixed(kV_dc / kBase_V, 28));
+    }
+    void give(double duty, double i_min, double i_max)
+    {
+        want(i_max);
+        line_current_give(&self, fixed(duty, 28), fixed(i_min / kBase_A, 28));
     }
     void period()
     {
@@ -102,6 +109,77 @@ TEST(LineCurrent, GivesNoMoreThanTheLink)
     }
     EXPECT_NEAR(x.i_A, 5, kRest_A);
     EXPECT_TRUE(x.self.limited);
+}
+
+// The voltage is the duty's to the bit, and the current what it makes.
+TEST(LineCurrent, ADutyIsTheVoltage)
+{
+    Line x(8);
+    for (int k = 0; k < 400; ++k) {
+        x.give(0.4, -9, 9);
+        x.period();
+        ASSERT_EQ(x.self.u, fixed(0.4, 28));
+    }
+    EXPECT_NEAR(x.i_A, (0.4 * kV_dc - 8) / (2 * kR_ohm), kRest_A);
+    EXPECT_NEAR(real(x.self.pi.integral) * 64 * kBase_V, 2 * kR_ohm * x.i_A, kIntegral_V);
+    EXPECT_FALSE(x.self.held);
+    EXPECT_FALSE(x.self.limited);
+}
+
+// 11 A and -7 A are what the voltage would make.
+TEST(LineCurrent, ADutyGivesWayToEitherEnd)
+{
+    for (const auto &[duty, end_A] : {std::pair{0.7, 3.0}, {0.1, -2.0}}) {
+        Line x(8);
+        x.give(1.0 / 3, -2, 3);
+        x.period();
+        ASSERT_FALSE(x.self.held);
+        for (int k = 0; k < 400; ++k) {
+            x.give(duty, -2, 3);
+            x.period();
+            ASSERT_LT(x.i_A, 3 * 1.15);
+            ASSERT_GT(x.i_A, -2 * 1.15);
+        }
+        EXPECT_NEAR(x.i_A, end_A, kRest_A);
+        EXPECT_TRUE(x.self.held);
+        x.self.held = false;
+        for (int k = 0; k < 400; ++k) {
+            x.give(0.35, -2, 3);
+            x.period();
+        }
+        EXPECT_EQ(x.self.u, fixed(0.35, 28));
+        EXPECT_NEAR(x.i_A, 0.5, kRest_A);
+    }
+}
+
+// What an EMF above the link forces back is no less than nothing and no more than the link.
+TEST(LineCurrent, NoCurrentLimitIsBeyondTheLink)
+{
+    Line x(28);
+    for (int k = 0; k < 400; ++k) {
+        x.give(0.5, -1, 9);
+        x.period();
+        ASSERT_LE(x.self.u, PM_ONE);
+    }
+    EXPECT_NEAR(x.i_A, -5, kRest_A);
+    EXPECT_TRUE(x.self.held);
+    EXPECT_TRUE(x.self.limited);
+}
+
+// A reference after a duty is followed as before.
+TEST(LineCurrent, AReferenceEndsTheDuty)
+{
+    Line x(8);
+    x.give(0.4, -9, 9);
+    for (int k = 0; k < 200; ++k) {
+        x.period();
+    }
+    const double before_A = x.i_A;
+    x.want(before_A);
+    for (int k = 0; k < 100; ++k) {
+        x.period();
+        ASSERT_NEAR(x.i_A, before_A, kRest_A) << k;
+    }
 }
 
 // The fundamental of blocks of 120 degrees, and the torque of both.

@@ -180,7 +180,7 @@ TEST(Cia402, OnlyModesThatThereAre)
 {
     Profile x;
     for (int mode = -128; mode < 128; ++mode) {
-        const bool known = mode == -2 || mode == -1 || mode == 0 || mode == 3 || mode == 4;
+        const bool known = mode == -3 || mode == -2 || mode == -1 || mode == 0 || mode == 3 || mode == 4;
         EXPECT_EQ(x.put(OD_LIVE_MODE, mode), known ? 0U : 0x06090030U) << mode;
     }
 }
@@ -197,12 +197,27 @@ TEST(Cia402, CurrentModeGivesCurrentAndTurns)
     EXPECT_EQ(x.out.velocity, 20000);
 }
 
+TEST(Cia402, DutyModeGivesTheDutyAndNothingElseDoes)
+{
+    for (const int mode : {CIA402_MODE_DUTY, CIA402_MODE_CURRENT, CIA402_MODE_VELOCITY, CIA402_MODE_TORQUE}) {
+        Profile x;
+        x.put(OD_LIVE_MODE, mode);
+        x.put(OD_LIVE_TARGET_DUTY, -2500);
+        x.reach(CIA402_OPERATION_ENABLED);
+        EXPECT_EQ(x.out.mode, mode);
+        EXPECT_EQ(x.out.duty, mode == CIA402_MODE_DUTY ? -2500 : 0) << mode;
+        x.command(ENABLE | HALT);
+        EXPECT_TRUE(x.out.enable);
+        EXPECT_EQ(x.out.duty, 0) << "halted";
+    }
+}
+
 TEST(Cia402, TargetsReadBack)
 {
     Profile x;
     int32_t value = 0;
     for (const uint16_t slot : {OD_LIVE_TARGET_VELOCITY, OD_LIVE_TARGET_TORQUE, OD_LIVE_TARGET_CURRENT,
-                                OD_LIVE_VELOCITY_WINDOW, OD_LIVE_VELOCITY_THRESHOLD}) {
+                                OD_LIVE_TARGET_DUTY, OD_LIVE_VELOCITY_WINDOW, OD_LIVE_VELOCITY_THRESHOLD}) {
         EXPECT_EQ(x.put(slot, ++value), 0U);
         EXPECT_EQ(x.get(slot), value);
     }

@@ -53,8 +53,8 @@ TEST(Rpdo, DefaultIsControlwordModeAndVelocity)
 {
     Bench x(5);
     x.operational();
-    x.give(0x205, {0x0F, 0x01, 0xFD, 0x30, 0x75, 0xFF, 0xFF});
-    ASSERT_EQ(x.taken.size(), 2U); // mode -3 is out of range, the others are taken
+    x.give(0x205, {0x0F, 0x01, 0xFC, 0x30, 0x75, 0xFF, 0xFF});
+    ASSERT_EQ(x.taken.size(), 2U); // mode -4 is out of range, the others are taken
     EXPECT_EQ(x.taken[0].first, entry(0x6040));
     EXPECT_EQ(x.taken[0].second, 0x010F);
     EXPECT_EQ(x.taken[1].first, entry(0x60FF));

@@ -132,7 +132,7 @@ def main():
         check_inputs_are_safe(folder, scenario)
         record = folder / "small.rec"
         expect_exit(0, "record", scenario, "--set", "angle=30", "--periods", 50, "--out", record)
-        assert record.read_bytes().startswith(b"PMREC002")
+        assert record.read_bytes().startswith(b"PMREC003")
         assert "plant alone" in expect_exit(0, "bench", scenario, "--repeat", 1).stdout
 
 

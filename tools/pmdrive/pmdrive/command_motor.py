@@ -9,10 +9,13 @@ from .drive import error_text
 from .output import as_json, show, shown
 
 
+TARGETS = {"speed": "target_velocity", "torque": "target_torque", "current": "target_current", "duty": "target_duty"}
+
+
 def add(command):
     sub = command("run", "run the motor while a time lasts or a key is held", run)
-    sub.add_argument("mode", choices=("speed", "torque", "current"))
-    sub.add_argument("target", help="300rpm, 20rad/s; 50%% of rated torque; 2A (turning at --speed)")
+    sub.add_argument("mode", choices=tuple(TARGETS))
+    sub.add_argument("target", help="300rpm, 20rad/s; 50%% of rated torque; 2A (turning at --speed); 30%% of v_dc")
     sub.add_argument("--speed", default="0", help="of the vector in current mode")
     sub.add_argument("--for", dest="seconds", type=float, help="seconds; without it the space bar must be held")
     command("stop", "switch the bridge off now", stop)
@@ -39,8 +42,7 @@ def add(command):
 
 
 def run(arguments, drive, out):
-    target = {"speed": "target_velocity", "torque": "target_torque", "current": "target_current"}[arguments.mode]
-    entry, speed = names.find(target), names.find("target_velocity")
+    entry, speed = names.find(TARGETS[arguments.mode]), names.find("target_velocity")
     raw = entry.parse(arguments.target)
     entry.check(raw)
     numbers = {arguments.mode: raw}

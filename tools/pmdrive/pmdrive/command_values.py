@@ -87,7 +87,8 @@ def set_values(arguments, drive, out):
 READY_HINTS = {1: "`pmdrive save`, before it may be switched on",
                2: "the drive refuses them as they are: `pmdrive get parameter_refused`",
                3: "the hardware runs with the old ones: `pmdrive save`, then `pmdrive reset`",
-               4: "a batch is open: `pmdrive set parameter_batch=0`"}
+               4: "a batch is open: `pmdrive set parameter_batch=0`",
+               5: "mode duty is of block commutation: `pmdrive set commutation=1`"}
 
 
 def hint(written, drive, out):

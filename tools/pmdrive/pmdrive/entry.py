@@ -26,6 +26,7 @@ UNITS = {
     ("1", "%"): Decimal("0.01"),
     ("rated torque", "%"): Decimal("0.01"),
     ("rated current", "%"): Decimal("0.01"),
+    ("v_dc", "%"): Decimal("0.01"),
     ("ohm", "Ω"): Decimal(1),
     ("degC", "°C"): Decimal(1),
 }

@@ -12,7 +12,7 @@ from .errors import FaultError, NotDone, UsageError
 
 PERIOD_S = 0.1
 WATCH_MS = 500
-MODES = {"speed": 3, "torque": 4, "current": -1, "identify": -2}
+MODES = {"speed": 3, "torque": 4, "current": -1, "identify": -2, "duty": -3}
 MAPPED = (0x60400010, 0x60600008, 0x60FF0020)
 SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP = 0x06, 0x07, 0x0F, 0x0B
 
@@ -20,12 +20,12 @@ SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP = 0x06, 0x07, 0x0F, 0x0B
 class Motion:
     """Between start() and stop() the drive follows; use it with `with`, which stops it whatever happens."""
 
-    def __init__(self, drive, mode, speed=0, torque=0, current=0):
-        """Speed in mrad/s, torque in thousandths of rated, current in mA: the integers of the dictionary."""
+    def __init__(self, drive, mode, speed=0, torque=0, current=0, duty=0):
+        """Speed in mrad/s, torque in thousandths of rated, current in mA, duty in 1e-4: the integers of the dictionary."""
         if mode not in MODES:
             raise UsageError(f"`{mode}` is no mode", ", ".join(MODES))
         self.drive, self.mode = drive, MODES[mode]
-        self.speed, self.torque, self.current = speed, torque, current
+        self.speed, self.torque, self.current, self.duty = speed, torque, current, duty
         self.task = None
 
     def __enter__(self):
@@ -58,6 +58,8 @@ class Motion:
         self.check_fault()
         drive.write("target_torque", self.torque)
         drive.write("target_current", self.current)
+        if self.mode == MODES["duty"]:  # not in each image
+            drive.write("target_duty", self.duty)
         drive.send(0, bytes([1, drive.node_id]))  # NMT: start
         return cob_id & 0x7FF
 

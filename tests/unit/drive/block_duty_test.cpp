@@ -1,0 +1,262 @@
+// Mode duty of block commutation on the plant of a fan: speed by the voltage, ramp, limits, braking, start and refusal.
+#include "firmware/drive/block.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/drive/fan.h"
+
+namespace
+{
+
+using fan::Fan;
+using fan::kRated_rad_s;
+
+constexpr double kPi = 3.141592653589793;
+constexpr double kSpeed = 0.02; // the current of 60 degrees is not flat
+constexpr double kRamp = 0.002; // of 1 s: two of its steps
+constexpr double kPeak_A = 6.0; // tests/scenario/six_step_duty.yaml
+
+// (duty - lost) v_dc = k w + 2 R i + (3 / pi) L p w i, k i = the fan's torque.
+double speed_rel(double duty)
+{
+    const double k_Vs = 0.995 * 3 * std::sqrt(3.0) / kPi * 4 * 7.5e-3;
+    double low = 0, high = 1000;
+    while (high - low > 1e-3) {
+        const double w = (low + high) / 2;
+        const double i_A = (1.8e-6 * w * w + 2e-3) / k_Vs;
+        const double v_dc_V = 24 - 0.05 * duty * i_A;
+        const double v_V = duty * v_dc_V - 0.5e-6 * 20e3 * (v_dc_V + 0.8);
+        const double taken_V = k_Vs * w + 2 * 0.41 * i_A + 3 / kPi * 0.5e-3 * 4 * w * i_A;
+        (v_V > taken_V ? low : high) = w;
+    }
+    return low / kRated_rad_s;
+}
+
+double u(Fan &x)
+{
+    return x.drive().block.current.u / double(PM_ONE);
+}
+
+void start(Fan &x, double duty, double time_s = 1.3)
+{
+    x.enable(DRIVE_MODE_DUTY);
+    x.duty(duty);
+    x.run_s(time_s);
+    ASSERT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    ASSERT_EQ(x.drive().stage, STAGE_SIX_STEP);
+}
+
+uint32_t limits_of(Fan &x, int ms)
+{
+    uint32_t limits = 0;
+    for (; ms > 0; --ms) {
+        x.run_s(1e-3);
+        limits |= drive_status(&x.drive())->limits;
+    }
+    return limits;
+}
+
+TEST(BlockDuty, TheVoltageMakesTheSpeedBothWays)
+{
+    for (const double duty : {0.4, -0.4, 0.6}) {
+        Fan x;
+        start(x, duty);
+        EXPECT_NEAR(x.omega_rel, std::copysign(speed_rel(std::fabs(duty)), duty),
+                    kSpeed * std::fabs(x.omega_rel))
+            << duty;
+        EXPECT_NEAR(u(x), std::fabs(duty), 1e-6);
+        EXPECT_EQ(limits_of(x, 20), 0U);
+        EXPECT_GT(duty * drive_status(&x.drive())->i_ref.q, 0) << "it drives the fan";
+    }
+}
+
+TEST(BlockDuty, FollowsItsRamp)
+{
+    for (const int32_t ramp_ms : {1000, 100}) {
+        Fan x;
+        x.params().t_duty = ramp_ms;
+        start(x, 0.4);
+        const double before = u(x);
+        x.duty(0.5);
+        x.run_s(0.005);
+        EXPECT_NEAR(u(x) - before, 5.0 / ramp_ms, kRamp * 1000 / ramp_ms);
+        x.duty(0.4);
+        x.run_s(0.2);
+        EXPECT_NEAR(u(x), 0.4, 1e-6);
+    }
+}
+
+// Whatever the start needs, and goes on from there.
+TEST(BlockDuty, BeginsAtTheVoltageOfTheStart)
+{
+    Fan x;
+    x.params().t_duty = 100000; // 1 % in a second
+    x.enable(DRIVE_MODE_DUTY);
+    x.duty(0.9);
+    for (int ms = 0; ms < 2000 && x.drive().block_ms == 0; ++ms) {
+        x.run_s(1e-3);
+    }
+    ASSERT_EQ(x.drive().stage, STAGE_SIX_STEP);
+    const double first = u(x);
+    EXPECT_GT(first, 0.02);
+    x.run_s(0.1);
+    EXPECT_NEAR(u(x), first, 0.002);
+}
+
+TEST(BlockDuty, GivesWayToTheCurrentLimitAndSaysSo)
+{
+    Fan x;
+    x.params().t_duty = 1;
+    start(x, 0.3);
+    x.duty(1);
+    EXPECT_NE(limits_of(x, 20) & DRIVE_LIMIT_CURRENT, 0U);
+    EXPECT_LT(u(x), 0.9);
+    x.run_s(0.02);
+    EXPECT_LT(x.peak_A, kPeak_A);
+    EXPECT_GT(x.peak_A, 0.9 * kPi / (2 * std::sqrt(3.0)) * 6) << "all of i_max";
+    x.run_s(0.6);
+    EXPECT_NEAR(u(x), 1, 1e-6);
+    EXPECT_EQ(limits_of(x, 20) & DRIVE_LIMIT_CURRENT, 0U);
+}
+
+TEST(BlockDuty, DeratesWithTheOthers)
+{
+    double peak_A[2];
+    for (const int hot : {0, 1}) {
+        Fan x;
+        x.params().temp_derate = hot != 0 ? 100 : 900; // the plant's sensor says 25 degC of 110
+        x.params().t_duty = 1;
+        start(x, 0.3, 1.8);
+        x.duty(0.9);
+        EXPECT_EQ((limits_of(x, 10) & DRIVE_LIMIT_TEMPERATURE) != 0, hot != 0);
+        x.run_s(0.01);
+        peak_A[hot] = x.peak_A;
+    }
+    EXPECT_NEAR(peak_A[1] / peak_A[0], 0.85, 0.05); // (110 - 25) / (110 - 10)
+}
+
+// Without regeneration the rotor is braked by its fan alone; the link does not rise.
+TEST(BlockDuty, RegeneratesNoMoreThanTheLinkAllows)
+{
+    double omega_rel[2];
+    for (const int full : {0, 1}) {
+        Fan x;
+        x.params().v_dc_derate = full != 0 ? 24500 : 32000;
+        x.params().v_dc_max = full != 0 ? 26400 : 36000; // nothing from 25.9 V on
+        plant_set_source(x.plant(), 26);
+        start(x, 0.8);
+        x.duty(0);
+        const uint32_t limits = limits_of(x, 100);
+        EXPECT_NE(limits & DRIVE_LIMIT_CURRENT, 0U);
+        EXPECT_EQ((limits & DRIVE_LIMIT_DC_VOLTAGE) != 0, full != 0);
+        EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+        omega_rel[full] = x.omega_rel;
+    }
+    EXPECT_GT(omega_rel[1], omega_rel[0] + 0.05);
+}
+
+TEST(BlockDuty, NothingBrakesToZeroAndHolds)
+{
+    Fan x;
+    start(x, 0.4);
+    x.duty(0);
+    x.run_s(1.5);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    EXPECT_EQ(x.drive().stage, STAGE_OPEN_LOOP);
+    EXPECT_NEAR(x.omega_rel, 0, 1e-3);
+    x.duty(0.02); // its speed without a load is below three quarters of six_step_speed
+    x.run_s(0.3);
+    EXPECT_EQ(x.drive().stage, STAGE_OPEN_LOOP);
+    x.duty(-0.4);
+    x.run_s(1.2);
+    EXPECT_NEAR(x.omega_rel, -speed_rel(0.4), kSpeed * speed_rel(0.4));
+}
+
+TEST(BlockDuty, TheOtherSignBrakesAndBeginsAnew)
+{
+    Fan x;
+    start(x, 0.5);
+    x.duty(-0.4);
+    bool left = false;
+    for (int ms = 0; ms < 2600; ++ms) {
+        x.run_s(1e-3);
+        left = left || x.drive().stage != STAGE_SIX_STEP;
+    }
+    EXPECT_TRUE(left);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    EXPECT_NEAR(x.omega_rel, -speed_rel(0.4), kSpeed * speed_rel(0.4));
+}
+
+TEST(BlockDuty, AStopSlowsDownWithTheAcceleration)
+{
+    Fan x;
+    x.params().acceleration = 200000;
+    start(x, 0.4);
+    const double before = x.omega_rel;
+    x.stop();
+    x.run_s(0.2);
+    EXPECT_NEAR((before - x.omega_rel) * kRated_rad_s, 40, 6);
+    x.run_s(1.2);
+    EXPECT_EQ(drive_status(&x.drive())->state, DRIVE_OFF);
+    EXPECT_FALSE(x.driven());
+}
+
+TEST(BlockDuty, FromTheVectorAtItsSpeed)
+{
+    for (const double sense : {1.0, -1.0}) {
+        Fan x;
+        x.params().six_step_start = 0;
+        x.params().six_step_speed = 100000;
+        x.enable(DRIVE_MODE_DUTY);
+        x.duty(0.2 * sense); // 96 rad/s without a load
+        x.run_s(1.5);
+        EXPECT_EQ(x.drive().stage, STAGE_VECTOR);
+        EXPECT_NEAR(x.omega_rel, sense * 0.2 * 24 / (3 * std::sqrt(3.0) / kPi * 4 * 7.5e-3) / kRated_rad_s,
+                    0.01);
+        x.duty(0.5 * sense);
+        x.run_s(1.2);
+        EXPECT_EQ(x.drive().stage, STAGE_SIX_STEP);
+        EXPECT_NEAR(x.omega_rel, sense * speed_rel(0.5), kSpeed * speed_rel(0.5));
+        EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    }
+}
+
+TEST(BlockDuty, AHeldRotorIsAStall)
+{
+    Fan x;
+    x.params().resync_tries = 0;
+    plant_set_locked(x.plant(), true);
+    x.enable(DRIVE_MODE_DUTY);
+    x.duty(0.5);
+    x.until_fault_s(5);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_STALL);
+    EXPECT_FALSE(x.driven());
+}
+
+// Of all that is more than the link it is the link.
+TEST(BlockDuty, IsNoMoreThanTheLink)
+{
+    Fan x;
+    x.enable(DRIVE_MODE_DUTY);
+    for (const double duty : {1.5, -1.5, 2000.0}) {
+        x.duty(duty);
+        x.run_s(0.002);
+        EXPECT_EQ(x.drive().duty_target, duty < 0 ? -PM_ONE : PM_ONE);
+    }
+}
+
+TEST(BlockDuty, FieldOrientationDoesNotStartInIt)
+{
+    Fan x;
+    x.params().commutation = 0;
+    x.enable(DRIVE_MODE_DUTY);
+    x.duty(0.5);
+    x.run_s(0.5);
+    EXPECT_EQ(drive_status(&x.drive())->state, DRIVE_OFF);
+    EXPECT_FALSE(x.driven());
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+}
+
+} // namespace
