@@ -21,6 +21,7 @@ enum {
     FIGURE_BLEND, /* injection and observer */
     FIGURE_FLUX,
     FIGURE_WEAKENING,
+    FIGURE_SIX_STEP,
     FIGURE_MODES
 };
 /* What may happen in any of them, counted there and here */

@@ -7,8 +7,9 @@ namespace pmsim
 namespace
 {
 
-const char *const mode_names[FIGURE_MODES] = {"off",       "calibrate", "pulses", "identify", "align",
-                                              "open_loop", "injection", "blend",  "flux",     "weakening"};
+const char *const mode_names[FIGURE_MODES] = {"off",   "calibrate", "pulses",    "identify",
+                                              "align", "open_loop", "injection", "blend",
+                                              "flux",  "weakening", "six_step"};
 const char *const event_names[FIGURE_EVENTS] = {"limited", "fault", "swap"};
 const char *const interrupt_names[FIGURE_INTERRUPTS] = {"control", "monitor", "slow", "can", "console"};
 

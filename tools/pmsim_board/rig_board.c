@@ -83,6 +83,12 @@ static bool is_wound(drive_param_id_t id)
     return false;
 }
 
+/* Not the user's: tools/pmsim/setup.cpp takes it from a sensor that the image does not look at. */
+static bool is_of_plant(drive_param_id_t id)
+{
+    return is_wound(id) || id == DRIVE_PARAM_neutral_filter;
+}
+
 /* A parameter that the image has not, and that is not as it would be without it */
 static const char *missing(const twin_t *twin, const uint32_t page[])
 {
@@ -92,7 +98,7 @@ static const char *missing(const twin_t *twin, const uint32_t page[])
         const store_pair_t pair = store_pair(page, (uint32_t)n);
         const od_entry_t *entry = od_find((uint16_t)(pair.id >> 8), (uint8_t)(pair.id & 0xFFU), &has_index);
         if (entry->kind == (uint8_t)OD_PARAMETER && !twin->has(pair.id) &&
-            pair.value != drive_param_table[entry->slot].def && !is_wound((drive_param_id_t)entry->slot)) {
+            pair.value != drive_param_table[entry->slot].def && !is_of_plant((drive_param_id_t)entry->slot)) {
             return drive_param_table[entry->slot].name;
         }
     }

@@ -79,6 +79,7 @@ static int mode(const void *before)
     case STAGE_OPEN_LOOP:
         return drive->state == DRIVE_FINDING ? FIGURE_ALIGN : FIGURE_OPEN_LOOP;
     case STAGE_SIX_STEP:
+        return FIGURE_SIX_STEP;
     case STAGE_VECTOR:
         break;
     }
