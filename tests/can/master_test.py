@@ -91,7 +91,7 @@ class Master(unittest.TestCase):
         self.node.sdo["parameter_set"]["parameters_open"].raw = int.from_bytes(b"open", "little")
         machine["R_s"].phys = 6.2
         self.assertEqual(machine["R_s"].raw, 6200000)
-        self.assertEqual(self.node.sdo["supported_modes"].raw, 0x3000C)
+        self.assertEqual(self.node.sdo["supported_modes"].raw, 0x7000C)
         self.assertTrue(self.node.is_op_mode_supported("PROFILED VELOCITY"))
         self.node.sdo["profile_acceleration"].phys = 123.0
         self.assertEqual(self.node.sdo["control"]["acceleration"].phys, 123.0)

@@ -21,11 +21,11 @@
         SEQUENCE_FIND, 4, 4, round, SEQUENCE_FAULT                                                           \
     }
 
-/* The axis is known and its pole is not: `align` is the step of the align. */
+/* The axis is known and its pole is not; a rotor that turns by itself is aligned. `align` is the step of that. */
 #define NO_POLE(align) (PM_HAS(torque_polarity) ? (align) + 1 : (align))
-#define TURN_FORTH_AND_BACK                                                                                  \
+#define TURN_FORTH_AND_BACK(align)                                                                           \
     {                                                                                                        \
-        PROCEDURE_torque_polarity, SEQUENCE_RUN, FAULT_ALWAYS                                                \
+        PROCEDURE_torque_polarity, SEQUENCE_RUN, SEQUENCE_FAULT, SEQUENCE_FAULT, align                       \
     }
 
 static const sequence_step_t steps[SEQUENCE_KINDS][SEQUENCE_STEPS] = {
@@ -37,7 +37,7 @@ static const sequence_step_t steps[SEQUENCE_KINDS][SEQUENCE_STEPS] = {
                                {SEQUENCE_FIND, SEQUENCE_RUN, NO_POLE(4), 4, SEQUENCE_FAULT},
                                {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS},
 #if PM_HAS(torque_polarity)
-                               TURN_FORTH_AND_BACK
+                               TURN_FORTH_AND_BACK(4)
 #endif
     },
     [SEQUENCE_identify] = {{PROCEDURE_calibrate, 2, FAULT_ALWAYS},
@@ -53,7 +53,7 @@ static const sequence_step_t steps[SEQUENCE_KINDS][SEQUENCE_STEPS] = {
                              FIND_AXIS(5),
                              {SEQUENCE_POLE, SEQUENCE_RUN, NO_POLE(5), SEQUENCE_FAULT, SEQUENCE_FAULT},
                              {PROCEDURE_align, SEQUENCE_RUN, FAULT_ALWAYS},
-                             TURN_FORTH_AND_BACK},
+                             TURN_FORTH_AND_BACK(5)},
 #endif
 };
 

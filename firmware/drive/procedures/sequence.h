@@ -9,10 +9,11 @@
  * find and pole are the procedures of drive_config_t. look, flying_start.h, catches a rotor that turns, and the drive runs
  * from there; it is passed over, without a period of its own, unless the parameter flying_start is set, and in current
  * mode. So is charge on boards without PM_BOOTSTRAP.
- * The fall-back is for what alignment, or which way a torque turns the rotor, can replace. A machine that shows no saliency is
- * round, whatever it was told: it runs as one without injection does, by open loop and hand-over, until the next start. An
- * image without torque_polarity aligns a machine that shows no polarity, too; where weak magnets or a brake have left that at
- * the wrong pole, the EMF puts it right (slip.h). Without a current nothing is connected: a fault in all of them.
+ * The fall-back is for what alignment, or which way a torque turns the rotor, can replace; a rotor that turns by itself is
+ * aligned. A machine that shows no saliency is round, whatever it was told: it runs as one without injection does, by open loop
+ * and hand-over, until the next start. An image without torque_polarity aligns a machine that shows no polarity, too; where
+ * weak magnets or a brake have left that at the wrong pole, the EMF puts it right (slip.h). Without a current nothing is
+ * connected: a fault in all of them.
  * Tests: tests/unit/drive/sequence_test.cpp, tests/scenario/start_fallback.yaml, start_round.yaml. */
 #ifndef DRIVE_PROCEDURES_SEQUENCE_H
 #define DRIVE_PROCEDURES_SEQUENCE_H

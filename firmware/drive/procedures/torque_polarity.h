@@ -13,11 +13,11 @@
  * A rotor that comes off its friction is turned by one step too much; injection follows it, and it does not go far by itself, while
  *   3/2 p^2 psi_m step / J <= 1/16 rad (2 pi injection_bandwidth)^2           i_max / 32 <= step <= i_max / 8
  *
- * 60 ms for injection, 40 ms a pulse: 0.2 s at rest without load, 1.7 s and as much again for the heaviest; 0.7 to 1.7 s until a rotor
- * that is held is refused. Movement: 22.5 electrical degrees forth and what it goes on by itself, 105 at most for a free IPM-1000. Peak current:
- * what turns it, i_max at most, and the carrier. PM_FAILED_NOT_TURNING: not within eight pulses of i_max; PM_FAILED_TURNED: by 135
- * degrees within a pulse, as a load does it; PM_FAILED_SALIENCY: the frame turns as fast as half of speed_trip, as one that nothing
- * holds. No division. State 16 bytes.
+ * 60 ms for injection, 40 ms a pulse: 0.2 s at rest without load, 1.7 s and as much again for the heaviest; 0.7 to 1.7 s until a
+ * rotor that is held is refused. Movement: 22.5 electrical degrees forth and what it goes on by itself, 105 at most for a free
+ * IPM-1000. Peak current: what turns it, i_max at most, and the carrier. PM_FAILED_NOT_TURNING: not within eight pulses of i_max;
+ * PM_FAILED_TURNED: by 135 degrees within a pulse, as a load or its own speed does it; PM_FAILED_SALIENCY: the frame turns as fast
+ * as half of speed_trip, as one that nothing holds. No division. State 16 bytes.
  * Tests: tests/unit/drive/torque_polarity_test.cpp, tests/scenario/start_fallback.yaml, start_weak_magnets.yaml. */
 #ifndef DRIVE_PROCEDURES_TORQUE_POLARITY_H
 #define DRIVE_PROCEDURES_TORQUE_POLARITY_H
@@ -41,6 +41,14 @@ typedef struct {
     bool forwards; /* it turned with +i_q */
 } torque_polarity_t;
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 void make_torque_polarity(maker_t *m, torque_polarity_config_t *c);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

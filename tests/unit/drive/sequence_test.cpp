@@ -74,6 +74,7 @@ TEST(Sequence, LeadsWhereItSays)
             EXPECT_EQ(next(id, step, PM_DONE), uint32_t(SEQUENCE_RUN));
             EXPECT_EQ(next(id, step, PM_FAILED_NOT_TURNING), uint32_t(SEQUENCE_FAULT));
         }
+        EXPECT_EQ(next(id, align + 1, PM_FAILED_TURNED), align);
     }
 }
 
