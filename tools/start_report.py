@@ -39,7 +39,7 @@ CLASSES = {
     "reluctance": {"words": "IPM-1000 with the L_q of a reluctance machine, L_q / L_d 3.2", "file": IPM,
                    "drive": "L_q: 138e-3, L_q_rated: 100e-3, L_qh_rated: 70e-3, ", "square": 70, "sine": 70,
                    "L_d0": 46.3e-3, "L_q0": 145e-3, "c": 105, "R": 6.0, "psi": 0.236, "i_link": 6, "ratio": 0.1},
-    "linear": {"words": "IPM-1000 that does not saturate: has no pole to be found", "file": IPM, "drive": "", "square": 70,
+    "linear": {"words": "IPM-1000 that does not saturate: its torque alone shows the pole", "file": IPM, "drive": "", "square": 70,
                "sine": 70, "L_d0": 43e-3, "L_q0": 75e-3, "c": 0, "R": 6.0, "psi": 0.236, "i_link": 6, "ratio": 0.1},
 }
 # name -> (rows of METHODS.md, parameters, carrier, sources whose code it has, state and configuration, knows, has, when to take it)

@@ -50,8 +50,8 @@ def c_values(entry):
     """Least, preset, most."""
     least, preset, most = (c_int32(value or 0) for value in (entry.least, entry.preset, entry.most))
     if entry.image_bits:
-        bits = entry.image_bits.items()
-        preset = " + ".join([c_int32(entry.preset - sum(entry.image_bits.values())), *(f"{b} * PM_HAS({m})" for m, b in bits)])
+        (method, bit), = entry.image_bits.items()
+        preset = f"PM_HAS({method}) ? {c_int32(entry.preset)} : {c_int32(entry.preset - bit)}"
     return least, preset, most
 
 

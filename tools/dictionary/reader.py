@@ -42,6 +42,8 @@ def _preset(table, entry, device):
         entry.preset = table.integer("preset")
     if "image_bits" in table.nodes:
         bits = table.table("image_bits")
+        if len(bits.nodes) != 1:
+            raise table.error("`image_bits` names one method", "image_bits")
         entry.image_bits = {name: bits.integer(name) for name in bits.nodes}
         entry.preset += sum(entry.image_bits.values())
 
