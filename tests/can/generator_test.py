@@ -468,7 +468,7 @@ class Made(unittest.TestCase):
     def test_bits_of_an_image(self):
         entry = next(e for e in self.dictionary.entries if e.index == 0x6502)
         self.assertEqual(entry.preset, sum(1 << (mode - 1) for mode in (3, 4)) + sum(1 << (15 - mode) for mode in (-1, -2, -3)))
-        self.assertIn(" + 262144 * PM_HAS(six_step),", self.files["firmware/can/dictionary_table.c"])
+        self.assertIn("    PM_HAS(six_step) ? 458764 : 196620,", self.files["firmware/can/dictionary_table.c"])
 
     def test_same_source_same_files(self):
         self.assertEqual(self.files, generate.files(ROOT))
