@@ -13,7 +13,7 @@ set(PM_IMAGE_bldc_CCM 10240)
 set(PM_IMAGE_bldc_INTERRUPT_MEAN 520)
 set(PM_IMAGE_bldc_INTERRUPT_WORST 590)
 set(PM_IMAGE_bldc_DRIVE_STEP_FLUX 290)
-set(PM_IMAGE_bldc_DRIVE_STEP_INJECTION 332)
+set(PM_IMAGE_bldc_DRIVE_STEP_INJECTION 342)
 
 # every method that the board has the channels for, but the saliency map and the further stages of injection
 set(PM_IMAGE_foc_BOARD stm32g431)
