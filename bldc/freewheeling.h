@@ -20,9 +20,11 @@
  * A current that flows back, while the machine brakes, is led to the other rail, and there
  *   x = (2 - share) v_dc - 2 E           share: the factor of v_dc above
  * With u v_dc = 2 E that is nothing where the leg that has come is not chopped: the current of the one that has gone decays by that
- * leg's own EMF alone, which falls on. With 2 e for 2 E, 2 e = 2 E (1 - k theta), k = 1.8 (trapezoid 1.91, sine 1.73):
+ * leg's own EMF alone, which falls from E:
+ *   e = E (1 - k theta)                  k = 1.8: trapezoid 1.91, sine 1.73
+ * The current that brakes with the crossing seen is then
  *   i = theta (v + k E theta) / (3 omega L)
- * is the current that brakes with the crossing seen. v = 0, of a chopped leg 2 (v_dc - 2 E), of both v_dc - 2 E. R is left out: the
+ * with v = 0, where the leg that has come is chopped 2 (v_dc - 2 E), where both are v_dc - 2 E. R is left out: the
  * decaying current's drop makes good what u v_dc is less than 2 E. Trapezoid within 11 %; a sine bears a quarter to a half more.
  *
  * Per-unit in Q28, angles in rad Q28. Two divisions, braking one; for 1 kHz.

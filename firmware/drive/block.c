@@ -2,14 +2,11 @@
 
 #include "firmware/drive/drive_parts.h"
 #include "firmware/math/compiler.h"
-#include "firmware/math/root.h"
-#include "firmware/math/trig.h"
 
 #if PM_HAS(six_step)
 
-#define V_DC_LEAST PM_Q(0.15)
-#define SIXTH      PM_TURN(1.0 / 6)
-#define WRONG_MS   20U
+#define SIXTH    PM_TURN(1.0 / 6)
+#define WRONG_MS 20U
 
 /* The sample of two periods ago, in per-unit. */
 static void take_sample(const drive_t *drive, const drive_in_t *in, zero_sample_t *sample)
@@ -100,63 +97,6 @@ static void look(block_t *self, const block_config_t *c)
     self->rate = UINT32_MAX / seen->sum;
 }
 
-static bool follows_duty(const drive_t *drive)
-{
-    return drive->command.mode == DRIVE_MODE_DUTY && drive->state != DRIVE_STOPPING;
-}
-
-/* With less the rotor would not keep its speed. */
-static pm_q_t in_q(const drive_t *drive, pm_q_t i)
-{
-    return pm_max(pm_mul_sat(i, Q_OF_LINE), drive->config.i_max / 8);
-}
-
-/* Narrowed to the currents with which a crossing is seen in time, where the freewheeling lasts longest: of one that drives into a
- * sector whose new leg is chopped, of one that brakes into one whose is not. What a speed or a torque brakes with is the user's. */
-static void narrow(const drive_t *drive, pm_q_t *i_min, pm_q_t *i_max)
-{
-    const block_config_t *c = &drive->config.block;
-    const block_t *self = &drive->block;
-    const pattern_id_t pattern = c->six_step.pattern.id;
-    freewheeling_in_t in = {.pattern = pattern,
-                            .sector = pattern_chops_incoming(pattern, 1) ? 1U : 0U,
-                            .u = self->current.u,
-                            .v_dc = drive->status.v_dc,
-                            .omega = pm_max(pm_abs(self->pll.omega), 1)};
-    const pm_q_t left = pm_max(PM_Q(0.5235987755982988) - pm_mul(in.omega, c->blind), 0);
-    const pm_q_t drives = in_q(drive, freewheeling_current(&c->freewheeling, &in, left));
-    pm_q_t brakes = drives;
-    if (follows_duty(drive)) {
-        in.sector = pattern_chops_incoming(pattern, 0) ? 1U : 0U;
-        brakes = in_q(drive, freewheeling_braking(&c->freewheeling, &in, left));
-    }
-    *i_min = pm_max(*i_min, self->six_step.reverse ? -drives : -brakes);
-    *i_max = pm_min(*i_max, self->six_step.reverse ? brakes : drives);
-}
-
-/* Between the two legs, of the speed that the crossings say. */
-static pm_q_t emf_of(const drive_t *drive)
-{
-    const pm_q_t psi = pm_mul(drive->config.machine.psi_m, LINE_OF_PHASES);
-    return pm_mul_sat(psi, pm_abs(drive->block.pll.omega));
-}
-
-static void prepare(drive_t *drive, pm_q_t i_q)
-{
-    block_t *self = &drive->block;
-    const pm_q_t emf = emf_of(drive);
-    const pm_q_t i = pm_mul(i_q, LINE_OF_Q);
-    line_current_prepare(&self->current, self->six_step.reverse ? -i : i, emf,
-                         pm_max(drive->status.v_dc, V_DC_LEAST));
-}
-
-void block_take_duty(drive_t *drive)
-{
-    const pm_q_t emf = pm_mul(drive->config.machine.psi_m, LINE_OF_PHASES); /* at base speed */
-    const pm_q_t omega = pm_div(pm_mul(pm_abs(drive->duty_target), drive->status.v_dc), emf);
-    drive->omega_target = drive->duty_target < 0 ? -omega : omega;
-}
-
 bool block_may_begin(const drive_t *drive)
 {
     const block_config_t *c = &drive->config.block;
@@ -172,7 +112,7 @@ static void enter(drive_t *drive, pm_q_t i_q)
     const pm_q_t i = pm_mul(i_q, LINE_OF_Q);
     line_current_reset(&self->current, &drive->config.block.current, self->six_step.reverse ? -i : i);
     look(self, &drive->config.block);
-    prepare(drive, i_q);
+    block_prepare(drive, i_q);
     drive->i_open = 0;
     drive->field_weakening.i_d = 0;
     drive->modulator.hidden = 0;
@@ -221,18 +161,6 @@ bool block_from_rest(drive_t *drive)
     return true;
 }
 
-static void report(drive_t *drive, pm_q_t i_q)
-{
-    const block_t *self = &drive->block;
-    const pm_q_t i = pm_mul(self->i, Q_OF_LINE);
-    drive->i_ref = (pm_dq_t){.d = 0, .q = i_q};
-    drive->status.i = (pm_dq_t){.d = 0, .q = self->six_step.reverse ? -i : i};
-    const pm_q_t v = pm_mul(pm_mul(self->current.u, drive->status.v_dc), PM_Q(1 / 1.6539866862653761));
-    drive->v_next =
-        pm_park_inverse((pm_dq_t){.d = 0, .q = self->six_step.reverse ? -v : v}, pm_dir(self->pll.theta));
-    drive->status.limits |= self->current.limited ? DRIVE_LIMIT_VOLTAGE : 0U;
-}
-
 /* Whether a rotor that starts by its crossings is to end here. */
 static bool is_slow(const drive_t *drive)
 {
@@ -258,7 +186,7 @@ static bool is_wrong(drive_t *drive)
     block_t *self = &drive->block;
     const pm_q_t taken = self->i < 0 ? -c->lost : c->lost;
     const pm_q_t e = pm_mul(self->current.u - taken, drive->status.v_dc) - pm_mul(c->current.R_2, self->i);
-    const pm_q_t emf = emf_of(drive);
+    const pm_q_t emf = block_emf(drive);
     const bool wrong = c->six_step.pattern.complementary && pm_abs(e - emf) > pm_half(emf);
     self->wrong_ms = wrong ? (uint16_t)(self->wrong_ms + 1U) : 0U;
     return self->wrong_ms > WRONG_MS || (wrong && is_fast(self));
@@ -282,23 +210,6 @@ drive_fault_t block_fault(const drive_t *drive, drive_fault_t fault)
 #endif
 }
 
-/* The voltage is given, and the current is what it makes. */
-static void follow_duty(drive_t *drive, pm_q_t i_min, pm_q_t i_max)
-{
-    block_t *self = &drive->block;
-    const bool reverse = self->six_step.reverse;
-    const pm_q_t step = drive->config.block.duty_step;
-    self->duty += pm_clamp(drive->duty_target - self->duty, -step, step);
-    prepare(drive, reverse ? i_min : i_max);
-    line_current_give(&self->current, pm_max(reverse ? -self->duty : self->duty, 0),
-                      pm_mul(reverse ? -i_max : i_min, LINE_OF_Q));
-    drive->status.limits |= self->current.held ? DRIVE_LIMIT_CURRENT : 0U;
-    self->current.held = false;
-    const pm_q_t i_q = pm_mul(reverse ? -self->i : self->i, Q_OF_LINE);
-    speed_control_reset(&drive->speed, self->pll.omega, pm_clamp(i_q, i_min, i_max));
-    report(drive, i_q);
-}
-
 block_result_t block_slow(drive_t *drive)
 {
     const block_config_t *c = &drive->config.block;
@@ -316,8 +227,8 @@ block_result_t block_slow(drive_t *drive)
     if (young) {
         const pm_q_t i_q = self->six_step.reverse ? -c->i_start : c->i_start;
         speed_control_reset(&drive->speed, self->pll.omega, i_q);
-        prepare(drive, i_q);
-        report(drive, i_q);
+        block_prepare(drive, i_q);
+        block_report(drive, i_q);
         return BLOCK_RUNS;
     }
     if (is_slow(drive)) {
@@ -326,26 +237,11 @@ block_result_t block_slow(drive_t *drive)
     if (is_wrong(drive)) {
         return lost(drive);
     }
-    if (drive->block_ms == 0U) { /* the ramp begins at the voltage that there is */
-        self->duty = self->six_step.reverse ? -self->current.u : self->current.u;
-    }
+    block_follow(drive);
     if (drive->block_ms < BLOCK_SETTLED_MS) {
         drive->block_ms++;
     } else {
         drive->block_tries = 0;
-    }
-    pm_q_t i_min;
-    pm_q_t i_max;
-    reference_range(drive, drive->config.i_max, &i_min, &i_max);
-    if (c->limit) {
-        narrow(drive, &i_min, &i_max);
-    }
-    if (follows_duty(drive)) {
-        follow_duty(drive, i_min, i_max);
-    } else {
-        const pm_q_t i_q = reference_torque(drive, self->pll.omega, i_min, i_max);
-        prepare(drive, i_q);
-        report(drive, i_q);
     }
     self->current.limited = false;
     return BLOCK_RUNS;

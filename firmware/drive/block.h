@@ -27,7 +27,8 @@
  *
  * Mode duty: u = |duty| (patterns.h), after a ramp of t_duty from 0 to 1, in place of what the current wants. Steadily, with
  * the dead time's share `lost`,
- *   (u - lost) v_dc = (3 sqrt(3) / pi) psi_m w + 2 R i + (3 / pi) L w i        the last: commutation, L i of each 60 degrees
+ *   (u - lost) v_dc = (3 sqrt(3) / pi) psi_m w + 2 R i + (3 / pi) L w i
+ * of which the last is what commutation takes, L i in each 60 degrees.
  * The current stays within the limits above, and the duty gives way (DRIVE_LIMIT_CURRENT, line_current.h). A duty for the other
  * direction brakes with u = 0 down to 3/4 of six_step_speed, from where the start goes on in that direction; none brakes to there and
  * holds the rotor. At rest, and where the vector turns the rotor, the speed that the duty is without a load is what is wanted:

@@ -108,7 +108,6 @@ typedef enum {
 
 #define BLOCK_SETTLED_MS 1000U /* after these a loss of synchronism is the first one */
 
-void block_take_duty(drive_t *drive);       /* mode duty: its speed without a load is what is wanted */
 bool block_may_begin(const drive_t *drive); /* in STAGE_VECTOR */
 void block_begin(drive_t *drive);
 bool block_from_rest(
@@ -116,6 +115,12 @@ bool block_from_rest(
 void block_step(drive_t *drive, const drive_in_t *in, drive_out_t *out);
 block_result_t block_slow(drive_t *drive);
 drive_fault_t block_fault(const drive_t *drive, drive_fault_t fault); /* or what it was for */
+/* block_current.c */
+pm_q_t block_emf(const drive_t *drive); /* between the two legs, of the speed that the crossings say */
+void block_prepare(drive_t *drive, pm_q_t i_q); /* the current control, for 1 ms */
+void block_report(drive_t *drive, pm_q_t i_q);  /* in the status: what is wanted and what there is */
+void block_follow(drive_t *drive);              /* both, by mode, reference and limits */
+void block_take_duty(drive_t *drive);           /* mode duty: its speed without a load is what is wanted */
 #endif
 
 /* open_loop.c: align, open-loop start, current mode, hand-over to the observer and back. */

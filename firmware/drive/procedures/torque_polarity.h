@@ -11,7 +11,8 @@
  * without current: with it, cross-saturation moves the axis that injection sees.
  *
  * A rotor that comes off its friction is turned by one step too much; injection follows it, and it does not go far by itself, while
- *   3/2 p^2 psi_m step / J <= 1/16 rad (2 pi injection_bandwidth)^2           i_max / 32 <= step <= i_max / 8
+ *   3/2 p^2 psi_m step / J <= 1/16 rad (2 pi injection_bandwidth)^2
+ *   i_max / 32 <= step <= i_max / 8
  *
  * 60 ms for injection, 40 ms a pulse: 0.2 s at rest without load, 1.7 s and as much again for the heaviest; 0.7 to 1.7 s until a
  * rotor that is held is refused. Movement: 22.5 electrical degrees forth and what it goes on by itself, 105 at most for a free

@@ -13,7 +13,8 @@
  * current; dead time, resistance and delay are in both and drop out. A rotor that friction keeps delta beside phase A turns
  * c by 2 delta.
  *   S = |Y| |I_a| / Re I_a
- *   D = S with I - S without,   margin = (|D| - S / 64) / sigma                       polarity.h
+ *   D = S with I - S without
+ *   margin = (|D| - S / 64) / sigma                                                   polarity.h
  * The quotient is 1 / cos of what resistance and dead time turn the current by: without I the carrier passes zero, where dead
  * time takes most (|Y| 1.8 to 3.7 % less on a linear IPM-1000 at 70 and 35 V, S 0.5 %). D < 0 beyond five sigma:
  * zero_falls 1, with magnetising current; D > 0: 0. Below, the machine does not saturate: margin 0, and the start cannot tell

@@ -74,7 +74,8 @@ def largest_carrier(x):
 
 def _injection(x, tolerance):
     """Seven steps of the converter as an answer 45 degrees off, and fourteen times what a leg loses, which at light load
-    comes and goes with the carrier; as far as the link leaves room, and i_trip beside i_max. And whether it may lead."""
+    comes and goes with the carrier; as far as the link leaves room. Half a step of its current adds to i_max and stays below 0.9 of
+    i_trip, and a quarter of rated current is left to it whatever i_max is. And whether it may lead."""
     step, dL = 2 * x["i_full_scale"] / STEPS, x["L_q"] - x["L_d"]
     beside = max(0.9 * limits(x)["i_trip"] - x["i_max"], 0.25 * x["i_rated"])
     top = min(largest_carrier(x), 2 * x["L_d"] * x["f_pwm"] * beside)
