@@ -76,7 +76,8 @@ static void make_damping(maker_t *m, open_loop_config_t *c)
 static void make_open_loop(maker_t *m, open_loop_config_t *c)
 {
     const pm_num_t slope = pm_num_mul(si(m, DRIVE_PARAM_open_loop_acceleration), pole_pairs(m));
-    c->i = per_unit(m, DRIVE_PARAM_i_open_loop, m->base.i);
+    c->i_most = current_along_poles(m, pm_num_ratio(9, 4));
+    c->i = pm_min(per_unit(m, DRIVE_PARAM_i_open_loop, m->base.i), c->i_most);
     c->i_slope = c->i / 50 + 1;
     c->slope = fixed(m, pm_num_div(pm_num_mul(slope, m->t_slow), m->base.omega), Q_BITS,
                      DRIVE_PARAM_open_loop_acceleration);

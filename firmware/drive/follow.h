@@ -5,17 +5,19 @@
  *   across = v_q - omega (L_d + L_q) / 2 i = omega (psi_m cos(delta) - (L_q - L_d) / 2 i cos(2 delta))
  * and one that stands shows neither, but for what saliency makes of a vector that passes it, omega (L_q - L_d) / 2 i, which
  * changes its sign with each quarter turn and so does not last. The rotor follows where `across` in the direction of rotation, or
- * `along` either way, is more than omega psi_m / 2.
+ * `along` either way, is more than half of what one without a load shows, e = omega (psi_m - (L_q - L_d) i / 2), at least
+ * omega psi_m / 2.
  *
  * R is what v_d / i was while rotor and vector were at rest at the end of the align: in it are the temperature and what dead
  * time and drops lose along the vector, which is the same when it turns, within R_s / 2 and v_dc / 64. Nothing is said where
- * omega psi_m is below 2 (R i / 32 + v_dc / 512), R / 4 where there was no rest.
+ * e is below 2 (R i / 32 + v_dc / 512), R / 4 where there was no rest.
  *
- * The load is too high for the current where |along| > 0.65 omega psi_m, 40 degrees of a round rotor; below 0.4 there is more
+ * The load is too high for the current where |along| > 0.65 e, 40 degrees of a round rotor; below 0.4 there is more
  * current than it needs.
  *
  * follow_slow() at 1 kHz while a vector is imposed. Filters of 20 ms; one division, at the end of a rest. State 28 bytes.
- * Tests: tests/unit/drive/follow_test.cpp, tests/scenario/fault_stall_open.yaml, open_loop_load.yaml. */
+ * Tests: tests/unit/drive/follow_test.cpp, tests/scenario/fault_stall_open.yaml, open_loop_load.yaml,
+ * open_loop_salient.yaml. */
 #ifndef DRIVE_FOLLOW_H
 #define DRIVE_FOLLOW_H
 
@@ -50,7 +52,7 @@ typedef struct {
 typedef struct {
     pm_q_t R, R_doubt;
     pm_q_t along, across; /* filtered; at rest: v_d */
-    pm_q_t emf;           /* |omega| psi_m where it says something, else 0 */
+    pm_q_t emf;           /* |e| where it says something, else 0 */
     int32_t turned;       /* by the vector since the rotor was seen to follow, ... */
     int32_t least;        /* ... and what it must, of FOLLOW_TURN */
     uint16_t ms;          /* that it stands, or has rested */

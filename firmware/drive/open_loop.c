@@ -197,7 +197,7 @@ static void try_again(drive_t *drive)
         return;
     }
     drive->tried = true;
-    drive->i_vector = drive->config.i_max;
+    drive->i_vector = drive->config.open_loop.i_most;
     drive->omega_ramp = 0;
     drive->rest_ms = REST_MS;
     drive->wait_ms = 0;
@@ -222,7 +222,7 @@ static void watch(drive_t *drive)
     }
     const int32_t load = PM_HAS(load_current) ? follow_load(&drive->follow) : 0;
     if (load > 0) {
-        drive->i_vector = pm_min(drive->i_vector + c->open_loop.i_slope, c->i_max);
+        drive->i_vector = pm_min(drive->i_vector + c->open_loop.i_slope, c->open_loop.i_most);
     } else if (load < 0) {
         drive->i_vector = pm_max(drive->i_vector - c->open_loop.i_slope / 8, c->open_loop.i);
     } else {

@@ -144,6 +144,23 @@ TEST(Follow, SaliencyIsNoEmf)
     EXPECT_FALSE(x.self.follows);
 }
 
+// Of a rotor on the vector saliency takes (L_q - L_d) i / 2 = 0.27 psi_m; that is not the EMF of one that stands, even where
+// psi_m is told half too large.
+TEST(Follow, WhatSaliencyTakesIsNotMissing)
+{
+    for (const double omega : {0.1, -0.1}) {
+        Rig x;
+        x.L_q = 2.5 * kL_d;
+        x.told = machine(x.L_q);
+        x.told.psi_m = fixed(1.5 * kPsi, 28);
+        x.rest();
+        for (int ms = 0; ms < 300; ++ms) {
+            ASSERT_FALSE(x.step(omega, 0)) << ms;
+        }
+        EXPECT_TRUE(x.self.follows);
+    }
+}
+
 // R a fifth and half off, and what dead time leaves: known from the rest, within R / 2 and v_dc / 64.
 TEST(Follow, TheRestTellsTheResistance)
 {

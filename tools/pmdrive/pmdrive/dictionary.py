@@ -241,7 +241,8 @@ ENTRIES = (
  'flux linkage'), "3.2.2 #22"),
     Entry(0x2300, 6, "speed_low", "position", "i32", "live", "rad/s", -3, 0, 10, 5000000, 21000, False, True, "application", "none", {}, 'below: injection alone', "5.9 #69"),
     Entry(0x2300, 7, "speed_high", "position", "i32", "live", "rad/s", -3, 0, 20, 10000000, 40000, False, True, "application", "none", {}, 'above: flux observer alone', "5.9 #69"),
-    Entry(0x2300, 8, "i_open_loop", "position", "i32", "live", "A", -3, 0, 20, 4000000, 2000, False, True, "application", "none", {}, 'current of align and open-loop start, up to i_max where the load asks for it', ""),
+    Entry(0x2300, 8, "i_open_loop", "position", "i32", "live", "A", -3, 0, 20, 4000000, 2000, False, True, "application", "none", {}, ('current of align and open-loop start, up to i_max where the load asks for it '
+ 'and saliency lets it'), ""),
     Entry(0x2300, 9, "t_align", "position", "i32", "live", "s", -3, 0, 10, 10000, 300, False, True, "application", "none", {}, 'time to align in the open-loop start', ""),
     Entry(0x2300, 10, "open_loop_acceleration", "position", "i32", "live", "rad/s2", -3, 0, 10, 100000000, 50000, False, True, "application", "none", {}, 'acceleration of the open-loop start', ""),
     Entry(0x2300, 11, "observer", "position", "i32", "live", "1", 0, 0, 0, 14, 0, False, True, "application", "none", {0: 'active flux', 1: 'back-EMF (round machines)', 2: 'extended EMF, estimated frame', 3: 'extended EMF, stationary frame', 4: 'flux linkage (round machines)', 5: 'sliding mode', 6: 'Kalman filter of full order', 7: 'Kalman filter of reduced order', 8: 'model reference, current model', 9: 'model reference, voltage model', 10: 'model reference, simplified voltage model', 11: 'third harmonic, integration', 12: 'third harmonic, continuous signal', 13: 'third harmonic, zero crossings', 14: 'derivative of the current within the zero vectors'}, 'fundamental-model observer: leads above speed_high', "2.3.3 #17"),
