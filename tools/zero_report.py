@@ -215,8 +215,8 @@ def section(results, count):
         "on the plant):\n",
         formulas(),
         f"{count} random machines, half load within 0.3 s: R_s, psi_m, dL_0 and inductances told wrong by up to 10 %, gains of the current "
-        "sensors off by up to 1 %; resistors of the star off by up to 1 %, or by 0.1 %, as after calibration of four channels or bought so: "
-        "the drive does not calibrate them. Lost, largest mean error, largest error:\n",
+        "sensors off by up to 1 %; resistors of the star off by up to 1 %, or by 0.1 %, as `pmdrive identify --only neutral` leaves them or bought so. "
+        "Lost, largest mean error, largest error:\n",
         table(["source", "resistors 1 %", "resistors 0.1 %"], drawn),
         "What decides is dL_0 / K: the answer of the currents goes with K, the difference of L_d and L_q, that of the neutral with dL_0, how "
         "far mutual and own inductances differ in what the position makes of them. And the neutral is a voltage of "

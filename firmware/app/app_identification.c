@@ -146,6 +146,12 @@ static bool zero_value(const app_t *app, uint16_t slot, int32_t *value)
     case OD_LIVE_IDENTIFICATION_ZERO_L_C0:
         *value = app_in_units(r->L_c0, base_of(&app->drive.config, IN_HENRY), 9);
         return true;
+    case OD_LIVE_IDENTIFICATION_STAR_ALPHA:
+        *value = app_in_units(r->star.alpha, pm_num(1), 6);
+        return true;
+    case OD_LIVE_IDENTIFICATION_STAR_BETA:
+        *value = app_in_units(r->star.beta, pm_num(1), 6);
+        return true;
     case OD_LIVE_IDENTIFICATION_ZERO_FALLS:
         *value = r->margin == 0 ? 2 : (int32_t)r->falls;
         return true;

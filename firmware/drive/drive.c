@@ -136,11 +136,12 @@ static inline pm_abc_t currents(const drive_t *drive, const uint16_t code[DRIVE_
 }
 
 #if PM_CARRIES(PM_MEASURED)
-static inline obs_more_t measure_more(const drive_t *drive, const drive_in_t *in)
+static inline obs_more_t measure_more(drive_t *drive, const drive_in_t *in)
 {
     obs_more_t more = {.codes = &in->more};
 #if PM_CARRIES(NEEDS_NEUTRAL)
-    more.v_zero = neutral_signal(&drive->neutral, &drive->config.neutral, in->more.v_neutral);
+    more.v_zero = neutral_signal(&drive->neutral, &drive->config.neutral, in->more.v_neutral) -
+                  neutral_star(&drive->neutral, &drive->config.neutral, drive->v_acting);
 #endif
 #if PM_CARRIES(NEEDS_SECOND_SAMPLE)
     more.v_dc = drive->status.v_dc;

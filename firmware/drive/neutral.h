@@ -7,12 +7,19 @@
  * at k, behind the RC of the channel, of half a period to two: at the zero vector, where the converters sample, the
  * instantaneous value has the ripple of p i in it. zero: code without voltage (procedures/calibrate.h).
  *
- * Only in programs that carry NEEDS_NEUTRAL. Cost: 5 instructions a period. Range: +-full scale, where the converter clips.
+ * Resistors that are not equal make S a mean of the terminals with weights 1/3 + e_k, sum of e_k = 0, which has a part of the
+ * voltage u of the legs in it (E12; 1 % of a resistor is 0.3 % of u, where the carrier's answer is of the same size):
+ *   v_S = mean + star_alpha u_alpha + star_beta u_beta,   star = sum of e_k e^{j gamma_k}, gamma_k = 0, 120, 240 degrees
+ * neutral_star() is that part behind the RC, with u over [k-1, k) and a = e^{-T_s / RC}
+ *   s_k = a s_k-1 + (1 - a) (star_alpha u_alpha + star_beta u_beta)
+ * and is taken off where field-oriented control runs. procedures/zero_inductance.h measures the two.
+ *
+ * Only in programs that carry NEEDS_NEUTRAL. Cost: 16 instructions a period. Range: +-full scale, where the converter clips.
  * Tests: tests/unit/drive/neutral_test.cpp, tests/contract/hal. */
 #ifndef DRIVE_NEUTRAL_H
 #define DRIVE_NEUTRAL_H
 
-#include "firmware/math/fixed.h"
+#include "firmware/math/frames.h"
 #include "firmware/math/measure.h"
 #include "firmware/params/types.h"
 
@@ -21,17 +28,27 @@ extern "C" {
 #endif
 
 typedef struct {
-    int32_t per_code; /* full scale over the base of voltages, Q30 */
+    int32_t per_code;              /* full scale over the base of voltages, Q30 */
+    int32_t star_alpha, star_beta; /* times 1 - a, Q32 */
+    pm_frac_t decay;               /* a */
 } neutral_config_t;
 
 typedef struct {
     pm_q_t zero; /* code without voltage, one being half of the range */
+    pm_q_t star; /* s_k */
 } neutral_t;
 
 #if PM_CARRIES(NEEDS_NEUTRAL)
 static inline pm_q_t neutral_signal(const neutral_t *self, const neutral_config_t *config, uint16_t code)
 {
     return pm_shl(pm_mulh(self->zero - pm_shl(code, PM_Q_BITS - 15), config->per_code), 2);
+}
+
+static inline pm_q_t neutral_star(neutral_t *self, const neutral_config_t *config, pm_ab_t u)
+{
+    const pm_q_t now = pm_mulh_add(pm_mulh(u.alpha, config->star_alpha), u.beta, config->star_beta);
+    self->star = now + pm_shl(pm_mulh(self->star, config->decay), 1);
+    return self->star;
 }
 #endif
 

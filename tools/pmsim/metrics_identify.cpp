@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <functional>
 #include <limits>
 
@@ -157,6 +158,19 @@ class Identified : public Metric
         return found == 0 ? std::numeric_limits<double>::quiet_NaN() : found / truth - 1;
     }
 
+    // Of the sum of the terminals that the star of resistors makes, with weights by their conductances.
+    std::complex<double> star() const
+    {
+        std::complex<double> weighed = 0;
+        double sum = 0;
+        for (int k = 0; k < 3; ++k) {
+            const double conductance = 1 / (1 + setup_.plant.sensor.v_zero_network_error[k]);
+            weighed += std::polar(conductance, k * 2 * std::acos(-1.0) / 3);
+            sum += conductance;
+        }
+        return weighed / sum;
+    }
+
     double error() const
     {
         const plant_machine_t &m = setup_.plant.machine;
@@ -210,6 +224,9 @@ class Identified : public Metric
         if (kind_ == "identify_L_c0_error_rel") { // of dL_0
             return (last_.L_c0_H - setup_.plant.winding.L_c0_H) / setup_.plant.winding.dL_0_H;
         }
+        if (kind_ == "identify_star_error") {
+            return std::abs(std::complex<double>(last_.star[0], last_.star[1]) - star());
+        }
         if (kind_ == "identify_zero_falls") {
             return last_.zero_falls;
         }
@@ -259,6 +276,7 @@ std::vector<SpecialMetric> identify_metrics()
                "largest error of the inductances at half and all of the map's current, drive's i_d"),
         number("identify_dL_0_error_rel", "dL_0 found against the plant's"),
         number("identify_L_c0_error_rel", "error of L_c0, of dL_0"),
+        number("identify_star_error", "error of what unlike resistors of the star make of the legs' voltage"),
         number("identify_zero_falls", "what was found of zero_falls; 2: not known"),
         number("identify_psi_m_error_rel", "magnet flux found against the plant's"),
         number("identify_J_error_rel", "inertia found against the plant's"),

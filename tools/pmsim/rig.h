@@ -55,6 +55,7 @@ typedef struct {
     rig_saliency_t half, rated;                     /* with the drive's i_d */
     double map_current_A, circle_centre_A, circle_radius_A;
     double dL_0_H, L_c0_H; /* procedures/zero_inductance.h */
+    double star[2];        /* alpha, beta */
     int zero_falls;        /* 2: not known */
 } rig_identified_t;
 

@@ -94,6 +94,8 @@ static void add_neutral(const rig_scale_t *scale, const zero_inductance_result_t
     const double L_H = scale->psi_Wb / scale->i_A / PM_ONE;
     found->dL_0_H = L_H * r->dL_0;
     found->L_c0_H = L_H * r->L_c0;
+    found->star[0] = ldexp(r->star.alpha, -PM_Q_BITS);
+    found->star[1] = ldexp(r->star.beta, -PM_Q_BITS);
     found->zero_falls = r->margin == 0 ? 2 : r->falls;
 }
 #endif

@@ -11,13 +11,16 @@
 
 #define VALUES    32U
 #define RISE_MS   256
+#define ACROSS    PM_TURN(0.25)
+#define ACROSS_MS 512U /* slowly, or the rotor swings for longer than the next turn takes */
 #define TURN_MS   800U /* with the current: the rotor comes to rest */
 #define FREE_MS   200U /* without */
 #define LATEST_MS 5000U
 #define SHARE     64   /* of S: a difference that is none */
 #define LEAST     4000 /* of the machine's inductance */
 
-enum { TURN, WITH, FREE, WITHOUT };
+/* Along phase A, and across it. */
+enum { TURN, WITH, FREE, WITHOUT, TURN_ON, FREE_ON, WITHOUT_ON, PARTS };
 
 static pm_q_t current(const drive_t *drive)
 {
@@ -30,10 +33,13 @@ static void enter(drive_t *drive, uint8_t part)
     self->part = part;
     self->ms = 0;
     self->hold.still = 0;
-    self->a = (pm_dq_t){0, 0};
-    self->b = (pm_dq_t){0, 0};
-    self->y = (pm_dq_t){0, 0};
-    drive->commissioning_report.progress = (uint8_t)(25U * part);
+    self->values = 0;
+    if (part == (uint8_t)WITHOUT) { /* not of those with the current */
+        self->at[0].a = (pm_dq_t){0, 0};
+        self->at[0].b = (pm_dq_t){0, 0};
+        self->at[0].y = (pm_dq_t){0, 0};
+    }
+    drive->commissioning_report.progress = (uint8_t)(100U * part / (uint8_t)PARTS);
 }
 
 void procedure_zero_inductance_begin(drive_t *drive)
@@ -70,12 +76,18 @@ static bool holds(drive_t *drive)
 {
     zero_inductance_t *self = &drive->procedure.zero_inductance;
     const zero_inductance_config_t *c = &drive->config.zero_inductance;
-    const bool with = self->part <= (uint8_t)WITH;
+    const bool with = self->part <= (uint8_t)WITH || self->part == (uint8_t)TURN_ON;
     const pm_q_t i = current(drive);
     const pm_q_t wanted = with ? i : 0;
     self->i = commissioning_approach(self->i, wanted, i / RISE_MS + 1);
-    commissioning_hold(drive, &self->hold, (pm_ab_t){self->i, 0}, sine_mean(&self->sine, &c->sine), c->omega);
-    if (self->i != wanted) { /* what lags behind a ramp is even, too */
+    const bool turns = self->part == (uint8_t)TURN_ON && self->along != ACROSS;
+    if (turns && self->i == wanted) {
+        self->along += ACROSS / ACROSS_MS;
+    }
+    const pm_dir_t along = pm_dir(self->along);
+    const pm_ab_t hold = {.alpha = pm_unit(self->i, along.cos), .beta = pm_unit(self->i, along.sin)};
+    commissioning_hold(drive, &self->hold, hold, sine_mean(&self->sine, &c->sine), c->omega);
+    if (self->i != wanted || turns) { /* what lags behind a ramp is even, too */
         self->hold.still = 0;
     }
     return self->hold.still >= (with ? TURN_MS : FREE_MS);
@@ -102,16 +114,19 @@ static bool add_value(drive_t *drive)
     const pm_dq_t i_sin = window_sine(&self->sine.window, per_n);
     const pm_q_t y_cos = window_cosine(&self->neutral, per_n).d;
     const pm_q_t y_sin = window_sine(&self->neutral, per_n).d;
-    const pm_q_t size = size_of(pm_hypot(y_cos, y_sin), i_cos, i_sin);
-    polarity_mean_t *mean = &self->size[self->part == (uint8_t)WITH ? 0 : 1];
-    if (self->part == (uint8_t)WITH && mean->count == 0U) {
-        self->first = size;
+    const uint32_t at = self->part == (uint8_t)WITHOUT_ON ? 1U : 0U;
+    add(&self->at[at].a, i_cos.d, i_sin.d);
+    add(&self->at[at].b, i_cos.q, i_sin.q);
+    add(&self->at[at].y, y_cos, y_sin);
+    if (at == 0U) {
+        const pm_q_t size = size_of(pm_hypot(y_cos, y_sin), i_cos, i_sin);
+        if (self->part == (uint8_t)WITH && self->values == 0U) {
+            self->first = size;
+        }
+        polarity_add(&self->size[self->part == (uint8_t)WITH ? 0 : 1], size - self->first);
     }
-    add(&self->a, i_cos.d, i_sin.d);
-    add(&self->b, i_cos.q, i_sin.q);
-    add(&self->y, y_cos, y_sin);
-    polarity_add(mean, size - self->first);
-    return mean->count >= VALUES;
+    self->values++;
+    return self->values >= VALUES;
 }
 
 /* Im(a* b) */
@@ -143,22 +158,64 @@ static void find_fall(drive_t *drive)
     }
 }
 
+static pm_dq_t sum(pm_dq_t x, pm_dq_t y)
+{
+    return (pm_dq_t){x.d + y.d, x.q + y.q};
+}
+
+static pm_dq_t difference(pm_dq_t x, pm_dq_t y)
+{
+    return (pm_dq_t){x.d - y.d, x.q - y.q};
+}
+
+/* W = -K Y */
+static pm_dq_t linkage(const drive_t *drive, pm_dq_t y)
+{
+    const pm_dq_t k = drive->config.zero_inductance.k;
+    return (pm_dq_t){pm_mul(y.q, k.q) - pm_mul(y.d, k.d), -pm_mul(y.d, k.q) - pm_mul(y.q, k.d)};
+}
+
+/* Of the winding's voltage by its current: (L - j rho) I */
+static pm_dq_t flux(pm_q_t L, pm_q_t rho, pm_dq_t i)
+{
+    return (pm_dq_t){pm_mul(L, i.d) + pm_mul(rho, i.q), pm_mul(L, i.q) - pm_mul(rho, i.d)};
+}
+
+static void find_star(drive_t *drive)
+{
+    const zero_inductance_t *self = &drive->procedure.zero_inductance;
+    zero_inductance_result_t *r = &drive->zero_inductance;
+    const pm_machine_t *m = &drive->config.machine;
+    const pm_q_t rho = pm_mul(m->R_s, drive->config.zero_inductance.rho);
+    const zero_sums_t *x = self->at;
+    const pm_dq_t a = difference(x[0].a, x[1].a);
+    const pm_dq_t b = difference(x[0].b, x[1].b);
+    const pm_dq_t both = linkage(drive, sum(x[0].y, x[1].y));
+    const pm_dq_t w = {both.d - pm_mul(r->dL_0, a.d) - pm_mul(r->L_c0, b.d),
+                       both.q - pm_mul(r->dL_0, a.q) - pm_mul(r->L_c0, b.q)};
+    const pm_dq_t p = sum(flux(m->L_d, rho, x[0].a), flux(m->L_q, rho, x[1].a));
+    const pm_dq_t q = sum(flux(m->L_q, rho, x[0].b), flux(m->L_d, rho, x[1].b));
+    r->star.alpha = -share(cross(w, q), cross(p, q)) / 2;
+    r->star.beta = -share(cross(p, w), cross(p, q)) / 2;
+}
+
 static pm_procedure_t conclude(drive_t *drive)
 {
     const zero_inductance_t *self = &drive->procedure.zero_inductance;
     zero_inductance_result_t *r = &drive->zero_inductance;
-    const pm_dq_t k = drive->config.zero_inductance.k;
-    const pm_dq_t w = {pm_mul(self->y.q, k.q) - pm_mul(self->y.d, k.d),
-                       -pm_mul(self->y.d, k.q) - pm_mul(self->y.q, k.d)};
-    const int64_t both = cross(self->a, self->b);
-    if (pm_abs(self->a.d) + pm_abs(self->a.q) < drive->config.i_max / 16) { /* of 32 halves */
+    const pm_dq_t a = sum(self->at[0].a, self->at[1].a);
+    const pm_dq_t b = sum(self->at[0].b, self->at[1].b);
+    const pm_dq_t w = linkage(drive, difference(self->at[0].y, self->at[1].y));
+    const int64_t both = cross(a, b);
+    if (pm_abs(a.d) + pm_abs(a.q) < drive->config.i_max / 8) { /* of 64 halves */
         return PM_FAILED_NO_CURRENT;
     }
-    r->dL_0 = share(cross(w, self->b), both);
-    r->L_c0 = share(cross(self->a, w), both);
+    r->dL_0 = share(cross(w, b), both);
+    r->L_c0 = share(cross(a, w), both);
     if (pm_hypot(r->dL_0, r->L_c0) < drive->config.machine.L_d / LEAST) {
         return PM_FAILED_SALIENCY;
     }
+    find_star(drive);
     find_fall(drive);
     return PM_DONE;
 }
@@ -188,7 +245,9 @@ pm_procedure_t procedure_zero_inductance_slow(drive_t *drive)
     if (self->ms > LATEST_MS) {
         return finish(drive, PM_FAILED_NO_CURRENT);
     }
-    if (self->part == (uint8_t)TURN || self->part == (uint8_t)FREE) {
+    const bool waits = self->part == (uint8_t)TURN || self->part == (uint8_t)FREE ||
+                       self->part == (uint8_t)TURN_ON || self->part == (uint8_t)FREE_ON;
+    if (waits) {
         if (held) {
             enter(drive, (uint8_t)(self->part + 1U));
         }
@@ -197,8 +256,8 @@ pm_procedure_t procedure_zero_inductance_slow(drive_t *drive)
     if (self->ms % block != 0U || !add_value(drive)) {
         return PM_RUNNING;
     }
-    if (self->part == (uint8_t)WITH) {
-        enter(drive, FREE);
+    if (self->part != (uint8_t)WITHOUT_ON) {
+        enter(drive, (uint8_t)(self->part + 1U));
         return PM_RUNNING;
     }
     return finish(drive, conclude(drive));

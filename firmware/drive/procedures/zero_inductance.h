@@ -1,5 +1,6 @@
-/* dL_0 and L_c0 of a motor whose star point is led out, measured by the drive, and which way the load on the magnet changes
- * them (METHODS.md 6.2.1 and 8.3.2; rows 71 to 77 and 95): what zero_sequence.h must know.
+/* dL_0 and L_c0 of a motor whose star point is led out, measured by the drive, which way the load on the magnet changes
+ * them, and how unlike the resistors of the star are (METHODS.md 6.2.1 and 8.3.2; rows 71 to 77 and 95): what zero_sequence.h
+ * and neutral.h must know.
  *
  * A current I along phase A, that of the command (rated by default) but psi_m / 2 (L_q - L_d) at most, turns the free rotor
  * to theta = 0. There a carrier V_h e^{j phi} of f_pwm / 20 turns, first with I, then without a current; friction keeps the
@@ -12,6 +13,14 @@
  * of the means without current over 32 values. K takes off the filter, and the differences that make a voltage of a
  * current; dead time, resistance and delay are in both and drop out. A rotor that friction keeps delta beside phase A turns
  * c by 2 delta.
+ * The same after the current has turned the rotor by a quarter, where e^{j 2 theta} = -1: there the winding's answer has the other sign, and what unlike
+ * resistors make of the carrier has not. Both positions by 0 and 1:
+ *   W = W_0 - W_1,  I_a = I_a0 + I_a1,  I_b = I_b0 + I_b1                              in the equations above
+ *   star_alpha P + star_beta Q = -[W_0 + W_1 - dL_0 (I_a0 - I_a1) - L_c0 (I_b0 - I_b1)] / 2
+ *   P = (L_d - j rho) I_a0 + (L_q - j rho) I_a1,  Q = (L_q - j rho) I_b0 + (L_d - j rho) I_b1
+ *   rho = R_s T_s / (2 tan(pi / 20))
+ * P and Q are the voltage at the winding, by its current: dead time turns that of the bridge by up to 9 degrees from the one
+ * commanded. R_s, L_d and L_q must be known, as well as the star's error shall be.
  *   S = |Y| |I_a| / Re I_a
  *   D = S with I - S without
  *   margin = (|D| - S / 64) / sigma                                                   polarity.h
@@ -20,9 +29,9 @@
  * zero_falls 1, with magnetising current; D > 0: 0. Below, the machine does not saturate: margin 0, and the start cannot tell
  * the poles by it (d_current.h).
  *
- * The rotor must be free and without load; it turns by up to half a turn, electrical. 3 s. Each period 170 instructions.
+ * The rotor must be free and without load; it turns by up to half a turn and a quarter, electrical. 5 s. Each period 170 instructions.
  * The bridge is driven without dead-time compensation (commissioning.h). PM_FAILED_NO_CURRENT: a current does not come, or
- * the carrier has no answer in the currents; PM_FAILED_SALIENCY: none at the neutral, below 1/4000 of the inductance.
+ * the carrier has no answer in the currents; PM_FAILED_SALIENCY: none at the neutral, below 1/4000 of the inductance, which leaves the star unknown, too.
  * Tests: tests/unit/drive/zero_inductance_test.cpp. */
 #ifndef DRIVE_PROCEDURES_ZERO_INDUCTANCE_H
 #define DRIVE_PROCEDURES_ZERO_INDUCTANCE_H
@@ -41,25 +50,33 @@ typedef struct {
     pm_dq_t k;     /* K w_base: real and imaginary part */
     pm_q_t i_most; /* psi_m / 2 (L_q - L_d) */
     pm_q_t omega;  /* of the control of the current */
+    pm_q_t rho;    /* over R_s */
 } zero_inductance_config_t;
 
 /* Of the last run, per-unit; all 0: not measured. */
 typedef struct {
     pm_q_t dL_0, L_c0;
+    pm_ab_t star;
     pm_sigma_t margin; /* of `falls`; 0: not known */
     bool falls;        /* the answer, with magnetising current */
 } zero_inductance_result_t;
+
+typedef struct {
+    pm_dq_t a, b, y; /* of I_a, I_b, Y */
+} zero_sums_t;
 
 typedef struct {
     sine_t sine;
     window_t neutral; /* d: v_zero */
     int32_t rest[3];  /* of the timer's counts, 128ths */
     commissioning_hold_t hold;
-    pm_q_t i;                /* that is held, along phase A */
-    pm_dq_t a, b, y;         /* sums of I_a, I_b, Y */
+    pm_q_t i;                /* that is held, */
+    pm_angle_t along;        /* along phase A and then across it */
+    zero_sums_t at[2];       /* theta = 0, 90 degrees */
     polarity_mean_t size[2]; /* S, with I and without; beside `first` */
     pm_q_t first;
     uint16_t ms; /* of this part */
+    uint8_t values;
     uint8_t part;
 } zero_inductance_t;
 

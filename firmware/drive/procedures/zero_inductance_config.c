@@ -37,6 +37,9 @@ void make_zero_inductance(maker_t *m, zero_inductance_config_t *c)
     turn(&re, &im, a);
     c->k = (pm_dq_t){fixed(m, re, Q_BITS, DRIVE_PARAM_neutral_filter),
                      fixed(m, im, Q_BITS, DRIVE_PARAM_neutral_filter)};
+    const pm_num_t cotangent = pm_num_ratio(631375151, 100000000);
+    c->rho = fixed(m, mul3(pm_num_mul(m->base.t_s, m->base.omega), cotangent, pm_num_ratio(1, 2)), Q_BITS,
+                   DRIVE_PARAM_f_pwm);
 }
 
 #endif

@@ -41,6 +41,30 @@ TEST(Neutral, AFullScaleBeyondTheFormatIsRefused)
     EXPECT_EQ(result.param, DRIVE_PARAM_neutral_full_scale);
 }
 
+// Behind the RC of the channel, by its equation in double precision.
+TEST(Neutral, TheStarIsTakenOffAsTheChannelShowsIt)
+{
+    constexpr double kAlpha = -0.0049, kBeta = 0.045, kT_s = 1e-4;
+    drive_params_t p = direct::params();
+    p.star_alpha = -4900;
+    p.star_beta = 45000;
+    for (const double rc_s : {0.5e-4, 1e-4, 2e-4}) {
+        p.neutral_filter = static_cast<int32_t>(std::lround(rc_s * 1e9));
+        drive_config_t c = {};
+        ASSERT_TRUE(drive_configure(&c, &p, PM_CHANNELS).ok);
+        neutral_t self = {};
+        const double a = std::exp(-kT_s / rc_s);
+        double s = 0;
+        for (int k = 0; k < 500; ++k) {
+            const std::complex<double> u = std::polar(0.9, 0.3 * k) + std::polar(0.3, -1.9 * k);
+            s = a * s + (1 - a) * (kAlpha * u.real() + kBeta * u.imag());
+            const pm_q_t got =
+                neutral_star(&self, &c.neutral, {bench::fixed(u.real(), 28), bench::fixed(u.imag(), 28)});
+            ASSERT_NEAR(bench::real(got), s, 1e-6) << rc_s << ' ' << k;
+        }
+    }
+}
+
 struct Loop {
     plant_config_t config = plants::ipm_1000();
     const char *error = nullptr;

@@ -17,10 +17,10 @@ using bench::kDegree;
 using bench::real;
 
 // 2 % of dL_0, and for L_c0 what friction leaves of the rotor's angle, half a degree: 2 delta dL_0.
-constexpr double kWithin = 0.02, kAcross = 0.03;
+constexpr double kWithin = 0.02, kAcross = 0.03, kStarWithin = 0.1;
 constexpr double kLongest_s = 8;
 constexpr double kHeld = 0.02; // of the current: gains of the channels 1 %, and hold.c's error of up to 3 %
-constexpr int kWithProgress = 25, kWithoutProgress = 75;
+constexpr int kWithProgress = 100 / 7, kWithoutProgress = 300 / 7;
 
 struct Motor {
     const char *name;
@@ -171,6 +171,27 @@ constexpr Motor kMotors[] = {{"ipm", false, 2e-3, 0, 20},         {"south", fals
                              {"cross", false, 2e-3, 0.5e-3, 133}, {"negative", false, -1.5e-3, -0.3e-3, 290},
                              {"spm", true, 0.3e-3, 0, 100},       {"spm cross", true, 0.3e-3, 0.1e-3, 310}};
 INSTANTIATE_TEST_SUITE_P(Motors, ZeroInductance, ::testing::ValuesIn(kMotors));
+
+// Resistors of the star 1 % apart: 0.3 % of the legs' voltage.
+TEST_P(ZeroInductance, AndTheStarThatOfTheBoard)
+{
+    const Motor m = GetParam();
+    plant_config_t c = plant_of(m);
+    c.sensor.v_zero_network_error[0] = 0.01;
+    c.sensor.v_zero_network_error[1] = -0.01;
+    Bench x(c, parameters(m), m.theta_deg);
+    x.run_s(kLongest_s);
+    ASSERT_EQ(x.report().state, COMMISSIONING_DONE) << int(x.report().reason);
+    const double conductance[] = {1 / 1.01, 1 / 0.99, 1};
+    const double sum = conductance[0] + conductance[1] + conductance[2];
+    const double alpha = (conductance[0] - conductance[1] / 2 - conductance[2] / 2) / sum;
+    const double beta = (conductance[1] - conductance[2]) * std::sqrt(0.75) / sum;
+    const double size = std::hypot(alpha, beta);
+    EXPECT_NEAR(real(x.result().star.alpha), alpha, kStarWithin * size);
+    EXPECT_NEAR(real(x.result().star.beta), beta, kStarWithin * size);
+    EXPECT_NEAR(x.henry() * real(x.result().dL_0), m.dL_0_H, kWithin * std::abs(m.dL_0_H));
+    EXPECT_NEAR(x.henry() * real(x.result().L_c0), m.L_c0_H, kAcross * std::abs(m.dL_0_H));
+}
 
 // What lags evenly behind a ramp is not at its end: at the first value without current there would be a quarter of it.
 TEST_P(ZeroInductance, IsMeasuredWithAndWithoutTheCurrent)

@@ -23,7 +23,7 @@ RESULTS = {
     "flux": ("psi_m",),
     "mechanics": ("J", "friction", "coulomb"),
     "saliency": ("L_d", "L_q", "L_dh_rated", "L_qh_rated", "L_dqh_rated", "cross_half"),
-    "neutral": ("dL_0", "zero_L_c0", "zero_falls"),
+    "neutral": ("dL_0", "zero_L_c0", "zero_falls", "star_alpha", "star_beta"),
 }
 DONE, FAILED = 2, 3
 WHAT_TO_DO = {
@@ -113,7 +113,7 @@ def parameters(drive, found):
     if "saliency" in found:
         wanted.update((name, x[name]) for name in RESULTS["saliency"])
     if "neutral" in found:
-        wanted.update(dL_0=x["dL_0"], zero_L_c0=x["zero_L_c0"])
+        wanted.update((name, x[name]) for name in ("dL_0", "zero_L_c0", "star_alpha", "star_beta"))
         if x["zero_falls"] < 2:  # else nothing is known of it
             wanted["zero_falls"] = x["zero_falls"]
     wanted.update((name, x[name]) for name in ("psi_m", "J") if name in x)
