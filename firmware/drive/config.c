@@ -76,8 +76,7 @@ static void make_damping(maker_t *m, open_loop_config_t *c)
 static void make_open_loop(maker_t *m, open_loop_config_t *c)
 {
     const pm_num_t slope = pm_num_mul(si(m, DRIVE_PARAM_open_loop_acceleration), pole_pairs(m));
-    c->i_most = current_along_poles(m, pm_num_ratio(9, 4));
-    c->i = pm_min(per_unit(m, DRIVE_PARAM_i_open_loop, m->base.i), c->i_most);
+    c->i = per_unit(m, DRIVE_PARAM_i_open_loop, m->base.i);
     c->i_slope = c->i / 50 + 1;
     c->slope = fixed(m, pm_num_div(pm_num_mul(slope, m->t_slow), m->base.omega), Q_BITS,
                      DRIVE_PARAM_open_loop_acceleration);
@@ -85,6 +84,17 @@ static void make_open_loop(maker_t *m, open_loop_config_t *c)
     c->align_ms = (uint16_t)m->params->t_align;
     c->sweep = PM_TURN(0.5) / (uint32_t)m->params->t_align;
 }
+
+#if PM_HAS(load_current)
+/* psi_m = 9/4 (L_q - L_d) i */
+static void limit_imposed(drive_config_t *config)
+{
+    open_loop_config_t *c = &config->open_loop;
+    const pm_machine_t *machine = &config->machine;
+    c->i_most = pm_min(config->i_max, pm_div(machine->psi_m / 9 * 4, machine->L_q - machine->L_d));
+    c->i = pm_min(c->i, c->i_most);
+}
+#endif
 
 static void make_protection(maker_t *m, protection_config_t *c)
 {
@@ -232,6 +242,9 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     config->slow_divider = m.slow_divider;
     config->injection =
         params->start_method % 2 == 1 || (params->start_method == 0 && injection_sees_saliency(&m));
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    make_neutral(&m, &config->neutral);
+#endif
     choose_start(&m, config, channels);
     if (config->injection) {
         const injection_limits_t limits = injection_limits(&m);
@@ -251,9 +264,6 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     m.i_d_rated = i_d_rated(&m, &config->mtpa);
     make_field_weakening(&m, &config->field_weakening);
     make_position(&m, &config->position, config->injection);
-#if PM_CARRIES(NEEDS_NEUTRAL)
-    make_neutral(&m, &config->neutral);
-#endif
     PM_IN_IMAGE(carrier_rest, make_rest(&m, &config->rest);)
     if (config->start != (uint8_t)SEQUENCE_align) {
         make_start(&m, config);
@@ -264,6 +274,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     make_fault_short(&m, &config->fault_short);
     PM_IN_IMAGE(six_step, make_block(&m, &config->block);)
     make_limits(&m, config);
+    PM_IN_IMAGE(load_current, limit_imposed(config);)
     make_units(&m, config);
     return m.result;
 }

@@ -56,9 +56,9 @@ typedef struct {
 /* Align and open-loop start, current mode. */
 typedef struct {
     pm_q_t i; /* current amplitude */
-    pm_q_t
-        i_most; /* that the load may ask for: psi_m = 9/4 (L_q - L_d) i, at most i_max. From 2 on the observers lose
-                          the active flux of a rotor on the vector, psi_m - (L_q - L_d) i, and no hand-over takes place */
+    /* That the load may ask for: psi_m = 9/4 (L_q - L_d) i, at most i_max. From 2 on the observers lose the active flux
+     * of a rotor on the vector, psi_m - (L_q - L_d) i, and no hand-over takes place. */
+    PM_IN_IMAGE(load_current, pm_q_t i_most;)
     pm_q_t i_slope;    /* per ms */
     pm_q_t slope;      /* of the speed, per ms */
     pm_frac_t k_swing; /* low-pass that knows swinging from steady turning, at 1 kHz */

@@ -178,7 +178,7 @@ void choose_start(maker_t *m, drive_config_t *config, uint32_t channels)
                 config->flying_start.charge =
                     (uint32_t)config->charge_periods * (uint32_t)FLYING_START_PARTS;)
     PM_IN_IMAGE(saliency_map, make_saliency_map(m, &config->saliency_map);)
-    PM_IN_IMAGE(zero_inductance, make_zero_inductance(m, &config->zero_inductance);)
+    PM_IN_IMAGE(zero_inductance, make_zero_inductance(m, &config->zero_inductance, config->neutral.decay);)
     require(m, sequence_needs((sequence_id_t)config->start, config->find, config_pole(config)),
             DRIVE_PARAM_start_method);
 }

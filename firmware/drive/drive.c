@@ -402,7 +402,7 @@ static void prepare_current_control(drive_t *drive)
         }
 #endif
     }
-    if (drive->stage == STAGE_OPEN_LOOP && machine->L_d < machine->L_q / 3) {
+    if (PM_HAS(load_current) && drive->stage == STAGE_OPEN_LOOP && machine->L_d < machine->L_q / 3) {
         regulator_slow_down(&drive->regulator_config, pm_ratio(3 * machine->L_d, machine->L_q));
     }
 }

@@ -57,8 +57,8 @@ bool follow_slow(follow_t *self, const pm_machine_t *machine, const follow_in_t 
     const pm_q_t reactance = pm_mul(in->omega, m->L_d / 2 + m->L_q / 2);
     (void)pm_lp1(&self->along, in->v.d - pm_mul(self->R, in->i), K_MEAN);
     (void)pm_lp1(&self->across, in->v.q - pm_mul(reactance, in->i), K_MEAN);
-    const pm_q_t less = pm_max(pm_mul(m->L_q - m->L_d, in->i) / 2, 0);
-    self->emf = pm_mul(pm_abs(in->omega), pm_max(m->psi_m - less, m->psi_m / 2));
+    const pm_q_t psi = m->psi_m - pm_mul(m->L_q - m->L_d, in->i) / 2;
+    self->emf = pm_mul(pm_abs(in->omega), pm_max(psi, m->psi_m / 2));
     if (PM_HAS(load_current)) {
         self->turned = pm_min(self->turned + in->turn, self->least);
     }

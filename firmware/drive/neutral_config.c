@@ -1,5 +1,6 @@
 #include "firmware/drive/neutral.h"
 
+#include "firmware/math/compiler.h"
 #include "firmware/math/image.h"
 #include "firmware/params/maker.h"
 #include "injection/zero_sequence.h"
@@ -13,7 +14,7 @@ static int32_t star(maker_t *m, drive_param_id_t id, pm_num_t share)
     return fixed(m, pm_num_mul(si(m, id), share), 32, id);
 }
 
-void make_neutral(maker_t *m, neutral_config_t *c)
+PM_APART void make_neutral(maker_t *m, neutral_config_t *c)
 {
     const pm_num_t a = zero_decay(m);
     const pm_num_t rest = pm_num_sub(pm_num(1), a);

@@ -115,19 +115,6 @@ static inline pm_q_t speed(maker_t *m, drive_param_id_t id)
     return fixed(m, pm_num_div(pm_num_mul(si(m, id), pole_pairs(m)), m->base.omega), Q_BITS, id);
 }
 
-/* i_max, or the current along the poles of a salient machine of which psi_m is `times` (L_q - L_d) i: reluctance torque turns the
- * rotor away from it,
- *   T = 3/2 p i sin(delta) (psi_m - (L_q - L_d) i cos(delta)). */
-static inline pm_q_t current_along_poles(maker_t *m, pm_num_t times)
-{
-    const pm_num_t less = pm_num_mul(times, pm_num_sub(si(m, DRIVE_PARAM_L_q), si(m, DRIVE_PARAM_L_d)));
-    const pm_num_t i_max = si(m, DRIVE_PARAM_i_max);
-    const pm_num_t psi_m = si(m, DRIVE_PARAM_psi_m);
-    const bool bound = pm_num_cmp(psi_m, pm_num_mul(i_max, less)) < 0;
-    return fixed(m, pm_num_div(bound ? pm_num_div(psi_m, less) : i_max, m->base.i), Q_BITS,
-                 DRIVE_PARAM_i_max);
-}
-
 static inline pm_num_t angular(const maker_t *m, drive_param_id_t id)
 {
     const pm_num_t two_pi = {PM_NUM_TWO_PI_M, PM_NUM_TWO_PI_E};

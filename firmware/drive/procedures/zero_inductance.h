@@ -80,7 +80,8 @@ typedef struct {
     uint8_t part;
 } zero_inductance_t;
 
-void make_zero_inductance(maker_t *m, zero_inductance_config_t *c);
+/* decay: a. */
+void make_zero_inductance(maker_t *m, zero_inductance_config_t *c, pm_frac_t decay);
 
 #ifdef __cplusplus
 }
