@@ -224,7 +224,8 @@ def section(results, count):
         words(results),
         "- The neutral is the better source where the currents show little saliency, with coarse converters, with a loop as quick "
         "as 20 Hz by a sine, and under load, as the measured form knows nothing of the machine but dL_0 and L_c0.\n"
-        "- Currents are the better source where nothing is known of the board's resistors (1 % in the star cost what the table says), "
+        "- Currents are the better source where the rotor cannot turn for the board's resistors to be found (1 % in the star cost what the "
+        "table says), "
         "where the star point is not led out, and where |dL_0| leaves less than 0.1 % of the base of voltages, which is refused.\n",
     ])
 
