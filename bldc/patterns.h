@@ -31,8 +31,9 @@
  *   H_PWM_L_PWM               high leg: u <= 1 - 2 b   low leg: never, its lower switch is open there
  *   H_PWM_L_ON                          u <= 1 - b              always
  *   H_PWM_L_PWM_ALTERNATING             u <= 1 - 2 b            always
- *   open leg                  in odd sectors, where its lower diode frees it; in even ones it is the upper one
- * One that is hidden follows from the other two. In even sectors what still flows in the open leg is then missing. H_PWM_L_PWM keeps
+ *   open leg                  in odd sectors, where its lower diode frees it; in even ones it is the upper one. Of a current that
+ *                             brakes the other way round
+ * One that is hidden follows from the other two. Where the open leg is, too, what still flows in it is then missing. H_PWM_L_PWM keeps
  * u at 1 - 2 b (line_current.h). The other patterns hold an upper switch closed beside a lower one that at rest conducts for less
  * than b: they show no current at all and are refused.
  *
@@ -103,9 +104,9 @@ pattern_sample_t pattern_sample(const pattern_config_t *config, uint32_t sector,
 uint32_t pattern_hidden(const pattern_config_t *config, uint32_t sector, bool reverse);
 
 /* They do not show what flows in the open leg: the sum of the three says nothing. */
-static inline bool pattern_hides_open(const pattern_config_t *config, uint32_t sector)
+static inline bool pattern_hides_open(const pattern_config_t *config, uint32_t sector, bool brakes)
 {
-    return config->low_side && sector_rising(sector);
+    return config->low_side && sector_rising(sector) != brakes;
 }
 
 #ifdef __cplusplus

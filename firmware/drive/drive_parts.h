@@ -118,7 +118,9 @@ drive_fault_t block_fault(const drive_t *drive, drive_fault_t fault); /* or what
 /* In STAGE_SIX_STEP the open leg's current is not measured. */
 static inline bool block_hides_open(const drive_t *drive)
 {
-    return pattern_hides_open(&drive->config.block.six_step.pattern, drive->block.six_step.plan[1].sector);
+    const block_t *self = &drive->block;
+    return pattern_hides_open(&drive->config.block.six_step.pattern, self->six_step.plan[1].sector,
+                              self->i < 0);
 }
 /* block_current.c */
 pm_q_t block_emf(const drive_t *drive); /* between the two legs, of the speed that the crossings say */

@@ -187,7 +187,8 @@ TEST(Patterns, LowSideShuntsHideWhatTheLegsSay)
                     }
                     const uint32_t hidden = fixed(u, 28) > c.shown ? pattern_hidden(&c, s, reverse) : 0;
                     EXPECT_EQ(hidden, expected) << p.id << ' ' << u << ' ' << s;
-                    EXPECT_EQ(pattern_hides_open(&c, s), sector_rising(s));
+                    EXPECT_EQ(pattern_hides_open(&c, s, false), sector_rising(s));
+                    EXPECT_EQ(pattern_hides_open(&c, s, true), !sector_rising(s));
                 }
             }
         }
