@@ -33,10 +33,10 @@ void line_current_step(line_current_t *self, const line_current_config_t *config
         wanted = pm_clamp(duty, v - pm_gain(self->i_span, config->pi.kp), v);
         self->held = self->held || wanted != duty;
     }
-    const pm_wide_t given = pm_clamp(wanted, 0, pm_widen(v_dc));
+    const pm_wide_t given = pm_clamp(wanted, 0, pm_widen(pm_mul(v_dc, config->most)));
     self->limited = self->limited || given != wanted;
     pm_pi_update(&self->pi, &config->pi, e, given - v);
-    self->u = pm_min(pm_mul_sat(pm_narrow(given), self->per_v), PM_ONE);
+    self->u = pm_min(pm_mul_sat(pm_narrow(given), self->per_v), config->most);
     if (pm_rarely(self->given) && given == duty) {
         self->u = self->duty; /* of the link as it is, not as it was at 1 kHz */
     }

@@ -1,7 +1,7 @@
 /* Control of the current that flows in by one leg and out by the other, in block commutation (METHODS.md 1.4.2, row 9).
  *
  *   e = i_ref - i                     i: of the leg that stays across the last commutation, whose current does not dip
- *   v = kp e + integral + emf         voltage between the two legs, 0 ... v_dc
+ *   v = kp e + integral + emf         voltage between the two legs, 0 ... most v_dc
  *   u = v / v_dc                      patterns.h
  *   kp = 2 w_c L,  ki = 2 w_c R T     two phases in series; w_c: bandwidth
  *   emf = (3 sqrt(3) / pi) psi_m w    mean of 60 degrees; a trapezoid of that fundamental has half a per cent less
@@ -16,7 +16,7 @@
  *   i = (pi / (2 sqrt(3))) i_q
  * so limits, torque and speed control are those of the vector. Called once a period with the current at t_k; acts in
  * [t_k+1, t_k+2). 35 instructions, 55 with a duty. Per-unit: Q28, gains as pi.h.
- * Tests: tests/unit/bldc/line_current_test.cpp, tests/scenario/six_step.yaml. */
+ * Tests: tests/unit/bldc/line_current_test.cpp, tests/scenario/six_step.yaml, six_step_low_side.yaml. */
 #ifndef BLDC_LINE_CURRENT_H
 #define BLDC_LINE_CURRENT_H
 
@@ -33,14 +33,15 @@ extern "C" {
 
 typedef struct {
     pm_pi_config_t pi;
-    pm_q_t R_2; /* of both phases */
+    pm_q_t R_2;  /* of both phases */
+    pm_q_t most; /* of u; 1, or what low-side shunts show the current at (patterns.h) */
 } line_current_config_t;
 
 typedef struct {
     pm_pi_t pi;
     pm_q_t i_ref, emf; /* of 1 kHz; i_ref: with a duty i_max */
     pm_q_t per_v;      /* 1 / v_dc */
-    pm_q_t u;          /* 0 ... 1 */
+    pm_q_t u;          /* 0 ... most */
     bool limited;      /* v has been at an end since it was last cleared */
     bool given;        /* by a duty, */
     bool held;         /* which has given way to i_min or i_max since it was last cleared */
@@ -60,6 +61,7 @@ void line_current_give(line_current_t *self, pm_q_t duty, pm_q_t i_min);
 
 void line_current_step(line_current_t *self, const line_current_config_t *config, pm_q_t i, pm_q_t v_dc);
 
+/* Without `most`. */
 void make_line_current(maker_t *m, line_current_config_t *c);
 
 #ifdef __cplusplus

@@ -77,3 +77,9 @@ pattern_sample_t pattern_sample(const pattern_config_t *config, uint32_t sector,
     }
     return (pattern_sample_t){.at = (uint16_t)pm_clamp(at, 1, 2 * N - 1), .legs = legs};
 }
+
+uint32_t pattern_hidden(const pattern_config_t *config, uint32_t sector, bool reverse)
+{
+    const sector_t at = sector_legs(sector, reverse);
+    return (uint32_t)pm_shl(1, config->id == PATTERN_H_PWM_L_PWM ? at.low : at.high);
+}

@@ -26,9 +26,20 @@
  *   late in the on time    the driven legs are apart; `lead` before the switch opens
  *   late in the off time   both are at one rail, where the on time is shorter than `least`
  *
+ * Low-side shunts see a leg's current while its lower switch or diode conducts, here at the start of a period, from dead time and
+ * settling after the last edge on, b = 2 f_pwm (T_dt + t_settle) of a period about it:
+ *   H_PWM_L_PWM               high leg: u <= 1 - 2 b   low leg: never, its lower switch is open there
+ *   H_PWM_L_ON                          u <= 1 - b              always
+ *   H_PWM_L_PWM_ALTERNATING             u <= 1 - 2 b            always
+ *   open leg                  in odd sectors, where its lower diode frees it; in even ones it is the upper one. Of a current that
+ *                             brakes the other way round
+ * One that is hidden follows from the other two. Where the open leg is, too, what still flows in it is then missing. H_PWM_L_PWM keeps
+ * u at 1 - 2 b (line_current.h). The other patterns hold an upper switch closed beside a lower one that at rest conducts for less
+ * than b: they show no current at all and are refused.
+ *
  * The duties are those that each leg needs in this sector or, open, in the next: to commutate only states change.
  * pattern_duties(): 20 instructions; pattern_states(), at a commutation: 44; pattern_sample(): 37.
- * Tests: tests/unit/bldc/patterns_test.cpp. */
+ * Tests: tests/unit/bldc/patterns_test.cpp, tests/scenario/six_step_low_side.yaml. */
 #ifndef BLDC_PATTERNS_H
 #define BLDC_PATTERNS_H
 
@@ -56,6 +67,10 @@ typedef struct {
     uint16_t half_period; /* N, counts */
     uint16_t lead;        /* counts from a sample to the edge it is ahead of: converter and its trigger */
     uint16_t least; /* on time, counts, of which samples are taken: dead time, settling, lead; below 2 N */
+    bool low_side;  /* shunts below the lower switches */
+    pm_q_t
+        shown;   /* u above which they hide the current of a leg that conducts, pattern_hidden(); in line 1 */
+    pm_q_t most; /* u up to which it follows from the others; 1 but for H_PWM_L_PWM */
 } pattern_config_t;
 
 /* PM_LEGS_... of a sector. */
@@ -64,6 +79,12 @@ uint16_t pattern_states(const pattern_config_t *config, uint32_t sector, bool re
 static inline bool pattern_chops_both(pattern_id_t id)
 {
     return id == PATTERN_H_PWM_L_PWM || id == PATTERN_H_PWM_L_PWM_ALTERNATING;
+}
+
+/* In some sector the upper switch of the high leg is closed throughout. */
+static inline bool pattern_holds_high(pattern_id_t id)
+{
+    return !pattern_chops_both(id) && id != PATTERN_H_PWM_L_ON;
 }
 
 /* The leg that has come with this sector is chopped. */
@@ -78,6 +99,15 @@ typedef struct {
 } pattern_sample_t;
 
 pattern_sample_t pattern_sample(const pattern_config_t *config, uint32_t sector, pm_q_t u);
+
+/* The leg whose current low-side shunts do not show at the end of a period that ends in `sector`, of u above `shown`: a bit. */
+uint32_t pattern_hidden(const pattern_config_t *config, uint32_t sector, bool reverse);
+
+/* They do not show what flows in the open leg: the sum of the three says nothing. */
+static inline bool pattern_hides_open(const pattern_config_t *config, uint32_t sector, bool brakes)
+{
+    return config->low_side && sector_rising(sector) != brakes;
+}
 
 #ifdef __cplusplus
 }

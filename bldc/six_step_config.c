@@ -12,6 +12,24 @@ static uint16_t counts(maker_t *m, drive_param_id_t id)
     return (uint16_t)pm_min(fixed(m, pm_num_mul(si(m, id), per_s), 0, id), UINT16_MAX);
 }
 
+/* What low-side shunts see. */
+static void make_shunts(maker_t *m, pattern_config_t *c)
+{
+    const int32_t hidden = PM_SHARE_ONE - seen_on_time(m);
+    const int32_t high = PM_SHARE_ONE - (pattern_chops_both(c->id) ? 2 : 1) * hidden;
+    const bool high_alone = c->id == PATTERN_H_PWM_L_PWM;
+    c->low_side = m->params->t_settle != 0;
+    c->shown = pm_shl(high, Q_BITS - PM_SHARE_BITS);
+    c->most = high_alone ? c->shown : PM_ONE;
+    if (c->low_side && high_alone) {
+        c->shown = -1;
+    }
+    if (c->low_side && pattern_holds_high(c->id)) {
+        refuse(m, DRIVE_PARAM_pattern,
+               "holds an upper switch closed, where low-side shunts see no current: use 0, 1 or 5");
+    }
+}
+
 static void make_pattern(maker_t *m, pattern_config_t *c)
 {
     const drive_params_t *p = m->params;
@@ -24,6 +42,7 @@ static void make_pattern(maker_t *m, pattern_config_t *c)
         refuse(m, DRIVE_PARAM_t_blank, "with t_lead and dead_time beyond half a period");
     }
     c->least = (uint16_t)pm_min(blind, p->timer_counts);
+    make_shunts(m, c);
     require(m, c->complementary ? 0U : NEEDS_ONE_SWITCH, DRIVE_PARAM_freewheeling);
     require(m, c->id == PATTERN_H_PWM_L_PWM ? NEEDS_ONE_SWITCH : 0U, DRIVE_PARAM_pattern);
 }

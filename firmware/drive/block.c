@@ -79,6 +79,11 @@ void block_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
     for (uint32_t leg = 0; leg < PM_LEGS; leg++) {
         drive_write_leg(out->compare[leg], pm_frac(next.legs.duty[leg], pm_shl(counts, 32 - PM_Q_BITS)));
     }
+    if (pm_rarely(self->current.u > c->six_step.pattern.shown)) {
+        const uint32_t end = self->six_step.commutation.sector;
+        const uint32_t legs = pattern_hidden(&c->six_step.pattern, end, self->six_step.reverse);
+        drive->modulator.hidden += MODULATOR_NEXT * (int32_t)legs;
+    }
     out->legs = next.legs.legs;
     out->trip = 0;
     out->instants = (pm_instants_t){.sample_at = {next.sample_at},

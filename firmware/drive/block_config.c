@@ -54,6 +54,7 @@ void make_block(maker_t *m, block_config_t *c)
     const pm_num_t dead = pm_num_mul(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm));
     c->lost = fixed(m, pm_num_mul(pm_num(legs), dead), Q_BITS, DRIVE_PARAM_dead_time);
     make_line_current(m, &c->current);
+    c->current.most = c->six_step.pattern.most;
     make_freewheeling(m, &c->freewheeling);
     if (!c->from_rest && p->six_step_speed < p->speed_high) {
         refuse(m, DRIVE_PARAM_six_step_speed, "below speed_high, where the flux observer is not alone yet");

@@ -115,6 +115,13 @@ bool block_from_rest(
 void block_step(drive_t *drive, const drive_in_t *in, drive_out_t *out);
 block_result_t block_slow(drive_t *drive);
 drive_fault_t block_fault(const drive_t *drive, drive_fault_t fault); /* or what it was for */
+/* In STAGE_SIX_STEP the open leg's current is not measured. */
+static inline bool block_hides_open(const drive_t *drive)
+{
+    const block_t *self = &drive->block;
+    return pattern_hides_open(&drive->config.block.six_step.pattern, self->six_step.plan[1].sector,
+                              self->i < 0);
+}
 /* block_current.c */
 pm_q_t block_emf(const drive_t *drive); /* between the two legs, of the speed that the crossings say */
 void block_prepare(drive_t *drive, pm_q_t i_q); /* the current control, for 1 ms */

@@ -93,6 +93,17 @@ static bool is_blocked(const drive_t *drive)
             pm_mul(i.d, i.d) + pm_mul(i.q, i.q) > pm_mul(c->i_stall, c->i_stall));
 }
 
+/* Else their sum is zero, an old one, or without what flows in a leg that is open. */
+static bool all_measured(const drive_t *drive)
+{
+#if PM_HAS(six_step)
+    if (drive->stage == STAGE_SIX_STEP && block_hides_open(drive)) {
+        return false;
+    }
+#endif
+    return drive->completed != drive->period;
+}
+
 void protection_slow(drive_t *drive)
 {
     const protection_config_t *c = &drive->config.protection;
@@ -104,8 +115,7 @@ void protection_slow(drive_t *drive)
         return;
     }
     const pm_q_t sum = drive->i_abc.a + drive->i_abc.b + drive->i_abc.c;
-    const bool all_measured = drive->completed != drive->period; /* else their sum is zero or an old one */
-    if (all_measured && lasts(&drive->sum_ms, pm_abs(sum) > c->i_sum, 2)) {
+    if (all_measured(drive) && lasts(&drive->sum_ms, pm_abs(sum) > c->i_sum, 2)) {
         drive_trip(drive, DRIVE_FAULT_SENSOR_SUM);
     }
     const pm_q_t omega = drive->pll.omega;

@@ -1,5 +1,5 @@
 /* What a CiA 402 master says to the image over the emulated bus: the node with its default process data, and
- * the second of them switched on. */
+ * the second of them switched on; a duty goes by the third. */
 #ifndef PMSIM_BOARD_MASTER_H
 #define PMSIM_BOARD_MASTER_H
 
@@ -15,6 +15,7 @@ typedef struct {
     double rated_torque_Nm; /* whose permille the torque is given in */
     bool enabled;           /* as far as it has asked */
     uint8_t routines;       /* to identify, as told last: 0 after the start */
+    bool gives_duty;        /* RPDO3 is in use */
 } master_t;
 
 master_t master_make(board_t *board, const drive_params_t *params);

@@ -25,7 +25,9 @@ line_current_config_t config()
 {
     const double kp = 2 * kBandwidth * kL_H * kBase_A / kBase_V;
     const double ki = 2 * kBandwidth * kR_ohm * kT_s * kBase_A / kBase_V;
-    return {{fixed(kp, 26), fixed(ki, 26), fixed(ki / kp, 31)}, fixed(2 * kR_ohm * kBase_A / kBase_V, 28)};
+    return {{fixed(kp, 26), fixed(ki, 26), fixed(ki / kp, 31)},
+            fixed(2 * kR_ohm * kBase_A / kBase_V, 28),
+            PM_ONE};
 }
 
 struct Line {
@@ -56,6 +58,26 @@ struct Line {
         u = real(self.u); // acts from the next period on
     }
 };
+
+// Short of the link's, and the integral goes no further: what is wanted next is reached at once.
+TEST(LineCurrent, KeepsTheVoltageAtWhatTheShuntsShow)
+{
+    Line line(20.0);
+    line.c.most = fixed(0.85, 28);
+    line.want(5);
+    for (int k = 0; k < 4000; ++k) {
+        line.period();
+        ASSERT_LE(line.u, 0.85);
+    }
+    EXPECT_NEAR(line.i_A, (0.85 * kV_dc - 20) / (2 * kR_ohm), kRest_A);
+    EXPECT_TRUE(line.self.limited);
+    line.give(0.95, 0, 5);
+    line.period();
+    EXPECT_NEAR(line.u, 0.85, 1e-7);
+    line.give(0.8, -5, 5);
+    line.period();
+    EXPECT_EQ(line.self.u, fixed(0.8, 28));
+}
 
 TEST(LineCurrent, ReachesItsReferenceWithTheBandwidth)
 {

@@ -19,7 +19,7 @@ constexpr double kRipple = 0.15, kRms = 0.3; // METHODS-ADDENDUM.md B (c), row 1
 
 pattern_config_t make(pattern_id_t id, bool complementary = true)
 {
-    return {id, complementary, kN, 170, 1000};
+    return {id, complementary, kN, 170, 1000, false, PM_ONE, PM_ONE};
 }
 
 // Is a terminal at the upper rail at a count of the period?
@@ -150,6 +150,45 @@ TEST(Patterns, SamplesAreTakenWhereTheLegsAreAsTold)
                     const bool down = high_at(pm_leg(out.legs, at.low), real(out.duty[at.low]), count);
                     EXPECT_EQ(up, sample.legs != ZERO_LEGS_LOW) << id << ' ' << u << ' ' << s;
                     EXPECT_EQ(down, sample.legs == ZERO_LEGS_HIGH) << id << ' ' << u << ' ' << s;
+                }
+            }
+        }
+    }
+}
+
+// A shunt below a lower switch that has conducted for kBlind of a period before its end shows the current; which leg it does not,
+// and up to which voltage one of the two is seen.
+TEST(Patterns, LowSideShuntsHideWhatTheLegsSay)
+{
+    constexpr double kBlind = 0.064;
+    struct {
+        pattern_id_t id;
+        double shown, most;
+    } const list[] = {{PATTERN_H_PWM_L_PWM, -1, 1 - 4 * kBlind},
+                      {PATTERN_H_PWM_L_ON, 1 - 2 * kBlind, 1},
+                      {PATTERN_H_PWM_L_PWM_ALTERNATING, 1 - 4 * kBlind, 1}};
+    for (const auto &p : list) {
+        pattern_config_t c = make(p.id);
+        c.low_side = true;
+        c.shown = fixed(p.shown, 28);
+        for (double u = 0.005; u < p.most; u += 0.01) {
+            for (const bool reverse : {false, true}) {
+                for (uint32_t s = 0; s < SECTORS; ++s) {
+                    pm_legs_t out;
+                    pattern_duties(&c, s, reverse, fixed(u, 28), &out);
+                    const uint16_t states = pattern_states(&c, s, reverse);
+                    const sector_t at = sector_legs(s, reverse);
+                    uint32_t expected = 0;
+                    for (const uint8_t leg : {at.high, at.low}) {
+                        const bool high =
+                            high_at(pm_leg(states, leg), real(out.duty[leg]), 2 * kN * (1 - kBlind)) ||
+                            high_at(pm_leg(states, leg), real(out.duty[leg]), 2 * kN - 1);
+                        expected |= high ? 1U << leg : 0U;
+                    }
+                    const uint32_t hidden = fixed(u, 28) > c.shown ? pattern_hidden(&c, s, reverse) : 0;
+                    EXPECT_EQ(hidden, expected) << p.id << ' ' << u << ' ' << s;
+                    EXPECT_EQ(pattern_hides_open(&c, s, false), sector_rising(s));
+                    EXPECT_EQ(pattern_hides_open(&c, s, true), !sector_rising(s));
                 }
             }
         }

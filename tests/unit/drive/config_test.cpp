@@ -539,6 +539,37 @@ TEST(Config, DcLinkPulsesNeedALinkThatShowsThem)
     EXPECT_EQ(refused(10000, 1000000000).param, DRIVE_PARAM_dc_capacitance);
 }
 
+// An upper switch that is held closed shows a low-side shunt nothing. Those that are not: up to all that leaves b = 2 f_pwm (T_dt +
+// t_settle) of a period, or twice that.
+TEST(Config, ABlockPatternThatHidesTheCurrentIsRefused)
+{
+    for (int32_t pattern = 0; pattern <= 5; ++pattern) {
+        for (const int32_t t_settle : {0, 1300}) {
+            drive_params_t p;
+            drive_params_default(&p);
+            p.commutation = 1;
+            p.pattern = pattern;
+            p.f_pwm = 20000;
+            p.dead_time = 500;
+            p.t_settle = t_settle;
+            drive_config_t c = {};
+            const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
+            const bool holds = pattern >= 2 && pattern <= 4;
+            ASSERT_EQ(r.ok, t_settle == 0 || !holds) << pattern << ' ' << r.reason;
+            if (!r.ok) {
+                EXPECT_EQ(r.param, DRIVE_PARAM_pattern);
+                continue;
+            }
+            const double b = t_settle == 0 ? 0 : 2 * 20e3 * 1.8e-6;
+            const pattern_config_t &made = c.block.six_step.pattern;
+            EXPECT_EQ(made.low_side, t_settle != 0);
+            EXPECT_NEAR(std::ldexp(c.block.current.most, -28), pattern == 0 ? 1 - 2 * b : 1, 1e-5);
+            EXPECT_NEAR(std::ldexp(made.shown, -28),
+                        pattern == 0 && b != 0 ? 0 : 1 - (pattern == 5 ? 2 : 1) * b, 1e-5);
+        }
+    }
+}
+
 TEST(Config, ACarrierThatTheLegsCannotMakeAboutHalfDutyIsRefused)
 {
     const auto refused = [](int32_t v_injection_mV) {
