@@ -118,7 +118,8 @@ static void put_words(sink_t *sink, const uint32_t words[], uint32_t count)
 }
 
 /* Contents of the new page: the present values of the given groups, and those of the old page for the
- * others. What this version does not know is another's, and stays until all is forgotten. */
+ * others. What this version does not know is another's, and stays until all is forgotten. Of the node's objects, over a hundred,
+ * those at their presets are left out but for the address: the page would not hold them beside all methods' parameters. */
 typedef struct {
     const app_t *app; /* NULL: parameters alone */
     const drive_params_t *params;
@@ -162,10 +163,12 @@ static bool select_value(const selection_t *selection, const od_entry_t *entry, 
     if (!known || !in_group(entry, selection->group)) {
         return selection->old != NULL && store_find(selection->old, id_of(entry), value);
     }
-    if (selection->keep) {
-        *value = present(selection, entry);
+    if (!selection->keep) {
+        return false;
     }
-    return selection->keep;
+    *value = present(selection, entry);
+    return entry->kind != (uint8_t)OD_NODE || *value != od_values_of(entry).preset ||
+           in_group(entry, NODE_GROUP_LSS);
 }
 
 /* Pairs that may be in the new page: a row of the dictionary each, then the old page's */

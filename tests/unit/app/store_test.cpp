@@ -240,6 +240,26 @@ TEST(StoreForeign, UnknownPairsSurviveASaveOfAnyGroup)
     }
 }
 
+// What the node has at its presets takes no place: the page holds all parameters of all methods and still what others know.
+TEST(StoreForeign, PresetsOfTheNodeAreNotKept)
+{
+    Bench x;
+    const drive_params_t params = defaults();
+    x.boot(&params);
+    x.run_ms(5);
+    ASSERT_EQ(x.set(0x1010, all, save), 0U);
+    EXPECT_EQ(stored(x.loop.hal).count(0x101700), 0U);
+    ASSERT_EQ(x.set(0x1017, 0, 333), 0U);
+    ASSERT_EQ(x.set(0x1010, all, save), 0U);
+    EXPECT_EQ(stored(x.loop.hal).at(0x101700), 333);
+    ASSERT_EQ(x.set(0x1017, 0, 500), 0U); // the preset
+    ASSERT_EQ(x.set(0x1010, all, save), 0U);
+    EXPECT_EQ(stored(x.loop.hal).count(0x101700), 0U);
+    sim_loop_boot(&x.loop);
+    x.run_ms(5);
+    EXPECT_EQ(x.get(0x1017, 0) & 0xFFFF, 500U);
+}
+
 // More than a page holds is refused, and what is there stays.
 TEST(StoreForeign, AFullPageRefusesASave)
 {
