@@ -107,7 +107,7 @@ static inline void injection_step(injection_t *self, const injection_config_t *c
                                       {in->dir.cos, in->dir.sin},
                                       in->omega,
                                       {in->ahead.cos, in->ahead.sin},
-                                      PM_IF_MEASURED(in->more)};
+                                      INJECTION_IF_MORE(in->more)};
         injection_out_t result;
         injection_step_other(self, config, &given, &result);
         *out = result;

@@ -10,12 +10,20 @@
 extern "C" {
 #endif
 
+/* A source reads the neutral, or samples between the two halves of a period. */
+#define INJECTION_HAS_MORE (PM_CARRIES(PM_MEASURED) && PM_CARRIES(NEEDS_NEUTRAL | NEEDS_HALVES))
+#if INJECTION_HAS_MORE
+#define INJECTION_IF_MORE(...) __VA_ARGS__
+#else
+#define INJECTION_IF_MORE(...)
+#endif
+
 typedef struct {
     pm_ab_t i;           /* current at k */
     pm_dir_t dir;        /* direction of the present position theta(k) */
     pm_q_t omega;        /* present electrical speed */
     pm_half_dir_t ahead; /* half of the direction of the estimated frame where the voltage will act */
-#if PM_CARRIES(PM_MEASURED)
+#if INJECTION_HAS_MORE
     const obs_more_t *more;
 #endif
 } injection_in_t;
@@ -31,7 +39,7 @@ typedef struct {
     pm_ab_t split; /* added in the first half, up to the all-high zero vector, and taken away in the second:
                       the mean voltage is what it is without */
 #endif
-#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+#if PM_HAS(pwm_excitation)
     uint16_t sample_at[PM_SAMPLES]; /* as pm_instants_t; delivered at k+2 */
 #endif
 } excitation_t;
@@ -49,7 +57,7 @@ static inline excitation_t excitation_of(pm_ab_t v)
     e.split.alpha = 0;
     e.split.beta = 0;
 #endif
-#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+#if PM_HAS(pwm_excitation)
     for (uint32_t n = 0; n < PM_SAMPLES; n++) {
         e.sample_at[n] = 0;
     }

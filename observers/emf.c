@@ -61,10 +61,11 @@ void emf_reset(emf_t *self, const emf_config_t *config, const emf_machine_t *mac
     self->e = (pm_dq_t){.d = 0, .q = pm_shl(pm_sat(e, 27), 3)};
 }
 
-static inline void follow(emf_t *self, const emf_config_t *config, const obs_in_t *in, pm_ab_t pair,
-                          obs_out_t *out)
+void emf_frame_step(emf_t *self, const emf_config_t *config, const obs_in_t *in, obs_out_t *out)
 {
-    pm_dq_t e = pm_park_half(pair, in->dir);
+    pm_ab_t sum;
+    const pm_ab_t change = emf_change(self, in, &sum);
+    pm_dq_t e = pm_park_half(emf_pair(self, change), in->dir);
     e = emf_turned(self, (pm_dq_t){.d = pm_shl(pm_sat(e.d, 26), 3), .q = pm_shl(pm_sat(e.q, 26), 3)});
     e.d += pm_shl(pm_mulh(in->i_dq.q, self->cross), 4);
     e.q -= pm_shl(pm_mulh(in->i_dq.d, self->cross), 4);
@@ -72,19 +73,6 @@ static inline void follow(emf_t *self, const emf_config_t *config, const obs_in_
     e.q = pm_mulh_add(self->e.q, pm_sub_sat(e.q, self->e.q), config->k_filter);
     self->e = e;
     emf_describe(self, e, out);
-}
-
-void emf_frame_follow(emf_t *self, const emf_config_t *config, const obs_in_t *in, pm_ab_t pair,
-                      obs_out_t *out)
-{
-    follow(self, config, in, pair, out);
-}
-
-void emf_frame_step(emf_t *self, const emf_config_t *config, const obs_in_t *in, obs_out_t *out)
-{
-    pm_ab_t sum;
-    const pm_ab_t change = emf_change(self, in, &sum);
-    follow(self, config, in, emf_pair(self, change), out);
 }
 
 obs_out_t emf_last(const emf_t *self)

@@ -73,9 +73,6 @@ typedef struct {
 emf_machine_t emf_salient(const emf_config_t *config, const obs_in_t *in, pm_gain_t lag);
 
 void emf_reset(emf_t *self, const emf_config_t *config, const emf_machine_t *machine, const obs_in_t *in);
-/* Turned into the present frame and filtered there. */
-void emf_frame_follow(emf_t *self, const emf_config_t *config, const obs_in_t *in, pm_ab_t pair,
-                      obs_out_t *out); /* pair: 2 T e of the stationary frame, Q28, w T before k */
 void emf_frame_step(emf_t *self, const emf_config_t *config, const obs_in_t *in, obs_out_t *out);
 void emf_slow(emf_t *self, const emf_config_t *config, const emf_machine_t *machine, const obs_in_t *in,
               pm_q_t weight);

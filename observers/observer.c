@@ -23,9 +23,9 @@ void observer_reset(observer_t *self, const observer_config_t *config, const obs
     }
 }
 
-/* The one that observer_step() has compiled into its caller is not called here a second time. */
+/* Those that observer_step() has compiled into its caller are not called here a second time. */
 #define OTHER_STEP(name)                                                                                     \
-    if (OBSERVER_##name != OBSERVER_INLINE) {                                                                \
+    if (!OBSERVER_IS_NEAR(name)) {                                                                           \
         name##_step(&self->name, &config->name, in, out);                                                    \
     }
 

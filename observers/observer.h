@@ -37,6 +37,15 @@ typedef enum {
 } observer_id_t;
 
 #define OBSERVER_INLINE OBSERVER_active_flux /* the default costs no call */
+/* Those that observer_step() does not hand to observer_step_other(). */
+#define OBSERVER_IS_NEAR(name) (OBSERVER_##name == OBSERVER_INLINE || OBSERVER_##name == OBSERVER_zero_vector)
+/* How many others the image has; one that has active_flux alone takes an instruction more when told so. */
+enum {
+    OBSERVERS_OTHER = (PM_HAS(zero_vector) != 0 ? 0 : 1)
+#define PM_METHOD(name, help, traits, needs) PM_IN_IMAGE(name, +(OBSERVER_IS_NEAR(name) ? 0 : 1))
+#include "observers/observers.def"
+#undef PM_METHOD
+};
 
 typedef struct {
     observer_id_t id;
@@ -59,7 +68,7 @@ void observer_slow(observer_t *self, const observer_config_t *config, const obs_
                    const obs_out_t *out, pm_q_t weight);
 void observer_tie(observer_t *self, const observer_config_t *config);
 
-/* observer_step() of all but OBSERVER_INLINE. */
+/* observer_step() of all but the near ones. */
 void observer_step_other(observer_t *self, const observer_config_t *config, const obs_in_t *in,
                          obs_out_t *out);
 
@@ -68,7 +77,11 @@ static inline void observer_step(observer_t *self, const observer_config_t *conf
 {
     if (__builtin_expect(config->id == OBSERVER_INLINE, 1) != 0) {
         active_flux_step(&self->active_flux, &config->active_flux, in, out);
-    } else {
+#if PM_HAS(zero_vector) && PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    } else if (config->id == OBSERVER_zero_vector) { /* works in every second period */
+        zero_vector_step(&self->zero_vector, &config->zero_vector, in, out);
+#endif
+    } else if (OBSERVERS_OTHER != 0) {
         /* Only this path needs them in memory; copied by members, so that elsewhere they stay in registers. */
         const obs_in_t given = {{in->v.alpha, in->v.beta},  {in->i.alpha, in->i.beta},
                                 {in->dir.cos, in->dir.sin}, in->omega,
@@ -76,19 +89,11 @@ static inline void observer_step(observer_t *self, const observer_config_t *conf
         obs_out_t result;
         observer_step_other(self, config, &given, &result);
         *out = result;
+    } else {
+        const obs_out_t none = {0, 0, {0, 0}};
+        *out = none;
     }
 }
-
-#if PM_HAS(zero_vector)
-/* After a step: the instant of [k+1, k+2) at which the observer wants a further sample, as pm_instants_t; 0:
- * none. */
-static inline uint32_t observer_sample_at(const observer_t *self, const observer_config_t *config)
-{
-    return config->id == OBSERVER_zero_vector
-               ? zero_vector_sample_at(&self->zero_vector, &config->zero_vector)
-               : 0U;
-}
-#endif
 
 uint32_t observer_traits(observer_id_t id); /* SOURCE_... */
 

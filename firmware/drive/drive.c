@@ -138,13 +138,16 @@ static inline pm_abc_t currents(const drive_t *drive, const uint16_t code[DRIVE_
 #if PM_CARRIES(PM_MEASURED)
 static inline obs_more_t measure_more(drive_t *drive, const drive_in_t *in)
 {
+    (void)drive;
     obs_more_t more = {.codes = &in->more};
+#if PM_HAS(zero_vector)
+    more.v_dc = &drive->status.v_dc;
+#endif
 #if PM_CARRIES(NEEDS_NEUTRAL)
     more.v_zero = neutral_signal(&drive->neutral, &drive->config.neutral, in->more.v_neutral) -
                   neutral_star(&drive->neutral, &drive->config.neutral, drive->v_acting);
 #endif
-#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
-    more.v_dc = drive->status.v_dc;
+#if PM_HAS(pwm_excitation)
     for (uint32_t n = 0; n < PM_SAMPLES; n++) {
         if (pm_sampled(&in->more, n)) {
             more.i_sample[n] = pm_clarke(currents(drive, in->more.i_sample[n], drive->zero[2]));
@@ -287,9 +290,9 @@ static inline void excite(drive_t *drive, const excitation_t *carrier, drive_out
     modulator_split(&drive->modulator, &drive->config.modulator, carrier->split, drive->status.v_dc,
                     out->compare);
 #endif
-#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+#if PM_HAS(pwm_excitation)
     for (uint32_t n = 0; n < PM_SAMPLES; n++) {
-        out->instants.sample_at[n] = carrier->sample_at[n];
+        out->instants.sample_at[n] |= carrier->sample_at[n]; /* never both, config_position.c */
     }
 #endif
     (void)drive;
@@ -336,15 +339,12 @@ static inline void control(drive_t *drive, const position_out_t *frame, bool usu
                    &m);
     drive->v_next = m.v;
     write_out(&m, out);
+#if PM_HAS(zero_vector)
+    out->instants.sample_at[0] = drive->position.sample_at;
+#endif
     if (drive->carrier) {
         excite(drive, &frame->carrier, out);
     }
-#if PM_HAS(zero_vector)
-    const uint32_t at = observer_sample_at(&drive->position.observer, &c->position.observer);
-    if (at != 0U) {
-        out->instants.sample_at[0] = (uint16_t)at;
-    }
-#endif
 }
 
 void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)

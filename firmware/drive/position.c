@@ -34,11 +34,15 @@ void position_step(position_t *self, const position_config_t *config, const posi
     pm_dq_t i_dq;
     pm_q_t low_eps = 0;
     if (inject) {
-        const injection_in_t raw = {
-            .i = i, .dir = dir, .omega = pll.omega, .ahead = frame_ahead, PM_IF_MEASURED(.more = at->more)};
+        const injection_in_t raw = {.i = i,
+                                    .dir = dir,
+                                    .omega = pll.omega,
+                                    .ahead = frame_ahead,
+                                    INJECTION_IF_MORE(.more = at->more)};
         injection_out_t low;
         injection_step(&self->injection, &config->injection, &raw, &low);
-        i_dq = low.i;
+        i_dq.d = low.i.d; /* by members, so that it stays in registers */
+        i_dq.q = low.i.q;
         low_eps = low.eps;
         out->carrier = low.carrier;
     } else {
@@ -52,6 +56,11 @@ void position_step(position_t *self, const position_config_t *config, const posi
                          PM_IF_MEASURED(.more = at->more)};
     obs_out_t high;
     observer_step(&self->observer, &config->observer, &in, &high);
+#if PM_HAS(zero_vector)
+    if (config->observer.id == OBSERVER_zero_vector) {
+        self->sample_at = zero_vector_sample_at(&self->observer.zero_vector);
+    }
+#endif
     pm_q_t eps = high.eps;
     if (inject) {
         eps = low_eps + pm_mul(self->weight, eps - low_eps);

@@ -59,6 +59,9 @@ typedef struct {
 #if PM_HAS(carrier_rest)
     bool rests; /* standstill without carrier: the position stays as it is */
 #endif
+#if PM_HAS(zero_vector)
+    uint16_t sample_at; /* for the observer, as pm_instants_t; 0: none */
+#endif
     observer_t observer;
     injection_t injection; /* while `inject` */
 

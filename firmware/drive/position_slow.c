@@ -55,6 +55,9 @@ void position_change_observer(position_t *self, const position_config_t *config,
 {
     const obs_in_t in = {.i = i, .dir = pm_dir(self->pll.theta), .omega = self->pll.omega, .i_dq = i_dq};
     observer_reset(&self->observer, &config->observer, &in);
+#if PM_HAS(zero_vector)
+    self->sample_at = 0;
+#endif
 }
 
 void position_set_resistance(position_t *self, const position_config_t *config, pm_q_t R)

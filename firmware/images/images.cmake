@@ -43,17 +43,17 @@ set(PM_IMAGE_neutral_INTERRUPT_WORST 510)
 set(PM_IMAGE_neutral_DRIVE_STEP_FLUX 280)
 set(PM_IMAGE_neutral_DRIVE_STEP_INJECTION 322)
 
-# all carriers, the saliency map measured by the drive itself, one observer
+# all carriers, the saliency map measured by the drive itself, EMF within the zero vectors
 set(PM_IMAGE_salient_BOARD stm32g431)
 set(PM_IMAGE_salient_PROGRAM pmdrive_salient)
-set(PM_IMAGE_salient_METHODS synchronous_pi vector calibrate initial_pulses align identify four_pulses charge lock d_current secondary_current dual_pulses three_phase_hf saliency_map torque_polarity stored_eds second_harmonic pulse_choice counted_carrier carrier_rest load_current injection_stages active_flux pulsating_square rotating_sine inform pulsating_sine stationary_sine stationary_square random_square)
+set(PM_IMAGE_salient_METHODS synchronous_pi vector calibrate initial_pulses align identify four_pulses charge lock d_current secondary_current dual_pulses three_phase_hf saliency_map torque_polarity stored_eds second_harmonic pulse_choice counted_carrier carrier_rest load_current injection_stages active_flux zero_vector pulsating_square rotating_sine inform pulsating_sine stationary_sine stationary_square random_square)
 set(PM_IMAGE_salient_IN_FLASH fault_short_stage fault_short_step procedure_identify_step procedure_saliency_map_step pulses_step pulses_add pulses_saliency procedure_four_pulses_step dual_pulses_step three_phase_hf_step injection_step_other regulator_step_other)
 set(PM_IMAGE_salient_FLASH 112640)
 set(PM_IMAGE_salient_RAM 20480)
-set(PM_IMAGE_salient_STACK 2432)
+set(PM_IMAGE_salient_STACK 2448)
 set(PM_IMAGE_salient_CCM 10240)
-set(PM_IMAGE_salient_INTERRUPT_MEAN 450)
-set(PM_IMAGE_salient_INTERRUPT_WORST 520)
+set(PM_IMAGE_salient_INTERRUPT_MEAN 475)
+set(PM_IMAGE_salient_INTERRUPT_WORST 540)
 set(PM_IMAGE_salient_DRIVE_STEP_FLUX 270)
 set(PM_IMAGE_salient_DRIVE_STEP_INJECTION 352)
 

@@ -25,9 +25,11 @@ enum {
  * row of a list needs; whether it was measured at all, `codes` says. */
 typedef struct {
     const pm_measure_t *codes; /* full scales are those of the channel */
-#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+#if PM_HAS(pwm_excitation)
     pm_ab_t i_sample[PM_SAMPLES]; /* per-unit; where codes->sampled says so */
-    pm_q_t v_dc;                  /* at k, per-unit */
+#endif
+#if PM_HAS(zero_vector)
+    const pm_q_t *v_dc; /* at k, per-unit */
 #endif
 #if PM_CARRIES(NEEDS_NEUTRAL)
     pm_q_t

@@ -295,13 +295,14 @@ void hal_bridge_write(hal_t *hal, const drive_out_t *out)
     TIM1.CCR2 = on_time(out, 1);
     TIM1.CCR3 = on_time(out, 2);
     port_hal.legs = enables_of(out->legs);
-#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
-    write_instants(&out->instants);
-#endif
     if (out->trip != 0U) {
         TIM1.BDTR = port_hal.bridge;
         port_hal.legs = 0U;
     }
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    /* last: with little ahead of it, the compiler takes the branch out of the usual path */
+    write_instants(&out->instants);
+#endif
 }
 #endif
 

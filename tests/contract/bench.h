@@ -54,6 +54,18 @@ inline pm_ab_t ab(Complex x)
     return {fixed(x.real(), PM_Q_BITS), fixed(x.imag(), PM_Q_BITS)};
 }
 
+// A further sample, as a converter of 16 bits gives it.
+inline void give_sample(pm_measure_t *measured, unsigned n, pm_ab_t i)
+{
+    const double a = std::ldexp(i.alpha, -PM_Q_BITS), b = std::ldexp(i.beta, -PM_Q_BITS) * std::sqrt(3.0);
+    const double phase[PM_LEGS] = {a, (b - a) / 2, (-b - a) / 2};
+    for (int leg = 0; leg < PM_LEGS; ++leg) {
+        const double code = std::round(32768 * (1 + phase[leg]));
+        measured->i_sample[n][leg] = static_cast<uint16_t>(std::fmin(std::fmax(code, 0), UINT16_MAX));
+    }
+    measured->sampled = static_cast<uint16_t>(measured->sampled | 1U << n);
+}
+
 inline pm_dq_t dq(Complex x)
 {
     return {fixed(x.real(), PM_Q_BITS), fixed(x.imag(), PM_Q_BITS)};

@@ -98,6 +98,10 @@ PM_APART pm_procedure_t procedure_secondary_current_slow(drive_t *drive)
         self->theta = drive->position.pll.theta;
         return PM_RUNNING;
     }
+    if (self->x.count >= self->wanted) {
+        return judge(
+            drive); /* a millisecond behind the last block: with that it does not fit in a period of 20 kHz */
+    }
     if ((self->ms - LOCK_MS) % drive->config.polarity.block_ms != 0U) {
         return PM_RUNNING;
     }
@@ -106,7 +110,7 @@ PM_APART pm_procedure_t procedure_secondary_current_slow(drive_t *drive)
     polarity_add(&self->x, second.d);
     polarity_add(&self->beside, second.q);
     polarity_add(&self->v, pm_narrow(drive->voltage.v.d));
-    return self->x.count < self->wanted ? PM_RUNNING : judge(drive);
+    return PM_RUNNING;
 }
 
 void procedure_secondary_current_abort(drive_t *drive)

@@ -30,11 +30,17 @@ static bench_t bench;
 #include "observers/observers.def"
 #undef PM_METHOD
 
+static uint16_t code(pm_q_t i)
+{
+    return (uint16_t)(32768 + i / (PM_ONE / 32768));
+}
+
 static void period(observer_id_t id, pm_ab_t v, pm_ab_t i)
 {
-    static const pm_measure_t codes = {.sampled = 1};
-    const obs_more_t more = {
-        .codes = &codes, .i_sample = {{i.alpha, i.beta}}, .v_dc = PM_Q(0.667), .v_zero = PM_Q(0.003)};
+    const pm_q_t v_dc = PM_Q(0.667);
+    const pm_abc_t phase = pm_clarke_inverse(i);
+    const pm_measure_t codes = {.sampled = 1, .i_sample = {{code(phase.a), code(phase.b), code(phase.c)}}};
+    const obs_more_t more = {.codes = &codes, .v_dc = &v_dc, .v_zero = PM_Q(0.003)};
     const pm_dir_t dir = pm_dir(bench.pll.theta);
     bench.in = (obs_in_t){
         .v = v, .i = i, .dir = dir, .omega = bench.pll.omega, .i_dq = pm_park(i, dir), .more = &more};

@@ -80,7 +80,7 @@ class Run
         codes.sampled = sampled && given.size() > 1 && given[given.size() - 2].sample_at[0] != 0 ? 1 : 0;
         const obs_more_t more = {&codes,
                                  {bench::ab(between_ / kBase.i_A), {0, 0}},
-                                 PM_ONE,
+                                 nullptr,
                                  bench::fixed(v_zero_V_ / kBase.v_V, 28)};
         injection_in_t in = {};
         in.more = &more;

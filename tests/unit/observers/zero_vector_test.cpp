@@ -94,16 +94,16 @@ class Bench
         pm_measure_t codes = {};
         obs_more_t more = {};
         more.codes = &codes;
-        more.v_dc = fixed(v_dc / kB.v_V, 28);
+        const pm_q_t link = fixed(v_dc / kB.v_V, 28);
+        more.v_dc = &link;
         if (asked_[1] != 0) {
-            codes.sampled = 1;
-            more.i_sample[0] = bench::ab((sample(asked_[1]) + noise()) / kB.i_A);
+            bench::give_sample(&codes, 0, bench::ab((sample(asked_[1]) + noise()) / kB.i_A));
         }
         obs_in_t in = seen();
         in.more = &more;
         observer_step(&state, &c, &in, &out);
         asked_[1] = asked_[0];
-        asked_[0] = observer_sample_at(&state, &c);
+        asked_[0] = zero_vector_sample_at(&state.zero_vector);
         if (++periods_ % 10 == 0) {
             observer_slow(&state, &c, &in, &out, weight);
         }
@@ -318,7 +318,8 @@ TEST(ZeroVector, WithoutSamplesThereIsNoErrorSignal)
     pm_measure_t codes = {};
     obs_more_t more = {};
     more.codes = &codes;
-    more.v_dc = fixed(0.6, 28);
+    const pm_q_t link = fixed(0.6, 28);
+    more.v_dc = &link;
     b.settled_deg(100);
     obs_in_t in = {};
     in.dir = bench::direction(0);
