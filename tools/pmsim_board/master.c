@@ -95,6 +95,7 @@ static void send_targets(master_t *master, const drive_command_t *command, int c
     (void)board_can_send(master->board, &frame);
 }
 
+#if PM_HAS(six_step)
 /* Mapped when it is first asked for: an image without block commutation has no such object. */
 static void send_duty(master_t *master, const drive_command_t *command)
 {
@@ -111,6 +112,7 @@ static void send_duty(master_t *master, const drive_command_t *command)
     put_number(&frame.data[0], 2, (int32_t)lround(1e-2 * command->duty_ppm));
     (void)board_can_send(master->board, &frame);
 }
+#endif
 
 master_t master_make(board_t *board, const drive_params_t *params)
 {
@@ -133,7 +135,7 @@ void master_send(master_t *master, const drive_command_t *command)
     const bool starts = command->enable && !master->enabled;
     const int now = master->enabled ? ENABLE_OPERATION : SWITCH_ON;
     send_targets(master, command, command->enable ? now : SWITCH_ON);
-    send_duty(master, command);
+    PM_IN_IMAGE(six_step, send_duty(master, command);)
     if (starts) {
         send_routines(master, command);
         send_control(master, command, SHUTDOWN);
