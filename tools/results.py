@@ -46,6 +46,15 @@ and with the median of the seeds.
 """
 
 
+def steps_of(page, column):
+    """Instructions of drive_step() at high speed and with injection, of one column of the page's table."""
+    lines = page.splitlines()
+    rows = [n for n, line in enumerate(lines) if re.match(r"\| (active flux, high speed|square-wave injection) \|", line)][:2]
+    head = max(n for n in range(rows[0]) if column in lines[n])
+    at = [cell.strip() for cell in lines[head].split("|")].index(column)
+    return [lines[n].split("|")[at].strip() for n in rows]
+
+
 def names():
     return sorted(path.stem for path in SCENARIOS.glob("*.yaml"))
 
@@ -170,7 +179,7 @@ def readme(record):
     starts, steady, effects = "ipm_start_grid", "ipm_steady_grid", "ipm_all_effects"
     count = record[starts]["runs"]
     wrong = [item for item in record[starts]["expectations"] if not item["pass"]]
-    steps = re.findall(r"\| (?:active flux, high speed|square-wave injection) \| (\d+) ", (ROOT / PERFORMANCE).read_text())[:2]
+    steps = steps_of((ROOT / PERFORMANCE).read_text(), "`foc`, mean")
 
     def mean_and_largest(name):
         return (f"mean position error ≤ {up(worst(record, [name], 'angle_error_mean_deg'))}°, "
