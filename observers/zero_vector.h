@@ -95,15 +95,15 @@ static inline void zero_vector_step(zero_vector_t *self, const zero_vector_confi
 {
     (void)config;
     const pm_measure_t *codes = in->more->codes;
-    const pm_q_t square = pm_mulh_add(pm_mulh(in->v.alpha, in->v.alpha), in->v.beta, in->v.beta);
+    const pm_q_t v_squared = pm_mulh_add(pm_mulh(in->v.alpha, in->v.alpha), in->v.beta, in->v.beta);
     if (self->behind) {
-        self->eps = zero_vector_pair(self, codes, square);
+        self->eps = zero_vector_pair(self, codes, v_squared);
         self->behind = false;
     } else {
         self->emf.i = zero_vector_codes(codes);
         self->dir = in->dir;
         self->i_dq = in->i_dq;
-        self->ahead = square;
+        self->ahead = v_squared;
         self->v_dc = *in->more->v_dc;
         self->held = codes->sampled;
         self->behind = true;

@@ -186,7 +186,7 @@ void open_loop_hold(drive_t *drive)
     damp(drive);
 }
 
-static pm_q_t most(const drive_config_t *c)
+static pm_q_t most_imposed(const drive_config_t *c)
 {
 #if PM_HAS(load_current)
     return c->open_loop.i_most;
@@ -206,7 +206,7 @@ static void try_again(drive_t *drive)
         return;
     }
     drive->tried = true;
-    drive->i_vector = most(&drive->config);
+    drive->i_vector = most_imposed(&drive->config);
     drive->omega_ramp = 0;
     drive->rest_ms = REST_MS;
     drive->wait_ms = 0;
@@ -231,7 +231,7 @@ static void watch(drive_t *drive)
     }
     const int32_t load = PM_HAS(load_current) ? follow_load(&drive->follow) : 0;
     if (load > 0) {
-        drive->i_vector = pm_min(drive->i_vector + c->open_loop.i_slope, most(c));
+        drive->i_vector = pm_min(drive->i_vector + c->open_loop.i_slope, most_imposed(c));
     } else if (load < 0) {
         drive->i_vector = pm_max(drive->i_vector - c->open_loop.i_slope / 8, c->open_loop.i);
     } else {

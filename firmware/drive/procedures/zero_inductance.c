@@ -158,12 +158,12 @@ static void find_fall(drive_t *drive)
     }
 }
 
-static pm_dq_t sum(pm_dq_t x, pm_dq_t y)
+static pm_dq_t sum_of(pm_dq_t x, pm_dq_t y)
 {
     return (pm_dq_t){x.d + y.d, x.q + y.q};
 }
 
-static pm_dq_t difference(pm_dq_t x, pm_dq_t y)
+static pm_dq_t difference_of(pm_dq_t x, pm_dq_t y)
 {
     return (pm_dq_t){x.d - y.d, x.q - y.q};
 }
@@ -188,13 +188,13 @@ static void find_star(drive_t *drive)
     const pm_machine_t *m = &drive->config.machine;
     const pm_q_t rho = pm_mul(m->R_s, drive->config.zero_inductance.rho);
     const zero_sums_t *x = self->at;
-    const pm_dq_t a = difference(x[0].a, x[1].a);
-    const pm_dq_t b = difference(x[0].b, x[1].b);
-    const pm_dq_t both = linkage(drive, sum(x[0].y, x[1].y));
+    const pm_dq_t a = difference_of(x[0].a, x[1].a);
+    const pm_dq_t b = difference_of(x[0].b, x[1].b);
+    const pm_dq_t both = linkage(drive, sum_of(x[0].y, x[1].y));
     const pm_dq_t w = {both.d - pm_mul(r->dL_0, a.d) - pm_mul(r->L_c0, b.d),
                        both.q - pm_mul(r->dL_0, a.q) - pm_mul(r->L_c0, b.q)};
-    const pm_dq_t p = sum(flux(m->L_d, rho, x[0].a), flux(m->L_q, rho, x[1].a));
-    const pm_dq_t q = sum(flux(m->L_q, rho, x[0].b), flux(m->L_d, rho, x[1].b));
+    const pm_dq_t p = sum_of(flux(m->L_d, rho, x[0].a), flux(m->L_q, rho, x[1].a));
+    const pm_dq_t q = sum_of(flux(m->L_q, rho, x[0].b), flux(m->L_d, rho, x[1].b));
     r->star.alpha = -share(cross(w, q), cross(p, q)) / 2;
     r->star.beta = -share(cross(p, w), cross(p, q)) / 2;
 }
@@ -203,9 +203,9 @@ static pm_procedure_t conclude(drive_t *drive)
 {
     const zero_inductance_t *self = &drive->procedure.zero_inductance;
     zero_inductance_result_t *r = &drive->zero_inductance;
-    const pm_dq_t a = sum(self->at[0].a, self->at[1].a);
-    const pm_dq_t b = sum(self->at[0].b, self->at[1].b);
-    const pm_dq_t w = linkage(drive, difference(self->at[0].y, self->at[1].y));
+    const pm_dq_t a = sum_of(self->at[0].a, self->at[1].a);
+    const pm_dq_t b = sum_of(self->at[0].b, self->at[1].b);
+    const pm_dq_t w = linkage(drive, difference_of(self->at[0].y, self->at[1].y));
     const int64_t both = cross(a, b);
     if (pm_abs(a.d) + pm_abs(a.q) < drive->config.i_max / 8) { /* of 64 halves */
         return PM_FAILED_NO_CURRENT;
