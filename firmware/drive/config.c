@@ -86,7 +86,7 @@ static void make_open_loop(maker_t *m, open_loop_config_t *c)
 }
 
 #if PM_HAS(load_current)
-/* psi_m = 9/4 (L_q - L_d) i */
+/* i_most, and i_open_loop no larger: config.h */
 static void limit_imposed(drive_config_t *config)
 {
     open_loop_config_t *c = &config->open_loop;

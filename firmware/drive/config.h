@@ -56,8 +56,10 @@ typedef struct {
 /* Align and open-loop start, current mode. */
 typedef struct {
     pm_q_t i; /* current amplitude */
-    /* That the load may ask for: psi_m = 9/4 (L_q - L_d) i, at most i_max. From 2 on the observers lose the active flux
-     * of a rotor on the vector, psi_m - (L_q - L_d) i, and no hand-over takes place. */
+    /* That the load may ask for, at most i_max:
+     *   psi_m = 9/4 (L_q - L_d) i
+     * With 2 in place of 9/4 half of the active flux of a rotor on the vector, psi_m - (L_q - L_d) i, would be left, and no
+     * hand-over would take place. */
     PM_IN_IMAGE(load_current, pm_q_t i_most;)
     pm_q_t i_slope;    /* per ms */
     pm_q_t slope;      /* of the speed, per ms */

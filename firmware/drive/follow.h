@@ -5,8 +5,9 @@
  *   across = v_q - omega (L_d + L_q) / 2 i = omega (psi_m cos(delta) - (L_q - L_d) / 2 i cos(2 delta))
  * and one that stands shows neither, but for what saliency makes of a vector that passes it, omega (L_q - L_d) / 2 i, which
  * changes its sign with each quarter turn and so does not last. The rotor follows where `across` in the direction of rotation, or
- * `along` either way, is more than half of what one without a load shows, e = omega (psi_m - (L_q - L_d) i / 2), at least
- * omega psi_m / 2.
+ * `along` either way, is more than half of what one without a load shows,
+ *   e = omega (psi_m - (L_q - L_d) i / 2)
+ * which counts as omega psi_m / 2 at least.
  *
  * R is what v_d / i was while rotor and vector were at rest at the end of the align: in it are the temperature and what dead
  * time and drops lose along the vector, which is the same when it turns, within R_s / 2 and v_dc / 64. Nothing is said where

@@ -9,7 +9,8 @@
  *
  * Resistors that are not equal make S a mean of the terminals with weights 1/3 + e_k, sum of e_k = 0, which has a part of the
  * voltage u of the legs in it (E12; 1 % of a resistor is 0.3 % of u, where the carrier's answer is of the same size):
- *   v_S = mean + star_alpha u_alpha + star_beta u_beta,   star = sum of e_k e^{j gamma_k}, gamma_k = 0, 120, 240 degrees
+ *   v_S = mean + star_alpha u_alpha + star_beta u_beta
+ *   star_alpha + j star_beta = sum of e_k e^{j gamma_k},   gamma_k = 0, 120, 240 degrees
  * neutral_star() is that part behind the RC, with u over [k-1, k) and a = e^{-T_s / RC}
  *   s_k = a s_k-1 + (1 - a) (star_alpha u_alpha + star_beta u_beta)
  * and is taken off where field-oriented control runs. procedures/zero_inductance.h measures the two.

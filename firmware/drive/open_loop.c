@@ -195,7 +195,7 @@ static pm_q_t most_imposed(const drive_config_t *c)
 #endif
 }
 
-/* Once more from standstill, with all the current there is. A vector that the user gave, or that a rotor had followed, is not
+/* Once more from standstill, with the most current that saliency lets it. A vector that the user gave, or that a rotor had followed, is not
  * tried again. */
 static void try_again(drive_t *drive)
 {

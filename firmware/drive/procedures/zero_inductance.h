@@ -6,21 +6,32 @@
  * to theta = 0. There a carrier V_h e^{j phi} of f_pwm / 20 turns, first with I, then without a current; friction keeps the
  * rotor. Of a whole period of the carrier, with the complex amplitudes I_a, I_b of the currents and Y of the channel, and
  * [A, B] = Im(A* B):
- *   v_0 = p psi_0,  psi_0 = -1/2 Re[c i e^{j 2 theta}],  c = dL_0 - j L_c0          zero_sequence.h
- *   dL_0 I_a + L_c0 I_b = W = -K Y,   K = 2 T_s (1 - a q) / ((1 - a)(1 - q)),   a = e^{-T_s / RC},  q = e^{-j 2 pi / 20}
+ *   v_0 = p psi_0                                                                     zero_sequence.h
+ *   psi_0 = -1/2 Re[c i e^{j 2 theta}]
+ *   c = dL_0 - j L_c0
+ *   a = e^{-T_s / RC}
+ *   q = e^{-j 2 pi / 20}
+ *   K = 2 T_s (1 - a q) / ((1 - a)(1 - q))
+ *   W = -K Y = dL_0 I_a + L_c0 I_b
  *   dL_0 = [W, I_b] / [I_a, I_b]
  *   L_c0 = [I_a, W] / [I_a, I_b]
  * of the means without current over 32 values. K takes off the filter, and the differences that make a voltage of a
  * current; dead time, resistance and delay are in both and drop out. A rotor that friction keeps delta beside phase A turns
  * c by 2 delta.
- * The same after the current has turned the rotor by a quarter, where e^{j 2 theta} = -1: there the winding's answer has the other sign, and what unlike
- * resistors make of the carrier has not. Both positions by 0 and 1:
- *   W = W_0 - W_1,  I_a = I_a0 + I_a1,  I_b = I_b0 + I_b1                              in the equations above
- *   star_alpha P + star_beta Q = -[W_0 + W_1 - dL_0 (I_a0 - I_a1) - L_c0 (I_b0 - I_b1)] / 2
- *   P = (L_d - j rho) I_a0 + (L_q - j rho) I_a1,  Q = (L_q - j rho) I_b0 + (L_d - j rho) I_b1
+ *
+ * Then the current turns the rotor by a quarter, where e^{j 2 theta} = -1: the winding's answer has the other sign there, and what
+ * unlike resistors of the star make of the carrier has the same. With 0 and 1 for the two positions, in the equations above
+ *   W = W_0 - W_1
+ *   I_a = I_a0 + I_a1
+ *   I_b = I_b0 + I_b1
+ * and for the star (neutral.h)
  *   rho = R_s T_s / (2 tan(pi / 20))
- * P and Q are the voltage at the winding, by its current: dead time turns that of the bridge by up to 9 degrees from the one
- * commanded. R_s, L_d and L_q must be known, as well as the star's error shall be.
+ *   P = (L_d - j rho) I_a0 + (L_q - j rho) I_a1
+ *   Q = (L_q - j rho) I_b0 + (L_d - j rho) I_b1
+ *   star_alpha P + star_beta Q = -[W_0 + W_1 - dL_0 (I_a0 - I_a1) - L_c0 (I_b0 - I_b1)] / 2
+ * P and Q stand for the voltage at the winding, by its current: dead time turns it by up to 9 degrees from the one commanded. What
+ * is found of the star is as exact as R_s, L_d and L_q. Friction that keeps the rotor delta beside the current adds 2 delta dL_0.
+ *
  *   S = |Y| |I_a| / Re I_a
  *   D = S with I - S without
  *   margin = (|D| - S / 64) / sigma                                                   polarity.h
@@ -29,9 +40,11 @@
  * zero_falls 1, with magnetising current; D > 0: 0. Below, the machine does not saturate: margin 0, and the start cannot tell
  * the poles by it (d_current.h).
  *
- * The rotor must be free and without load; it turns by up to half a turn and a quarter, electrical. 5 s. Each period 170 instructions.
+ * The rotor must be free and without load; it turns by up to half a turn and a quarter, electrical. 5 s. Each
+ * period 170 instructions.
  * The bridge is driven without dead-time compensation (commissioning.h). PM_FAILED_NO_CURRENT: a current does not come, or
- * the carrier has no answer in the currents; PM_FAILED_SALIENCY: none at the neutral, below 1/4000 of the inductance, which leaves the star unknown, too.
+ * the carrier has no answer in the currents; PM_FAILED_SALIENCY: none at the neutral, below 1/4000 of the inductance, which
+ * leaves the star unknown, too.
  * Tests: tests/unit/drive/zero_inductance_test.cpp. */
 #ifndef DRIVE_PROCEDURES_ZERO_INDUCTANCE_H
 #define DRIVE_PROCEDURES_ZERO_INDUCTANCE_H
