@@ -35,7 +35,6 @@ void open_loop_start(drive_t *drive)
     drive->omega_open = 0;
     drive->i_open = 0;
     drive->i_vector = drive->config.open_loop.i;
-    follow_reset(&drive->follow, &drive->config.machine);
     position_reset(&drive->position, &drive->config.position, 0, drive->i_ab, false);
     regulator_reset(&drive->regulator, &drive->config.regulator, (pm_dq_t){0, 0}, (pm_dq_t){0, 0}, 0);
 }

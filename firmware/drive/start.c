@@ -47,6 +47,7 @@ void start_begin(drive_t *drive)
     drive->sequence = (sequence_t){.id = id, .begins = true};
     drive->status.refusal = (drive_refusal_t){0};
     drive->round = false;
+    follow_reset(&drive->follow, &drive->config.machine);
 }
 
 /* The rotor stands at theta: injection takes over. */
@@ -77,8 +78,9 @@ PM_RARE static void go_on(drive_t *drive)
 #endif
 
 #if PM_HAS(flying_start)
-/* Where the link has less than the EMF, the current that weakens the field is wanted at once; any other comes little by
- * little. At a speed where neither source sees the rotor it is held by a vector along its d-axis. */
+/* The current along d is wanted at once, since dead time shows most where the legs' currents are about zero, as far as its flux,
+ * of which an observer takes for an angle what L_q is not known to, is small beside psi_m; where the link has less than the EMF,
+ * the one that weakens the field. At a speed where neither source sees the rotor it is held by a vector along its d-axis. */
 PM_RARE static void begin_caught(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
@@ -99,7 +101,8 @@ PM_RARE static void begin_caught(drive_t *drive)
     drive->theta_open = caught.theta;
     drive->omega_ramp = caught.omega;
     drive->omega_open = caught.omega;
-    drive->i_open = imposed ? 0 : pm_mul(c->i_d_light, drive->position.weight);
+    const pm_q_t light = pm_mul(c->i_d_light, drive->position.weight);
+    drive->i_open = imposed ? 0 : pm_max(light - pm_div(c->machine.psi_m / 16, c->machine.L_q), 0);
     drive->stage = imposed ? STAGE_OPEN_LOOP : STAGE_VECTOR;
     drive->state = DRIVE_RUNNING;
     drive->state_ms = 0;

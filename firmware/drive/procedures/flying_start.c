@@ -14,9 +14,8 @@
 #define QUIET 2U
 /* From then on, after a pulse, what is left may be the ringing of the open legs with the winding, which does not end. */
 #define RINGS (SEEN + 4U)
-/* Times its noise: a current of a leg that is there, and one that has an angle, of 3 degrees rms. */
+/* Times its noise: a current of a leg that is there. */
 #define THERE 6
-#define LEAST 20
 
 /* Periods of a pulse. */
 static uint32_t periods_of(uint32_t length)
@@ -69,7 +68,8 @@ static void after_pulse(flying_start_t *self, const flying_start_config_t *c)
 /* What devices and noise leave of it has no angle. */
 static bool is_large(const flying_start_t *self, const flying_start_config_t *c, pm_q_t i)
 {
-    return i >= LEAST * c->noise && i / 3 >= times(c->drop, seen_of(self->length));
+    const pm_q_t drop = times(c->drop, seen_of(self->length));
+    return i >= FLYING_START_LEAST * c->noise && i >= drop + drop / 2;
 }
 
 static pm_procedure_t keep(flying_start_t *self, const flying_start_config_t *c, pm_abc_t i, uint16_t period)

@@ -10,10 +10,11 @@
  *
  * The first pulse is a period long; on boards that have PWM on one switch and different halves of a period, a 64th of one,
  * at its end. A pulse twice or four times as long follows while it cannot carry more than about 40 % of rated current, is not
- * longer than 3.2 ms, and the rotor does not turn by more than 0.2 rad meanwhile: then an error of L_q / L_d costs little.
+ * longer than 3.2 ms, and the rotor does not turn by more than 0.2 rad meanwhile: then an error of L_q / L_d costs little. What
+ * has no angle yet is not enough.
  * Five of the length that is left, at distances that double, give the speed: each tells how many turns lie before the next.
  *   w = (angle of i_n - angle of i_0) / (t_n - t_0)
- * At rest (PM_FAILED_NOT_TURNING): currents below twenty times their noise or three times i_drop, or a turn that noise could
+ * At rest (PM_FAILED_NOT_TURNING): currents below twenty times their noise or one and a half i_drop, or a turn that noise could
  * make, 0.16 |i| |turn in rad| below 1.5 times the noise of a current. A 12-bit converter of 2.5 times rated current sees 5 to
  * 10 % of rated speed, and less where L is small.
  *
@@ -40,6 +41,7 @@ extern "C" {
 
 #define FLYING_START_PULSES 5
 #define FLYING_START_PARTS  32 /* of a period */
+#define FLYING_START_LEAST  20 /* times its noise: a current that has an angle, of 3 degrees rms */
 
 typedef struct {
     bool on;

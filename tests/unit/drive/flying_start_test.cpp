@@ -383,6 +383,39 @@ TEST(FlyingStart, BrakesToAStandstill)
     }
 }
 
+// A vector that takes over at low speed knows of R what the drive was told: there was no align.
+TEST(FlyingStart, AnImposedVectorBehindItKnowsR)
+{
+    drive_params_t p = spm_params();
+    p.L_d = p.L_q;
+    p.L_dh_rated = p.L_qh_rated;
+    Catch x(spm(), p, 0.8 * 41.888, 0, DRIVE_MODE_SPEED);
+    x.look();
+    ASSERT_EQ(x.drive().stage, STAGE_VECTOR);
+    EXPECT_EQ(x.drive().follow.R, x.drive().config.machine.R_s);
+    EXPECT_EQ(x.drive().follow.R_doubt, x.drive().config.machine.R_s / 4);
+    plant_free_speed(x.plant());
+    x.run_ms(3000);
+    EXPECT_EQ(drive_status(&x.drive())->fault, DRIVE_FAULT_NONE);
+    EXPECT_EQ(x.drive().stage, STAGE_OPEN_LOOP);
+    EXPECT_LE(std::abs(x.truth().omega_mech_rad_s), 0.01 * 41.888);
+}
+
+// The current along d is there at once, as far as its flux is small beside that of the magnets.
+TEST(FlyingStart, TheCurrentOfALightLoadFlowsAtOnce)
+{
+    for (const int32_t part : {2, 40}) {
+        drive_params_t p = spm_params();
+        p.i_d_light = p.i_rated / 10 * part / 40;
+        Catch x(spm(), p, 0.8 * 41.888);
+        x.look();
+        const drive_config_t &c = x.drive().config;
+        const double most = bench::real(c.machine.psi_m) / 16 / bench::real(c.machine.L_q);
+        const double light = bench::real(c.i_d_light);
+        EXPECT_NEAR(bench::real(x.drive().i_open), std::max(light - most, 0.0), 1e-4) << part;
+    }
+}
+
 // An EMF beyond 95 % of the link's is weakened at once.
 TEST(FlyingStart, AnEmfAtTheEndOfTheLinkIsWeakened)
 {
