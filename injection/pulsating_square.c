@@ -3,11 +3,16 @@
 #include "firmware/math/pair.h"
 #include "injection/carrier.h"
 
+static int32_t whole_carrier(const pulsating_square_config_t *config)
+{
+    return pm_shl(config->v_h, 30 - PM_Q_BITS);
+}
+
 void pulsating_square_reset(pulsating_square_t *self, const pulsating_square_config_t *config,
                             const obs_in_t *in)
 {
     *self = (pulsating_square_t){.i = in->i,
-                                 .carrier = -pm_shl(config->v_h, 30 - PM_Q_BITS),
+                                 .carrier = -whole_carrier(config) / 2,
                                  .gain = config->saliency.gain_0,
                                  .h = {.d = -config->h_d, .q = 0}}; /* as seen with that sign */
 }
@@ -21,6 +26,9 @@ void pulsating_square_slow(pulsating_square_t *self, const pulsating_square_conf
     const int32_t gain = saliency_gain(&config->saliency, i_q);
     self->lambda = pm_shl(pm_sat(lambda, PM_Q_BITS), 3);
     self->gain = self->carrier > 0 ? -gain : gain;
+    const int32_t v = whole_carrier(config);
+    const int32_t size = pm_min(pm_abs(self->carrier) + v / 4, v);
+    self->carrier = self->carrier < 0 ? -size : size;
 }
 
 void pulsating_square_step(pulsating_square_t *self, const pulsating_square_config_t *config,

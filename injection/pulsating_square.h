@@ -13,6 +13,8 @@
  * Without it the position lags by L_q / (L_q - L_d) times as much.
  *
  * eps is exact for small e and 1/2 sin 2e beyond: stable at 0 and 180 degrees, so the polarity must be known.
+ * It begins with half of V_h and has all of it after two calls of pulsating_square_slow(), a quarter more each: a whole half-wave
+ * from zero would leave a mean current of half the ripple, a peak twice as high; this leaves one of a quarter more.
  * Commanded at k, a voltage is seen at k+2. So the first three steps after a reset show only noise in eps, and
  * the fourth shows half of the error.
  * misfit: distance of h_d from its value without load, relative. The fundamental current is the mean of two
@@ -40,7 +42,7 @@ typedef struct {
 typedef struct {
     pm_ab_t i;          /* current at k-1 */
     pm_dq_t half_delta; /* half of the change over the last period */
-    int32_t carrier;    /* commanded in the last period: +-v_h, Q30 */
+    int32_t carrier;    /* commanded in the last period: +-v_h, less at first, Q30 */
     int32_t gain;       /* at the present current, Q20, with the sign of the answer that comes next */
     pm_unit_t lambda;   /* at the present current and speed */
     pm_dq_t h;          /* of the last step, either sign */

@@ -240,10 +240,10 @@ void position_slow(position_t *self, const position_config_t *config, pm_ab_t i,
 #if PM_CARRIES(NEEDS_NEUTRAL)
     set_shown(self, seen.vector);
 #endif
-    set_weight(self, config, &in);
-    if (self->inject) {
+    if (self->inject) { /* not yet in the millisecond in which it begins */
         injection_slow(&self->injection, &config->injection, &in);
     }
+    set_weight(self, config, &in);
     self->gains.kp_turn = blend(config->pll_low.kp_turn, config->pll_high.kp_turn, self->weight);
     self->gains.ki = blend(config->pll_low.ki, config->pll_high.ki, self->weight);
     loop_slow(&self->loop, &config->loop, self->weight);

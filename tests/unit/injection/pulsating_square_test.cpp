@@ -83,6 +83,8 @@ class Carrier
         obs_in_t in = {};
         in.i = measured();
         pulsating_square_reset(&self, &c_, &in);
+        pulsating_square_slow(&self, &c_, &in);
+        pulsating_square_slow(&self, &c_, &in); // the whole amplitude
     }
 
     // Sample k: demodulation, and the voltage for [k+1, k+2), in the frame of its middle; 1 kHz every tenth.
@@ -283,11 +285,17 @@ TEST(PulsatingSquare, VoltageAlternatesAlongD)
     in.ahead = {fixed(std::cos(ahead), 30), fixed(std::sin(ahead), 30)};
     pulsating_square_t self;
     pulsating_square_reset(&self, &c, &none);
-    for (int k = 0; k < 10; ++k) {
+    // half of the amplitude in the first millisecond, three quarters in the second
+    const double share[] = {0.5, 0.75, 1, 1};
+    for (int k = 0; k < 40; ++k) {
+        if (k > 0 && k % 10 == 0) {
+            pulsating_square_slow(&self, &c, &none);
+        }
         injection_out_t out;
         pulsating_square_step(&self, &c, &in, &out);
         const Complex v = bench::complex(out.carrier.v) * kBase.v_V * std::polar(1.0, -ahead);
-        EXPECT_NEAR(v.real(), k % 2 == 0 ? kCarrier_V : -kCarrier_V, 1e-5) << k;
+        const double expected = share[k / 10] * kCarrier_V;
+        EXPECT_NEAR(v.real(), k % 2 == 0 ? expected : -expected, 1e-5) << k;
         EXPECT_NEAR(v.imag(), 0, 1e-5) << k;
     }
 }
