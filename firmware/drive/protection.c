@@ -123,10 +123,10 @@ void protection_slow(drive_t *drive)
         drive_trip(drive, DRIVE_FAULT_OVER_SPEED);
     }
     /* Also in open loop, where the rotor can lose synchronism, except during the ramp up to the speed from
-     * which the observer's angle is used; not during identification. */
-    const bool ramp = drive->forced && open_loop_ramps(drive);
-    const bool judged = drive->state >= DRIVE_RUNNING && drive->command.mode < DRIVE_MODE_CURRENT && !ramp &&
-                        drive->stage != STAGE_SIX_STEP; /* which knows at once (block.h) */
+     * which the observer's angle is used, and where no EMF shows, as at rest; not during identification. */
+    const bool unseen = drive->forced && (open_loop_ramps(drive) || drive->follow.emf == 0);
+    const bool judged = drive->state >= DRIVE_RUNNING && drive->command.mode < DRIVE_MODE_CURRENT &&
+                        !unseen && drive->stage != STAGE_SIX_STEP; /* which knows at once (block.h) */
     if (lasts(&drive->lost_ms, judged && drive->position.quality == 0, c->lost_ms)) {
         drive_trip(drive, protection_fault_of_lost(drive));
     }
