@@ -44,7 +44,8 @@ void active_flux_reset(active_flux_t *self, const active_flux_config_t *config, 
 {
     self->R = config->model.R;
     self->step = config->model.t_s / 4;
-    set_reference(self, observer_active_flux(&config->model, in->i_dq));
+    self->psi_a = observer_active_flux(&config->model, in->i_dq);
+    set_reference(self, self->psi_a);
     set_operating_point(self, config, in);
     active_flux_tie(self, config);
     const pm_dq_t drawn = {.d = pm_mulh(self->inductance, in->i_dq.d),
@@ -84,16 +85,19 @@ obs_out_t active_flux_last(const active_flux_t *self)
 void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in,
                       const obs_out_t *out, pm_q_t weight)
 {
+    pm_q_t psi;
     if (weight == 0) {
         /* while tied to the position, the flux gives no amplitude */
         active_flux_tie(self, config);
-        set_reference(self, observer_active_flux(&config->model, in->i_dq));
+        psi = observer_active_flux(&config->model, in->i_dq);
+        self->psi_a = psi;
         const pm_q_t lack = pm_mul(out->vector.q, in->i_dq.q);
         self->R = observer_resistance(&config->resistance, &config->model, self->R, in->omega, lack);
     } else {
         self->k_seed = 0;
-        set_reference(self, observer_amplitude(&config->model, in->i_dq, self->psi_ref,
-                                               pm_sub_sat(self->psi_ref, out->vector.d)));
+        const pm_q_t lack = pm_sub_sat(self->psi_ref, out->vector.d);
+        psi = observer_amplitude(&config->model, in->i_dq, self->psi_ref, lack, &self->psi_a);
     }
+    set_reference(self, psi);
     set_operating_point(self, config, in);
 }

@@ -10,8 +10,8 @@
  *   k_d    = g |omega| + k_q
  * g |omega| holds the amplitude and so removes the drift of the integration, which appears as a ripple of
  * the amplitude; it moves no angle as long as psi_ref is the mean amplitude. k_q > 0 ties the flux to the
- * present position while injection leads; it is zero when this observer leads. psi_ref follows the amplitude
- * slowly within a band around psi_a of model.h, so an error of psi_m moves no angle either.
+ * present position while injection leads; it is zero when this observer leads. psi_ref is psi_a of
+ * model.h and what that lacks, which it follows slowly within a band: an error of psi_m moves no angle either.
  * While the flux is tied, its distance from the current model shows the error of the resistance, and R is
  * adapted to it:
  *   k_q psi_a,q = (R - R^) i_q
@@ -54,7 +54,8 @@ typedef struct {
     pm_gain_t inverse;   /* 1 / psi_ref, Q26 */
     pm_dq_t active;      /* active flux of the last step, Q25 */
     pm_q_t psi_ref;
-    pm_q_t R; /* adapted */
+    pm_q_t psi_a; /* what of it is the model's */
+    pm_q_t R;     /* adapted */
 } active_flux_t;
 
 /* Sets the flux to that of the current model at the given position: no transient follows if it is right. */

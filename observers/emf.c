@@ -40,12 +40,18 @@ static void set_point(emf_t *self, const emf_config_t *config, const emf_machine
     self->inverse = omega < 0 ? -inverse : inverse;
 }
 
+static void set_from_model(emf_t *self, const emf_config_t *config, const obs_in_t *in)
+{
+    self->psi_a = observer_active_flux(&config->model, in->i_dq);
+    self->psi_ref = self->psi_a;
+}
+
 void emf_reset(emf_t *self, const emf_config_t *config, const emf_machine_t *machine, const obs_in_t *in)
 {
     self->step = config->model.t_s;
     self->rate = config->rate;
     self->R = config->model.R;
-    self->psi_ref = observer_active_flux(&config->model, in->i_dq);
+    set_from_model(self, config, in);
     self->omega_cross = in->omega;
     set_point(self, config, machine, in->omega, config->omega_min);
     self->i = in->i;
@@ -98,13 +104,13 @@ void emf_slow(emf_t *self, const emf_config_t *config, const emf_machine_t *mach
 {
     const obs_out_t out = emf_last(self);
     if (weight == 0) {
-        self->psi_ref = observer_active_flux(&config->model, in->i_dq);
+        set_from_model(self, config, in);
         /* not with the loop's own speed: where it dips below the limit, E_q exceeds its w psi_a */
         self->R = observer_resistance(&config->resistance, &config->model, self->R, self->omega_cross,
                                       lacking(self, config, machine->saliency, out.vector.q, in));
     } else {
-        self->psi_ref =
-            observer_amplitude(&config->model, in->i_dq, self->psi_ref, pm_mul(out.misfit, self->psi_ref));
+        const pm_q_t lack = pm_mul(out.misfit, self->psi_ref);
+        self->psi_ref = observer_amplitude(&config->model, in->i_dq, self->psi_ref, lack, &self->psi_a);
     }
     self->i_q = in->i_dq.q;
     self->omega = in->omega;

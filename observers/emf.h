@@ -7,7 +7,7 @@
  * of half the sampling frequency; it lies w T before k. In the present frame:
  *   eps    = -E_d / (w psi_ref)
  *   misfit = 1 - E_q / (w psi_ref)
- * psi_ref follows the amplitude within a band around psi_a of model.h, so an error of psi_m moves no angle.
+ * psi_ref is psi_a of model.h and what that lacks, followed within a band: an error of psi_m moves no angle.
  * Below omega_min the error signal fades with the EMF instead of rising with the noise; while another source
  * leads, below omega_tied, so that voltage errors act as in a flux that is tied to the position. Then, below
  * resistance.omega, R is adapted to the difference
@@ -58,6 +58,7 @@ typedef struct {
     int32_t rate;       /* 1 / (T w_base), Q20 */
     pm_dq_t e;          /* T e, filtered, in the present frame, Q31 */
     pm_q_t psi_ref;
+    pm_q_t psi_a;       /* what of it is the model's */
     pm_q_t R;           /* adapted */
     pm_q_t i_q, omega;  /* of the last slow step */
     pm_q_t omega_cross; /* speed of the cross-coupling */

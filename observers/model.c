@@ -21,11 +21,14 @@ PM_RARE pm_q_t observer_L_q(const observer_model_t *model, pm_dq_t i)
     return pm_max(pm_add_sat(along_q, pm_mul(k, i.d)), model->L_q / 16);
 }
 
-pm_q_t observer_amplitude(const observer_model_t *model, pm_dq_t i, pm_q_t reference, pm_q_t lack)
+pm_q_t observer_amplitude(const observer_model_t *model, pm_dq_t i, pm_q_t reference, pm_q_t lack,
+                          pm_q_t *psi_a)
 {
-    const pm_q_t centre = observer_active_flux(model, i);
-    const pm_q_t band = pm_half(centre);
-    return pm_clamp(reference - pm_frac(lack, PM_FRAC(0.01)), centre - band, centre + band);
+    const pm_q_t past = *psi_a;
+    const pm_q_t now = observer_active_flux(model, i);
+    const pm_q_t half = pm_half(now);
+    *psi_a = now;
+    return pm_clamp(reference + (now - past) - pm_frac(lack, PM_FRAC(0.01)), half, now + half);
 }
 
 pm_q_t observer_resistance(const observer_resistance_t *config, const observer_model_t *model, pm_q_t R,

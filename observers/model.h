@@ -45,9 +45,10 @@ typedef struct {
 pm_q_t observer_active_flux(const observer_model_t *model, pm_dq_t i);
 pm_q_t observer_L_q(const observer_model_t *model, pm_dq_t i);
 
-/* The next reference of the amplitude; lack: reference minus measured amplitude. Follows with 100 ms, within
- * half of psi_a around it. */
-pm_q_t observer_amplitude(const observer_model_t *model, pm_dq_t i, pm_q_t reference, pm_q_t lack);
+/* The next reference of the amplitude; lack: reference minus measured amplitude. It changes with psi_a of the current at once, and
+ * follows what that is not right in with 100 ms, within half of psi_a. psi_a: of the model, at the last call. */
+pm_q_t observer_amplitude(const observer_model_t *model, pm_dq_t i, pm_q_t reference, pm_q_t lack,
+                          pm_q_t *psi_a);
 
 /* The next R, from the power that the model lacks: error (of flux or voltage) along the current, times the
  * current. Between half and twice the parameter. */

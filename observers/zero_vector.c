@@ -163,7 +163,8 @@ static pm_q_t amplitude(const zero_vector_t *self, const zero_vector_config_t *c
     const emf_t *emf = &self->emf;
     const pm_q_t relative = pm_shl(pm_sat(pm_mulh(emf->e.q, emf->inverse), 17), PM_Q_BITS - 16);
     const pm_q_t lack = pm_mul(PM_ONE - relative, emf->psi_ref);
-    return observer_amplitude(&config->emf.model, i, emf->psi_ref, lack);
+    pm_q_t psi_a = emf->psi_a;
+    return observer_amplitude(&config->emf.model, i, emf->psi_ref, lack, &psi_a);
 }
 
 void zero_vector_slow(zero_vector_t *self, const zero_vector_config_t *config, const obs_in_t *in,
