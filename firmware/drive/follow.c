@@ -18,7 +18,7 @@ void follow_again(follow_t *self, int32_t least)
 
 void follow_resume(follow_t *self)
 {
-    follow_again(self, FOLLOW_STANDS);
+    follow_again(self, FOLLOW_TURN);
     self->follows = true;
 }
 
@@ -38,7 +38,7 @@ void follow_rested(follow_t *self, const pm_machine_t *machine, pm_q_t i, pm_q_t
     follow_reset(self, machine);
     if (ms >= FOLLOW_REST_MS && i > 0) {
         const pm_q_t drop = pm_mul(machine->R_s, i);
-        const pm_q_t band = drop / 2 + v_dc / 64;
+        const pm_q_t band = pm_half(drop) + v_dc / 64;
         self->R = pm_div(pm_clamp(v_d, drop - band, drop + band), i);
         self->R_doubt = machine->R_s / 32;
     }
@@ -46,7 +46,7 @@ void follow_rested(follow_t *self, const pm_machine_t *machine, pm_q_t i, pm_q_t
 
 static bool is_seen(const follow_t *self, pm_q_t omega)
 {
-    const pm_q_t half = self->emf / 2;
+    const pm_q_t half = pm_half(self->emf);
     const pm_q_t across = omega < 0 ? -self->across : self->across;
     return across > half || pm_abs(self->along) > half;
 }
@@ -54,15 +54,15 @@ static bool is_seen(const follow_t *self, pm_q_t omega)
 bool follow_slow(follow_t *self, const pm_machine_t *machine, const follow_in_t *in)
 {
     const pm_machine_t *m = machine;
-    const pm_q_t reactance = pm_mul(in->omega, m->L_d / 2 + m->L_q / 2);
+    const pm_q_t reactance = pm_mul(in->omega, pm_half(m->L_d) + pm_half(m->L_q));
     (void)pm_lp1(&self->along, in->v.d - pm_mul(self->R, in->i), K_MEAN);
     (void)pm_lp1(&self->across, in->v.q - pm_mul(reactance, in->i), K_MEAN);
     const pm_q_t psi = m->psi_m - pm_mul(m->L_q - m->L_d, in->i) / 2;
-    self->emf = pm_mul(pm_abs(in->omega), pm_max(psi, m->psi_m / 2));
+    self->emf = pm_mul(pm_abs(in->omega), pm_max(psi, pm_half(m->psi_m)));
     if (PM_HAS(load_current)) {
         self->turned = pm_min(self->turned + in->turn, self->least);
     }
-    if (self->emf / 2 <= pm_mul(self->R_doubt, in->i) + in->v_dc / 512) {
+    if (pm_half(self->emf) <= pm_mul(self->R_doubt, in->i) + in->v_dc / 512) {
         self->emf = 0;
         self->ms = 0;
         if (PM_HAS(load_current)) {

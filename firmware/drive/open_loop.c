@@ -43,7 +43,7 @@ void open_loop_start(drive_t *drive)
 static pm_dq_t with_margin(const drive_t *drive, pm_dq_t i)
 {
     const drive_config_t *c = &drive->config;
-    const pm_q_t wanted = pm_max(c->open_loop.i, 2 * pm_abs(i.q) + c->open_loop.i / 2);
+    const pm_q_t wanted = pm_max(c->open_loop.i, 2 * pm_abs(i.q) + pm_half(c->open_loop.i));
     const pm_q_t length = pm_min(wanted, pm_max(c->i_max, pm_abs(i.q)));
     return (pm_dq_t){.d = pm_sqrt(pm_mul(length, length) - pm_mul(i.q, i.q)), .q = i.q};
 }
@@ -139,7 +139,7 @@ static bool is_mean(const drive_t *drive)
 /* Too fast for a rotor that swings to stand. */
 static bool is_fast(const drive_t *drive)
 {
-    return drive->follow.emf >= drive->config.open_loop.v_swing / 2;
+    return drive->follow.emf >= pm_half(drive->config.open_loop.v_swing);
 }
 
 /* The EMF of the rotor's speed, along where it is: across the vector alone a lag delta shows as speed, omega sin(delta), which

@@ -64,7 +64,7 @@ void position_set_resistance(position_t *self, const position_config_t *config, 
 {
     if (config->observer.id == OBSERVER_active_flux) {
         const pm_q_t told = config->observer.active_flux.model.R;
-        self->observer.active_flux.R = pm_clamp(R, told / 2, told + told / 2);
+        self->observer.active_flux.R = pm_clamp(R, pm_half(told), told + pm_half(told));
     }
 }
 

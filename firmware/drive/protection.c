@@ -123,8 +123,8 @@ void protection_slow(drive_t *drive)
         drive_trip(drive, DRIVE_FAULT_OVER_SPEED);
     }
     /* Also in open loop, where the rotor can lose synchronism, except during the ramp up to the speed from
-     * which the observer's angle is used, and where no EMF shows, as at rest; not during identification. */
-    const bool unseen = drive->forced && (open_loop_ramps(drive) || drive->follow.emf == 0);
+     * which the observer's angle is used, and at rest, where no EMF shows; not during identification. */
+    const bool unseen = drive->forced && (drive->omega_ramp == 0 || open_loop_ramps(drive));
     const bool judged = drive->state >= DRIVE_RUNNING && drive->command.mode < DRIVE_MODE_CURRENT &&
                         !unseen && drive->stage != STAGE_SIX_STEP; /* which knows at once (block.h) */
     if (lasts(&drive->lost_ms, judged && drive->position.quality == 0, c->lost_ms)) {

@@ -353,17 +353,17 @@ TEST(Protection, LimitsThemselvesAreAllowed)
         EXPECT_EQ(calls(x, 10000), quality == 0 ? c.lost_ms + 1 : 10000);
         EXPECT_EQ(x.d.fault, quality == 0 ? DRIVE_FAULT_POSITION_LOST : DRIVE_FAULT_NONE);
     }
-    // Of an imposed vector: only where it has its speed and an EMF shows.
+    // Of an imposed vector: only where it has its speed, and turns.
     for (const bool ramps : {false, true}) {
-        for (const int emf : {0, 1}) {
+        for (const bool turns : {false, true}) {
             Drive x = turning();
             x.d.stage = STAGE_OPEN_LOOP;
             x.d.forced = true;
-            x.d.omega_ramp = x.d.omega_target + (ramps ? 1 : 0);
-            x.d.follow.emf = emf;
+            x.d.omega_ramp = turns ? -1 : 0;
+            x.d.omega_target = x.d.omega_ramp + (ramps ? 1 : 0);
             x.d.position.quality = 0;
-            const bool judged = !ramps && emf != 0;
-            EXPECT_EQ(calls(x, 10000), judged ? c.lost_ms + 1 : 10000) << ramps << emf;
+            const bool judged = turns && !ramps;
+            EXPECT_EQ(calls(x, 10000), judged ? c.lost_ms + 1 : 10000) << ramps << turns;
         }
     }
     for (const int32_t dC : {c.temp_trip_dC + 100, c.temp_derate_dC - 1, int{c.temp_derate_dC}}) {
