@@ -12,7 +12,7 @@ void pulsating_square_reset(pulsating_square_t *self, const pulsating_square_con
                             const obs_in_t *in)
 {
     *self = (pulsating_square_t){.i = in->i,
-                                 .carrier = -whole_carrier(config) / 2,
+                                 .carrier = -pm_half(whole_carrier(config)),
                                  .gain = config->saliency.gain_0,
                                  .h = {.d = -config->h_d, .q = 0}}; /* as seen with that sign */
 }
@@ -27,8 +27,7 @@ void pulsating_square_slow(pulsating_square_t *self, const pulsating_square_conf
     self->lambda = pm_shl(pm_sat(lambda, PM_Q_BITS), 3);
     self->gain = self->carrier > 0 ? -gain : gain;
     const int32_t v = whole_carrier(config);
-    const int32_t size = pm_min(pm_abs(self->carrier) + v / 4, v);
-    self->carrier = self->carrier < 0 ? -size : size;
+    self->carrier = pm_clamp(self->carrier + pm_half(self->carrier), -v, v);
 }
 
 void pulsating_square_step(pulsating_square_t *self, const pulsating_square_config_t *config,

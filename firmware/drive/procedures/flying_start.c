@@ -69,7 +69,7 @@ static void after_pulse(flying_start_t *self, const flying_start_config_t *c)
 static bool is_large(const flying_start_t *self, const flying_start_config_t *c, pm_q_t i)
 {
     const pm_q_t drop = times(c->drop, seen_of(self->length));
-    return i >= FLYING_START_LEAST * c->noise && i >= drop + drop / 2;
+    return i >= FLYING_START_LEAST * c->noise && i >= drop + pm_half(drop);
 }
 
 static pm_procedure_t keep(flying_start_t *self, const flying_start_config_t *c, pm_abc_t i, uint16_t period)

@@ -35,10 +35,11 @@ void make_flying_start(maker_t *m, flying_start_config_t *c)
     const pm_num_t turns =
         mul3(pm_num_ratio(1, 2), si(m, DRIVE_PARAM_psi_m), pm_num_div(pm_num(1), si(m, DRIVE_PARAM_L_q)));
     const pm_num_t i = pm_num_mul(least(si(m, DRIVE_PARAM_i_rated), turns), pm_num_ratio(1, 5));
-    c->noise = pm_max(per_unit(m, DRIVE_PARAM_i_noise, m->base.i), PM_Q(0.5 / 4096.0));
+    c->noise = pm_clamp(per_unit(m, DRIVE_PARAM_i_noise, m->base.i), PM_Q(0.5 / 4096.0),
+                        PM_Q_MAX / FLYING_START_LEAST);
     c->i_enough = pm_max(fixed(m, pm_num_div(i, m->base.i), Q_BITS, DRIVE_PARAM_i_rated),
-                         FLYING_START_LEAST * pm_min(c->noise, PM_Q_MAX / FLYING_START_LEAST));
-    c->i_zero = pm_max(5 * pm_min(c->noise, PM_Q_MAX / 5), PM_Q(8.0 / 4096.0));
+                         FLYING_START_LEAST * c->noise);
+    c->i_zero = pm_max(5 * c->noise, PM_Q(8.0 / 4096.0));
     c->i_rings = pm_max(make_ringing(m), c->i_zero);
     c->decay = per_part(m, si(m, DRIVE_PARAM_R_s), DRIVE_PARAM_R_s);
     c->drop = per_part(m, pm_num_div(si(m, DRIVE_PARAM_device_drop), m->base.i), DRIVE_PARAM_device_drop);
