@@ -129,6 +129,18 @@ TEST(Follow, AThirdOfATurnIsWaitedFor)
     }
 }
 
+// Behind an observer, which knew that it turned, it may swing meanwhile.
+TEST(Follow, ARotorThatTurnedIsWaitedForAWholeTurn)
+{
+    for (const double turn : {0.01, 1.0 / 300}) {
+        Rig x;
+        x.turn = turn;
+        x.rest();
+        follow_resume(&x.self);
+        EXPECT_NEAR(x.stands(0.1), 1 / turn, 2);
+    }
+}
+
 // A vector that passes a salient rotor sees its saliency alternate.
 TEST(Follow, SaliencyIsNoEmf)
 {
