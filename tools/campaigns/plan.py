@@ -132,7 +132,7 @@ class Campaign(CampaignFile):
         names = dict(drawn)
         for section, entries in truth.items():
             names.update((f"{section}.{key}", value) for key, value in entries.items())
-        told = laid_over({"name": name, **truth}, chosen(self._evaluated(self.told, names, number)))
+        told = {"name": name, **chosen(laid_over(truth, self._evaluated(self.told, names, number)))}
         try:
             completed = self._completed(told)
         except tune.UsageError as error:

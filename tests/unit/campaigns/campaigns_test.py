@@ -206,6 +206,15 @@ class Files(unittest.TestCase):
         self.assertEqual(told("7 if L > 0 else untold"), 7)
         self.assertEqual(told("untold if L > 0 else 7"), 20)  # rated current
 
+    def test_what_is_untold_the_truth_does_not_tell(self):
+        text = CAMPAIGN.replace("psi_m_Wb: 0.02,", "psi_m_Wb: 0.02, c_A_Wb5: 1.0e+9,")
+        untold = text.replace("electrical.R_s_ohm * told_R}", "electrical.R_s_ohm * told_R, c_A_Wb5: untold}")
+        machine = yaml.safe_load(self.campaign(untold).run(0).machine)
+        self.assertEqual(machine["electrical"]["c_A_Wb5"], 1.0e9)
+        self.assertEqual(machine["drive"]["L_q_rated"], machine["drive"]["L_q"])
+        told = yaml.safe_load(self.campaign(text).run(0).machine)["drive"]
+        self.assertLess(told["L_q_rated"], told["L_q"])
+
     def test_a_run_does_not_depend_on_others(self):
         campaign = self.campaign()
         forwards = [campaign.run(n) for n in range(4)]
