@@ -45,8 +45,9 @@ typedef struct {
 pm_q_t observer_active_flux(const observer_model_t *model, pm_dq_t i);
 pm_q_t observer_L_q(const observer_model_t *model, pm_dq_t i);
 
-/* The next reference of the amplitude; lack: reference minus measured amplitude. It changes with psi_a of the current at once, and
- * follows what that is not right in with 100 ms, within half of psi_a. psi_a: of the model, at the last call. */
+/* The next reference of the amplitude: psi_a of the present current, and what the model lacks, learnt in 100 ms.
+ *   reference += psi_a(i) - psi_a - lack / 100
+ * Stays within half of psi_a(i) around it. lack: reference minus measured amplitude; psi_a: of the last call, then of i. */
 pm_q_t observer_amplitude(const observer_model_t *model, pm_dq_t i, pm_q_t reference, pm_q_t lack,
                           pm_q_t *psi_a);
 
