@@ -13,8 +13,8 @@
  *
  * drive_slow() runs in app_slow() between two control interrupts and is never interrupted by one: if it is
  * still running when the next one comes, the fault is OVERRUN. A new parameter set is applied there too, as a
- * whole, in a period of its own before drive_slow(). Each takes less than a period of 40 kHz, the highest
- * carrier that the port stm32g431 accepts (target.board_IMAGE_modes_40kHz).
+ * whole, in a period of its own before drive_slow(). Each takes less than a period of the highest carrier that the
+ * port accepts (docs/performance.md).
  *
  * Parameters are written to a shadow set, which is also what is read back. A write that the drive's
  * configuration refuses is undone (0604 0043h). Parameters that decide the meaning of the drive's state

@@ -13,7 +13,8 @@ static const hal_board_t board = {
     .t_bridge_ms = 10000,      /* of a board of 30 by 41 mm: chosen */
     .dead_time_least_ns = 300, /* the driver's delays differ by up to 50 ns, the transistors take 100 */
     .f_pwm_least_Hz = 4000,
-    .f_pwm_most_Hz = 40000, /* the control interrupt needs its time */
+    /* the interrupts of control and 1 kHz, and with a neutral that of its further sample, end within a period */
+    .f_pwm_most_Hz = PM_CARRIES(NEEDS_NEUTRAL) ? 30000 : 40000,
 };
 
 const hal_board_t *hal_board(const hal_t *hal)

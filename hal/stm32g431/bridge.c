@@ -5,8 +5,8 @@
 #include "hal/stm32g431/registers/tim.h"
 
 enum {
-    COUNTS_LEAST = 2125, /* 40 kHz: the control interrupt needs its time */
-    COUNTS_SAFE = 4250,  /* in place of a refused value: everything else is timed by this clock */
+    COUNTS_LEAST = PM_CARRIES(NEEDS_NEUTRAL) ? 2833 : 2125, /* 30 and 40 kHz: f_pwm_most of board.c */
+    COUNTS_SAFE = 4250, /* in place of a refused value: everything else is timed by this clock */
     DEAD_TIME_LEAST_ns = 300,
     COMMUTATE_LEAST = 510, /* 3 us: by then the control interrupt has written the states to come */
     /* Of further samples. The converters are started ahead of the instant, since the currents come first; */
