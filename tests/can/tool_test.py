@@ -648,6 +648,13 @@ class Identification(Bench):
         _, err = self.command("tune", "--yes", "--bandwidth", "4000", code=2)
         self.assertIn("a tenth of f_pwm", err)
 
+    def test_tunes_the_amplitude_feedback_by_saliency(self):
+        for L_q_uH, gain in ((75000, 500), (46000, 1000)):  # beside L_d of 43 mH; neither is said to saturate
+            for name in ("L_q", "L_q_rated", "L_qh_rated"):
+                self.node[name] = L_q_uH * 1000
+            self.command("tune", "--yes")
+            self.assertEqual(self.node["flux_gain"], gain)
+
     def test_from_python(self):
         with self.connect() as drive:
             found = identify.run(drive, ["flux"])
