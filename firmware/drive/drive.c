@@ -42,7 +42,6 @@ PM_RARE void drive_reconfigure(drive_t *drive, const drive_config_t *config)
 {
     const observer_id_t before = drive->config.position.observer.id;
     drive->config = *config;
-    drive->references_ready = false;
     const position_config_t *position = &drive->config.position;
     if (position->observer.id != before && drive->stage >= STAGE_OPEN_LOOP) {
         position_change_observer(&drive->position, position, drive->i_ab, drive->status.i);
@@ -57,14 +56,6 @@ PM_RARE void drive_reconfigure(drive_t *drive, const drive_config_t *config)
 PM_RARE void drive_command(drive_t *drive, const drive_command_t *command)
 {
     const drive_mode_t mode = drive->state == DRIVE_OFF ? command->mode : drive->command.mode;
-    const drive_command_t *last = &drive->command;
-    const bool same_references = command->speed_mrad_s == last->speed_mrad_s &&
-                                 command->torque_uNm == last->torque_uNm &&
-                                 command->current_mA == last->current_mA;
-    drive->references_ready = drive->references_ready && same_references;
-#if PM_HAS(six_step)
-    drive->references_ready = drive->references_ready && command->duty_ppm == last->duty_ppm;
-#endif
     drive->command = *command;
     drive->command.mode = mode;
     if (drive->state == DRIVE_OFF) {

@@ -275,9 +275,8 @@ void drive_slow(drive_t *drive, const drive_slow_in_t *in)
     protection_heat(drive);
     protection_phases(drive);
     if (drive->fault == DRIVE_FAULT_NONE) {
-        if (!drive->references_ready && !is_alone(drive)) {
+        if (!is_alone(drive)) {
             reference_take(drive);
-            drive->references_ready = true;
         }
 #if PM_HAS(six_step)
         if (drive->command.mode == DRIVE_MODE_DUTY) {

@@ -35,16 +35,15 @@ struct drive {
     neutral_t neutral;
 #endif
     bool hw_fault;
-    bool carrier; /* injection is on */
-    bool forced;  /* open loop: the observer is forced to the ramp angle */
-    bool usual;   /* estimated angle and REGULATOR_INLINE: one branch per period for all that is not */
-    bool round;   /* the start has found no saliency: without injection until the next one */
-    bool tried;   /* open loop: once more, with i_max */
-    bool references_ready; /* the command's references are in per-unit */
-    pm_dir_t ahead;        /* one and a half periods of rotation: from the sample to where the voltage acts */
-    pm_unit_t v_share;     /* share of v_dc for current control */
-    pm_ab_t v_acting;      /* commanded at k-1: acts over [k, k+1) */
-    pm_ab_t v_next;        /* commanded at k: acts over [k+1, k+2) */
+    bool carrier;      /* injection is on */
+    bool forced;       /* open loop: the observer is forced to the ramp angle */
+    bool usual;        /* estimated angle and REGULATOR_INLINE: one branch per period for all that is not */
+    bool round;        /* the start has found no saliency: without injection until the next one */
+    bool tried;        /* open loop: once more, with i_max */
+    pm_dir_t ahead;    /* one and a half periods of rotation: from the sample to where the voltage acts */
+    pm_unit_t v_share; /* share of v_dc for current control */
+    pm_ab_t v_acting;  /* commanded at k-1: acts over [k, k+1) */
+    pm_ab_t v_next;    /* commanded at k: acts over [k+1, k+2) */
 
     regulator_out_t voltage; /* of the current control, without carrier */
     regulator_t regulator;

@@ -5,9 +5,7 @@
 /* What does not fit saturates, and the limits below clamp it with a flag. */
 static pm_q_t to_signal(int32_t value, pm_num_t unit)
 {
-    int32_t x;
-    (void)pm_num_to_fixed(pm_num_mul(pm_num(value), unit), PM_Q_BITS, &x);
-    return pm_clamp(x, -PM_Q(4.0), PM_Q(4.0));
+    return pm_clamp(pm_num_times(value, unit, PM_Q_BITS), -PM_Q(4.0), PM_Q(4.0));
 }
 
 void reference_take(drive_t *drive)
@@ -17,7 +15,8 @@ void reference_take(drive_t *drive)
     drive->torque_target = to_signal(command->torque_uNm, drive->config.per_uNm);
     drive->i_target = to_signal(command->current_mA, drive->config.per_mA);
 #if PM_HAS(six_step)
-    drive->duty_target = pm_clamp(to_signal(command->duty_ppm, pm_num_dec(1, -6)), -PM_ONE, PM_ONE);
+    const pm_num_t millionth = {.m = 1125899907, .e = -50};
+    drive->duty_target = pm_clamp(to_signal(command->duty_ppm, millionth), -PM_ONE, PM_ONE);
 #endif
 }
 

@@ -180,3 +180,21 @@ pm_num_t pm_num_from_fixed(int32_t x, int frac_bits)
     r.e -= r.m == 0 ? 0 : frac_bits;
     return r;
 }
+
+int32_t pm_num_times(int32_t value, pm_num_t unit, int frac_bits)
+{
+    const int64_t product = (int64_t)value * unit.m;
+    const int32_t shift = -unit.e - frac_bits;
+    int64_t x = 0;
+    if (shift < 1) { /* a mantissa has its top bit set: twice that fits for zero only */
+        x = shift < 0 ? 2 * product : product;
+    } else if (shift <= 2 * MANTISSA_BITS) {
+        x = ((product >> (shift - 1)) + 1) >> 1;
+    } else {
+        /* less than half */
+    }
+    if (x != (int32_t)x) {
+        return x < 0 ? INT32_MIN : INT32_MAX;
+    }
+    return (int32_t)x;
+}

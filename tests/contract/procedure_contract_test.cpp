@@ -55,7 +55,6 @@ class Procedure : public ::testing::TestWithParam<Row>
         x.enable(true, GetParam().trait == Trait::ALONE ? DRIVE_MODE_IDENTIFY : DRIVE_MODE_SPEED);
         x.step();
         reference_take(&x.d);
-        x.d.references_ready = true;
         procedure_begin(&x.d, GetParam().id);
         drive_prepare(&x.d);
         return x;

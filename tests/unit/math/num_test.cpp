@@ -180,6 +180,26 @@ TEST(MathNum, ToFixedRoundsOrSaturates)
     }
 }
 
+// Exact but for the last rounding, at any shift.
+TEST(MathNum, TimesRoundsOnceOrSaturates)
+{
+    Random random;
+    for (int i = 0; i < kCount; ++i) {
+        const int32_t x = random.any_size();
+        const pm_num_t unit = random_num(random);
+        const int frac_bits = static_cast<int>(random.within(-10, 60));
+        const long double exact = std::ldexp(static_cast<long double>(x) * value(unit), frac_bits);
+        const long double rounded = std::floor(exact + 0.5L);
+        ASSERT_EQ(pm_num_times(x, unit, frac_bits), std::clamp<long double>(rounded, INT32_MIN, INT32_MAX))
+            << x << " times " << unit.m << " " << unit.e << ", " << frac_bits;
+    }
+    for (const int32_t x : corners()) {
+        EXPECT_EQ(pm_num_times(x, pm_num(1), 0), x);
+        EXPECT_EQ(pm_num_times(x, pm_num(0), 28), 0);
+        EXPECT_EQ(pm_num_times(0, pm_num(x), 60), 0);
+    }
+}
+
 TEST(MathNum, FromFixedAndBack)
 {
     for (const int32_t x : corners()) {
