@@ -44,6 +44,12 @@ static inline bool drive_injects(const drive_t *drive)
     return drive->config.injection && !drive->round;
 }
 
+/* Block commutation is at work. */
+static inline bool drive_commutates(const drive_t *drive)
+{
+    return PM_HAS(six_step) != 0 && drive->stage == STAGE_SIX_STEP;
+}
+
 /* drive.c: at 1 kHz, what the step needs of the present operating point and stage. */
 void drive_prepare(drive_t *drive);
 

@@ -133,8 +133,10 @@ static void run(drive_t *drive)
     }
 #endif
     const position_config_t *c = &drive->config.position;
-    position_slow(&drive->position, c, drive->i_ab, drive->status.i);
-    if (drive->stage == STAGE_OPEN_LOOP) {
+    const bool open = drive->stage == STAGE_OPEN_LOOP; /* status.i is that of the imposed frame */
+    const pm_dq_t i = open ? pm_park(drive->i_ab, pm_dir(drive->position.pll.theta)) : drive->status.i;
+    position_slow(&drive->position, c, drive->i_ab, i);
+    if (open) {
         open_loop_slow(drive);
         return;
     }
@@ -248,7 +250,7 @@ static void report(drive_t *drive)
     s->fault = drive->fault;
     if (drive->stage < STAGE_SIX_STEP) {
         report_nothing(drive);
-    } else if (drive->stage == STAGE_SIX_STEP) {
+    } else if (drive_commutates(drive)) {
         s->omega = drive->pll.omega;
         s->omega_ref = drive->speed.reference;
         s->weight = PM_ONE;

@@ -2,10 +2,10 @@
 
 #include "firmware/math/root.h"
 
-/* What does not fit saturates, and the limits below clamp it with a flag. */
+/* What does not fit saturates at 4, and the limits below clamp it with a flag. */
 static pm_q_t to_signal(int32_t value, pm_num_t unit)
 {
-    return pm_clamp(pm_num_times(value, unit, PM_Q_BITS), -PM_Q(4.0), PM_Q(4.0));
+    return pm_half(pm_num_times(value, unit, PM_Q_BITS + 1));
 }
 
 void reference_take(drive_t *drive)

@@ -101,15 +101,10 @@ void measure_start(void)
 #endif
 }
 
-/* The internal reference at 3.3 V, by its value at 3.0. */
-static uint16_t expected_reference(void)
-{
-    return (uint16_t)(VREFINT.CAL * 10U / 11U);
-}
-
 void measure_run(hal_t *hal)
 {
-    hal->code[PORT_REFERENCE] = expected_reference();
+    /* the internal reference at 3.3 V, by its value at 3.0 */
+    hal->code[PORT_REFERENCE] = (uint16_t)(VREFINT.CAL * 10U / 11U);
     ADC1.ISR = ADC_ISR_JEOS;
     ADC1.IER = ADC_IER_JEOSIE;
     ADC2.CR = ADC_CR_ADVREGEN | ADC_CR_JADSTART;
@@ -230,13 +225,13 @@ void hal_measure_slow(hal_t *hal, hal_slow_t *slow)
 {
     if ((ADC1.ISR & ADC_ISR_EOC) != 0U) {
         hal->code[hal->turn] = (uint16_t)ADC1.DR; /* clears the flag */
-        hal->turn = (uint8_t)((hal->turn + 1U) % PORT_TURNS);
+        hal->turn = (uint8_t)(hal->turn + 1U < PORT_TURNS ? hal->turn + 1U : 0U);
         ADC1.SQR1 = reg_field(ADC_SQR1_SQ1, TURN[hal->turn]);
         ADC1.CR = ADC_CR_ADVREGEN | ADC_CR_ADSTART;
     }
-    const uint32_t expected = expected_reference();
     slow->temperature_missing = !ntc_temperature(hal->code[PORT_TEMPERATURE], &slow->temperature_dC);
     slow->dial = (uint16_t)(hal->code[PORT_DIAL] * 16U);
     slow->button = pins_button();
-    slow->reference_off = hal->code[PORT_REFERENCE] - (expected - expected / 20U) > expected / 10U;
+    const uint32_t cal = VREFINT.CAL; /* within 5 % of 20/22 of it */
+    slow->reference_off = hal->code[PORT_REFERENCE] * 22U - cal * 19U > cal * 2U;
 }
