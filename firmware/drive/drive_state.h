@@ -73,13 +73,14 @@ struct drive {
     pm_q_t i_vector;   /* open loop: current that is wanted */
     pm_q_t i_open;     /* open loop: its current; after the hand-over: what is left of it on the d-axis */
 
-    /* references in per-unit, made from the command when it is another */
+    /* references in per-unit, made from the command */
     pm_q_t omega_target;
     pm_q_t torque_target;
     pm_q_t i_target;
 
     uint16_t state_ms; /* since the state or stage was entered */
-    uint16_t stall_ms, lost_ms, sum_ms;
+    uint16_t stall_ms, sum_ms;
+    uint16_t lost;     /* eighths of a ms without a position */
     uint16_t still_ms; /* standstill while stopping */
     uint16_t agree_ms; /* observer and imposed angle turn alike */
     uint16_t wait_ms;  /* for that, where the observer should */

@@ -69,8 +69,19 @@ drive_fault_t protection_fault_of_lost(const drive_t *drive)
 /* Counts while a condition holds; true when it has held for longer than `limit` ms. */
 static bool lasts(uint16_t *timer, bool condition, uint16_t limit)
 {
-    *timer = condition ? (uint16_t)(*timer + (*timer < UINT16_MAX ? 1U : 0U)) : 0U;
+    *timer = condition ? (uint16_t)(*timer + 1U) : 0U;
     return *timer > limit;
+}
+
+/* At once where the quality is none. Where the observer alone has little of it, an eighth as fast: an estimate that turns at another
+ * speed than the rotor meets it now and then, and its quality comes and goes. Injection has little with a small carrier. */
+static bool is_lost(drive_t *drive, bool judged)
+{
+    const position_t *p = &drive->position;
+    const uint16_t lost = (uint16_t)(drive->lost + (p->quality == 0 ? 8U : 1U));
+    const bool low = p->quality < (p->weight == PM_ONE ? PM_Q(0.375) : 1);
+    drive->lost = judged && low ? lost : 0U;
+    return drive->lost / 8U > drive->config.protection.lost_ms;
 }
 
 /* At standstill where it should turn, with three quarters of rated current or of its torque, or what there is of them. A load
@@ -107,7 +118,7 @@ static bool all_measured(const drive_t *drive)
 void protection_slow(drive_t *drive)
 {
     const protection_config_t *c = &drive->config.protection;
-    const bool turning = drive->stage == STAGE_VECTOR || drive->stage == STAGE_SIX_STEP;
+    const bool turning = drive->stage == STAGE_VECTOR || drive_commutates(drive);
     if (drive->temperature_dC >= c->temp_trip_dC) {
         drive_trip(drive, DRIVE_FAULT_OVER_TEMPERATURE);
     }
@@ -126,8 +137,8 @@ void protection_slow(drive_t *drive)
      * which the observer's angle is used, and at rest, where no EMF shows; not during identification. */
     const bool unseen = drive->forced && (drive->omega_ramp == 0 || open_loop_ramps(drive));
     const bool judged = drive->state >= DRIVE_RUNNING && drive->command.mode < DRIVE_MODE_CURRENT &&
-                        !unseen && drive->stage != STAGE_SIX_STEP; /* which knows at once (block.h) */
-    if (lasts(&drive->lost_ms, judged && drive->position.quality == 0, c->lost_ms)) {
+                        !unseen && !drive_commutates(drive); /* which knows at once (block.h) */
+    if (is_lost(drive, judged)) {
         drive_trip(drive, protection_fault_of_lost(drive));
     }
 #if PM_CARRIES(NEEDS_NEUTRAL)

@@ -16,7 +16,7 @@ PM_RARE static void begin_procedure(drive_t *drive)
     drive->state_ms = 0;
     drive->still_ms = 0;
     drive->stall_ms = 0;
-    drive->lost_ms = 0;
+    drive->lost = 0;
     drive->sum_ms = 0;
     const sequence_step_t *step = sequence_step((sequence_id_t)self->id, self->step);
     procedure_id_t id =

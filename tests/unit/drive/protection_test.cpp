@@ -347,11 +347,27 @@ TEST(Protection, LimitsThemselvesAreAllowed)
             EXPECT_EQ(calls(x, 10000), beyond ? c.stall_ms + 1 : 10000);
         }
     }
-    for (const int quality : {0, 1}) {
+    // Without any quality at once; with little of it, where the observer has the lead alone, eight times as late.
+    for (const int quality : {0, 1, PM_Q(0.375) - 1, PM_Q(0.375)}) {
+        for (const int weight : {PM_ONE - 1, PM_ONE}) {
+            Drive x = turning();
+            x.d.position.quality = quality;
+            x.d.position.weight = weight;
+            const bool lost = quality == 0 || (quality < PM_Q(0.375) && weight == PM_ONE);
+            const int after_ms = quality == 0 ? c.lost_ms + 1 : 8 * (c.lost_ms + 1);
+            EXPECT_EQ(calls(x, 10000), lost ? after_ms : 10000);
+            EXPECT_EQ(x.d.fault, lost ? DRIVE_FAULT_POSITION_LOST : DRIVE_FAULT_NONE);
+        }
+    }
+    // It may come and go, not be good for a moment.
+    for (const int between : {PM_Q(0.3), PM_Q(0.4)}) {
         Drive x = turning();
-        x.d.position.quality = quality;
-        EXPECT_EQ(calls(x, 10000), quality == 0 ? c.lost_ms + 1 : 10000);
-        EXPECT_EQ(x.d.fault, quality == 0 ? DRIVE_FAULT_POSITION_LOST : DRIVE_FAULT_NONE);
+        x.d.position.weight = PM_ONE;
+        for (int ms = 0; ms < 100; ++ms) {
+            x.d.position.quality = ms % 2 == 0 ? 0 : between;
+            protection_slow(&x.d);
+        }
+        EXPECT_EQ(x.d.fault, between < PM_Q(0.375) ? DRIVE_FAULT_POSITION_LOST : DRIVE_FAULT_NONE);
     }
     // Of an imposed vector: only where it has its speed, and turns.
     for (const bool ramps : {false, true}) {
@@ -382,8 +398,8 @@ TEST(Protection, LimitsThemselvesAreAllowed)
     }
 }
 
-// A millisecond counter stops at its end, and a position is not judged where there is none.
-TEST(Protection, CountersDoNotWrap)
+// A position is not judged where there is none.
+TEST(Protection, CurrentModeHasNoPositionToLose)
 {
     Drive x;
     x.step();
@@ -391,15 +407,13 @@ TEST(Protection, CountersDoNotWrap)
     x.d.stage = STAGE_VECTOR;
     x.d.i_abc = {0, 0, 0};
     x.d.position.quality = 0;
-    x.d.lost_ms = UINT16_MAX;
-    x.d.config.protection.lost_ms = UINT16_MAX; // never
     x.d.command.mode = DRIVE_MODE_SPEED;
     protection_slow(&x.d);
-    EXPECT_EQ(x.d.lost_ms, UINT16_MAX);
-    EXPECT_EQ(x.d.fault, DRIVE_FAULT_NONE);
+    EXPECT_GT(x.d.lost, 0);
     x.d.command.mode = DRIVE_MODE_CURRENT;
     protection_slow(&x.d);
-    EXPECT_EQ(x.d.lost_ms, 0);
+    EXPECT_EQ(x.d.lost, 0);
+    EXPECT_EQ(x.d.fault, DRIVE_FAULT_NONE);
 }
 
 // One by one, where the control period has seen that something is beyond its limit.
