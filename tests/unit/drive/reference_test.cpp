@@ -249,9 +249,10 @@ TEST(Reference, CommandsBeyondTheFormatSaturate)
         x.d.command.torque_uNm = way * INT32_MAX;
         x.d.command.current_mA = way * INT32_MAX;
         reference_take(&x.d);
-        EXPECT_EQ(x.d.omega_target, way * PM_Q(4.0));
-        EXPECT_EQ(x.d.torque_target, way * PM_Q(4.0));
-        EXPECT_EQ(x.d.i_target, way * PM_Q(4.0));
+        const pm_q_t most = way > 0 ? PM_Q(4.0) - 1 : -PM_Q(4.0);
+        EXPECT_EQ(x.d.omega_target, most);
+        EXPECT_EQ(x.d.torque_target, most);
+        EXPECT_EQ(x.d.i_target, most);
     }
 }
 
