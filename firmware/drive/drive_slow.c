@@ -133,10 +133,8 @@ static void run(drive_t *drive)
     }
 #endif
     const position_config_t *c = &drive->config.position;
-    const bool open = drive->stage == STAGE_OPEN_LOOP; /* status.i is that of the imposed frame */
-    const pm_dq_t i = open ? pm_park(drive->i_ab, pm_dir(drive->position.pll.theta)) : drive->status.i;
-    position_slow(&drive->position, c, drive->i_ab, i);
-    if (open) {
+    position_slow(&drive->position, c, drive->i_ab, drive->status.i);
+    if (drive->stage == STAGE_OPEN_LOOP) {
         open_loop_slow(drive);
         return;
     }
