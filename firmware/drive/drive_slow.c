@@ -124,7 +124,7 @@ static void run_block(drive_t *drive)
 static void run(drive_t *drive)
 {
 #if PM_HAS(six_step)
-    if (drive->stage == STAGE_SIX_STEP) {
+    if (drive_commutates(drive)) {
         run_block(drive);
         return;
     }

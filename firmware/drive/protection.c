@@ -74,12 +74,14 @@ static bool lasts(uint16_t *timer, bool condition, uint16_t limit)
 }
 
 /* At once where the quality is none. Where the observer alone has little of it, an eighth as fast: an estimate that turns at another
- * speed than the rotor meets it now and then, and its quality comes and goes. Injection has little with a small carrier. */
+ * speed than the rotor meets it now and then, and its quality comes and goes. Injection has little with a
+ * small carrier, and whether a rotor follows an imposed vector is seen elsewhere (follow.h). */
 static bool is_lost(drive_t *drive, bool judged)
 {
     const position_t *p = &drive->position;
     const uint16_t lost = (uint16_t)(drive->lost + (p->quality == 0 ? 8U : 1U));
-    const bool low = p->quality < (p->weight == PM_ONE ? PM_Q(0.375) : 1);
+    const bool alone = drive->stage == STAGE_VECTOR && p->weight == PM_ONE;
+    const bool low = p->quality < (alone ? PM_Q(0.375) : 1);
     drive->lost = judged && low ? lost : 0U;
     return drive->lost / 8U > drive->config.protection.lost_ms;
 }
@@ -108,7 +110,7 @@ static bool is_blocked(const drive_t *drive)
 static bool all_measured(const drive_t *drive)
 {
 #if PM_HAS(six_step)
-    if (drive->stage == STAGE_SIX_STEP && block_hides_open(drive)) {
+    if (drive_commutates(drive) && block_hides_open(drive)) {
         return false;
     }
 #endif

@@ -15,7 +15,7 @@ void reference_take(drive_t *drive)
     drive->torque_target = to_signal(command->torque_uNm, drive->config.per_uNm);
     drive->i_target = to_signal(command->current_mA, drive->config.per_mA);
 #if PM_HAS(six_step)
-    const pm_num_t millionth = {.m = 1125899907, .e = -50};
+    const pm_num_t millionth = {.m = 1125899907, .e = -50}; /* 10^-6 x 2^50, rounded */
     drive->duty_target = pm_clamp(to_signal(command->duty_ppm, millionth), -PM_ONE, PM_ONE);
 #endif
 }

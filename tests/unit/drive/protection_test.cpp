@@ -377,6 +377,9 @@ TEST(Protection, LimitsThemselvesAreAllowed)
             x.d.forced = true;
             x.d.omega_ramp = turns ? -1 : 0;
             x.d.omega_target = x.d.omega_ramp + (ramps ? 1 : 0);
+            x.d.position.weight = PM_ONE;
+            x.d.position.quality = 1; // little is not none
+            EXPECT_EQ(calls(x, 10000), 10000) << ramps << turns;
             x.d.position.quality = 0;
             const bool judged = turns && !ramps;
             EXPECT_EQ(calls(x, 10000), judged ? c.lost_ms + 1 : 10000) << ramps << turns;
