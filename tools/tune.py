@@ -248,6 +248,15 @@ def from_board(x, told, board):
     return {name: float(told.get(name, value)) for name, value in follow.items()}
 
 
+def careful(known, tolerance):
+    """L_q of a motor to whose flux saliency adds more than the magnet gives: at most what it has, though more was told. With more, the
+    active flux lags, i_d is lost to i_q, the flux falls and lags further (docs/methods_notes.md, 2.2.2)."""
+    if (known["L_q"] - known["L_d"]) * known["i_rated"] < known["psi_m"]:
+        return {}
+    why = f"the motor's over 1 + {tolerance:g}: told too much of it, the flux observer loses the position"
+    return {name: (max(known[name] / (1 + tolerance), known["L_d"]), why) for name in ("L_q", "L_q_rated")}
+
+
 def drive(x, board, tolerance):
     """`drive:` as {name: (value, why)}, what is told above what is chosen."""
     def of(section, key):
@@ -274,6 +283,7 @@ def drive(x, board, tolerance):
         known[name] = told.get(name, value)
     out["offset_max"] = 0.03 * known["i_full_scale"], "3 % of the converter's range"
     out.update((name, (value, tune.WHY[name])) for name, value in tune.values(known, tolerance=tolerance).items())
+    out.update(careful(known, tolerance))
     if in_blocks(x):
         out["v_terminal_full_scale"] = of("sensor", "v_leg_full_scale_V"), "the sensor's"
         out["emf_shape"] = (1.0 if x.get("winding", {}).get("trapezoid_flat_deg") else 0.0), "the winding's; a sine if nothing is told"

@@ -119,8 +119,17 @@ class Tune(unittest.TestCase):
     def test_a_vector_turns_no_rotor_away(self):
         """psi_m i - (L_q - L_d) i^2, its stiffness, is positive and falls beyond psi_m / (2 (L_q - L_d))."""
         told = motor("PM-SyRM, saturated")
-        found = self.drive(told)
-        self.assertAlmostEqual(found["i_open_loop"], 0.15 / (2 * (found["L_q"] - found["L_d"])), places=2)
+        found, exact = self.drive(told), self.drive(told, "--tolerance", "0")
+        self.assertAlmostEqual(found["i_open_loop"], 0.15 / (2 * (exact["L_q"] - exact["L_d"])), places=2)
+
+    def test_of_a_reluctance_machine_no_more_L_q_than_it_has(self):
+        for name, share in (("PM-SyRM, saturated", 1.15), ("compressor", 1.0)):
+            found, exact = self.drive(motor(name)), self.drive(motor(name), "--tolerance", "0")
+            for key in ("L_q", "L_q_rated"):
+                self.assertAlmostEqual(exact[key] / found[key], share, delta=0.001, msg=f"{name}, {key}")
+            self.assertEqual(found["L_d"], exact["L_d"])
+        told = {**motor("PM-SyRM, saturated"), "drive": {"L_q": 60e-3}}
+        self.assertEqual(self.drive(told)["L_q"], 60e-3)
 
     def test_the_emf_at_the_hand_over_is_above_what_is_not_known(self):
         for name in MOTORS:
