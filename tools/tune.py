@@ -250,7 +250,7 @@ def from_board(x, told, board):
 
 def careful(known, tolerance):
     """L_q of a motor to whose flux saliency adds more than the magnet gives: at most what it has, though more was told. With more, the
-    active flux lags, i_d is lost to i_q, the flux falls and lags further (docs/methods_notes.md, 2.2.2)."""
+    estimate lags, the rotor has less negative i_d, its flux falls and the estimate lags further (docs/methods_notes.md, 2.2.2)."""
     if (known["L_q"] - known["L_d"]) * known["i_rated"] < known["psi_m"]:
         return {}
     why = f"the motor's over 1 + {tolerance:g}: told too much of it, the flux observer loses the position"

@@ -131,6 +131,26 @@ class Tune(unittest.TestCase):
         told = {**motor("PM-SyRM, saturated"), "drive": {"L_q": 60e-3}}
         self.assertEqual(self.drive(told)["L_q"], 60e-3)
 
+    def test_told_more_L_q_than_it_has_a_reluctance_machine_keeps_its_position(self):
+        """L_q told 15 % too large, friction 44 % of rated torque. Twin: the drive takes it as told, and loses the position."""
+        told = {
+            "name": "PM-SyRM with friction",
+            "electrical": {"R_s_ohm": 1.128, "L_d0_H": 6.28e-3, "L_q0_H": 1.15 * 24.5e-3, "psi_m_Wb": 0.1164, "pole_pairs": 2,
+                           "c_A_Wb5": 8292},
+            "mechanics": {"J_kgm2": 1.415e-3, "T_coulomb_Nm": 2.53},
+            "rated": {"i_rated_A": 15.7, "speed_rated_rad_s": 217, "v_dc_V": 400},
+        }
+        careful = yaml.safe_load(self.tune(told).stdout)
+        careful["electrical"]["L_q0_H"] = 24.5e-3
+        exact = self.drive(told, "--tolerance", "0")
+        twin = {**careful, "drive": {**careful["drive"], "L_q": exact["L_q"], "L_q_rated": exact["L_q_rated"]}}
+        for machine, fault in ((careful, "NONE"), (twin, "POSITION_LOST")):
+            self.told.write_text(yaml.safe_dump(machine), encoding="utf-8")
+            result = subprocess.run([PMSIM, "run", str(SCENARIO), "--set", f"machine={self.told}", "--seeds", "3", "--quiet"],
+                                    capture_output=True, text=True, check=False)
+            self.assertEqual(result.returncode, 0 if fault == "NONE" else 1, result.stdout + result.stderr)
+            self.assertRegex(result.stdout, rf"fault +{fault} .*median of 3 seeds {fault}")
+
     def test_the_emf_at_the_hand_over_is_above_what_is_not_known(self):
         for name in MOTORS:
             tuned = yaml.safe_load(self.tune(motor(name)).stdout)
