@@ -83,10 +83,12 @@ obs_out_t injection_last(const injection_t *self, const injection_config_t *conf
 
 /* Of the source that the parameter `injection` names. injection_sees_saliency(): the carrier is more than dead time and
  * devices take of it without load, its answer at 45 degrees of error is four times the noise, and some saliency is left at
- * rated current. make_injection() refuses a carrier below the first. */
+ * half of rated current, at all of it for sources of the stator. make_injection() refuses a carrier below the first.
+ * injection_current(): i_q up to which saturation leaves some. */
 void make_injection(maker_t *m, injection_config_t *c);
 injection_limits_t injection_limits(const maker_t *m);
 bool injection_sees_saliency(const maker_t *m);
+pm_q_t injection_current(maker_t *m);
 
 /* injection_step() of all but those, and with stages of these too. */
 void injection_step_other(injection_t *self, const injection_config_t *config, const injection_in_t *in,

@@ -1,4 +1,5 @@
 #include "firmware/math/image.h"
+#include "firmware/math/root.h"
 #include "injection/injection.h"
 #include "injection/saliency_config.h"
 #include "injection/sine.h"
@@ -31,7 +32,7 @@ uint32_t injection_traits(injection_id_t id)
 #include "injection/injections.def"
 #undef PM_METHOD
     };
-    return traits_of[id];
+    return id < INJECTION_COUNT ? traits_of[id] : 0U;
 }
 
 void make_injection(maker_t *m, injection_config_t *c)
@@ -85,15 +86,39 @@ static pm_num_t answer(const maker_t *m)
     }
 }
 
-/* The carrier must pass the legs, its answer be four times the noise, the saliency 5 %, and some of it be left at rated
- * current. */
+/* Whether the source reads the current across the axis of the rotor; else it follows the axis of the saliency, which saturation
+ * turns away from that. */
+static bool reads_across(const maker_t *m)
+{
+    const uint32_t traits = injection_traits((injection_id_t)m->params->injection);
+    return (traits & ((uint32_t)SOURCE_STATOR | (uint32_t)SOURCE_ONE_WAY)) == 0U;
+}
+
+/* Share of the slope across that rated current takes away; at most 8. */
+static pm_q_t saturates(const maker_t *m)
+{
+    const inductances_t zero = inductances_at_zero(m);
+    const inductances_t rated = inductances_at_rated(m);
+    const pm_num_t slope = slope_across(&zero, pm_num(1));
+    const pm_num_t fall = pm_num_sub(slope, slope_across(&rated, pm_num(1)));
+    pm_q_t share;
+    (void)pm_num_to_fixed(pm_num_div(fall, slope), Q_BITS, &share);
+    return share;
+}
+
+/* The carrier must pass the legs, its answer be four times the noise, the saliency 5 %, and some of it be left at half of rated
+ * current, or at all of it. */
 bool injection_sees_saliency(const maker_t *m)
 {
-    const inductances_t L = inductances_at_zero(m);
-    const inductances_t rated = inductances_at_rated(m);
-    const pm_num_t dL = pm_num_sub(L.L_q, L.L_d);
-    const pm_num_t noise = pm_num_mul(pm_num(4), si(m, DRIVE_PARAM_i_noise));
-    return carrier_passes(m) && pm_num_cmp(answer(m), noise) > 0 &&
-           pm_num_cmp(dL, pm_num_mul(L.L_q, pm_num_ratio(1, 20))) > 0 &&
-           pm_num_cmp(slope_across(&rated, pm_num(1)), pm_num(0)) > 0;
+    const drive_params_t *p = m->params;
+    const pm_num_t noise = pm_num_dec(4 * p->i_noise, drive_param_exp10[DRIVE_PARAM_i_noise]);
+    return carrier_passes(m) && pm_num_cmp(answer(m), noise) > 0 && p->L_q - p->L_d > p->L_q / 20 &&
+           saturates(m) < (reads_across(m) ? 4 : 1) * PM_ONE;
+}
+
+/* The slope falls with the square of the current: 0.9 of where it would be zero, or 7 times rated current. */
+pm_q_t injection_current(maker_t *m)
+{
+    const pm_q_t share = pm_div(PM_Q(0.9), pm_sqrt(pm_max(saturates(m), PM_ONE / 64)));
+    return reads_across(m) ? pm_mul(share, per_unit(m, DRIVE_PARAM_i_rated, m->base.i)) : PM_Q_MAX;
 }

@@ -45,21 +45,13 @@ pm_num_t slope_sequence(const inductances_t *L, pm_num_t flux)
     return pm_num_div(mul3(pm_num(2), flux, saliency_k(L)), saliency_d(L));
 }
 
-static bool positive(pm_num_t x)
-{
-    return pm_num_cmp(x, pm_num(0)) > 0;
-}
-
-/* Slopes: current per radian without load and at rated current. */
+/* Slopes: current per radian without load and at rated current, where nothing may be left of it. */
 static void make_gain(maker_t *m, saliency_config_t *c, pm_num_t slope_0, pm_num_t slope_r)
 {
-    if (!positive(slope_0) || !positive(slope_r)) {
-        refuse(m, DRIVE_PARAM_L_qh_rated, "leaves no saliency for injection at rated current");
-        return;
-    }
     const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
     const pm_num_t gain_0 = pm_num_div(m->base.i, slope_0);
-    const pm_num_t gain_r = least(pm_num_div(m->base.i, slope_r), pm_num_mul(GAIN_RISE, gain_0));
+    const pm_num_t most = pm_num_mul(GAIN_RISE, gain_0);
+    const pm_num_t gain_r = slope_r.m > 0 ? least(pm_num_div(m->base.i, slope_r), most) : most;
     c->gain_0 = fixed(m, gain_0, SMALL_BITS, DRIVE_PARAM_v_injection);
     c->gain_2 = fixed(m, pm_num_div(pm_num_sub(gain_r, gain_0), square(i_rated)), SMALL_BITS - 4,
                       DRIVE_PARAM_v_injection);

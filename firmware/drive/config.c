@@ -96,7 +96,7 @@ static void limit_imposed(drive_config_t *config)
 }
 #endif
 
-static void make_protection(maker_t *m, protection_config_t *c)
+static void make_protection(maker_t *m, protection_config_t *c, pm_q_t most)
 {
     const drive_params_t *p = m->params;
     const pm_q_t i_trip = per_unit(m, DRIVE_PARAM_i_trip, m->base.i);
@@ -130,7 +130,7 @@ static void make_protection(maker_t *m, protection_config_t *c)
     c->temp_trip_dC = (int16_t)p->temp_trip;
     c->omega_stall = speed(m, DRIVE_PARAM_speed_max) / 50;
     c->stall_ms = (uint16_t)p->t_stall;
-    c->i_stall = pm_min(i_rated / 4 * 3, per_unit(m, DRIVE_PARAM_i_max, m->base.i) / 16 * 15);
+    c->i_stall = pm_min(i_rated / 4 * 3, most / 16 * 15);
     c->lost_ms = (uint16_t)p->t_lost;
     if (p->i_trip > p->i_full_scale) {
         refuse(m, DRIVE_PARAM_i_trip, "above the full scale of the current channels");
@@ -197,7 +197,6 @@ static void check_board(maker_t *m)
 static void make_limits(maker_t *m, drive_config_t *config)
 {
     config->k_theta = config->position.pll_low.k_theta;
-    config->i_max = per_unit(m, DRIVE_PARAM_i_max, m->base.i);
     config->i_d_light = per_unit(m, DRIVE_PARAM_i_d_light, m->base.i);
     config->omega_max = speed(m, DRIVE_PARAM_speed_max);
     config->v_share = fixed(m, pm_num_mul(si(m, DRIVE_PARAM_voltage_limit), pm_num_sqrt(pm_num_ratio(1, 3))),
@@ -239,7 +238,9 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     make_base(&m, config);
     config->base = m.base;
     config->pole_pairs = pole_pairs(&m);
-    config->slow_divider = m.slow_divider;
+    config->slow_divider = (uint16_t)m.slow_divider;
+    config->i_max = per_unit(&m, DRIVE_PARAM_i_max, m.base.i);
+    config->i_injection = config->i_max;
     config->injection =
         params->start_method % 2 == 1 || (params->start_method == 0 && injection_sees_saliency(&m));
 #if PM_CARRIES(NEEDS_NEUTRAL)
@@ -250,6 +251,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
         const injection_limits_t limits = injection_limits(&m);
         m.comp_zone = limits.comp_zone;
         m.swing = limits.swing;
+        config->i_injection = pm_min(config->i_max, injection_current(&m));
     }
     make_modulator(&m, &config->modulator);
     make_regulator(&m, &config->regulator);
@@ -270,7 +272,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     }
     make_open_loop(&m, &config->open_loop);
     PM_IN_IMAGE(torque_polarity, make_torque_polarity(&m, &config->torque_polarity);)
-    make_protection(&m, &config->protection);
+    make_protection(&m, &config->protection, config->i_injection);
     make_fault_short(&m, &config->fault_short);
     PM_IN_IMAGE(six_step, make_block(&m, &config->block);)
     make_limits(&m, config);

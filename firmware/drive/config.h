@@ -101,16 +101,17 @@ typedef struct {
     PM_IN_IMAGE(six_step, block_config_t block;)
     pm_num_t pole_pairs;
     pm_num_t per_mrad_s, per_uNm, per_mA; /* units of a command in per-unit */
-    uint32_t slow_divider;                /* periods per drive_slow(): the nearest to 1 ms */
+    uint16_t slow_divider;                /* periods per drive_slow(): the nearest to 1 ms */
+    uint16_t charge_periods;              /* of the upper switches' supply; 0: needs none */
     bool injection;                       /* injection leads at low speed; else open-loop start */
     uint8_t start;                        /* SEQUENCE_...: how the initial position is found ... */
     uint8_t find;                         /* PROCEDURE_...: ... by which of them ... */
 #if SEQUENCE_HAS_POLARITY
     uint8_t pole; /* PROCEDURE_...: ... and what tells the pole afterwards, or none */
 #endif
-    uint16_t charge_periods; /* of the upper switches' supply; 0: needs none */
-    int32_t k_theta;         /* pm_omega_to_angle() */
+    int32_t k_theta; /* pm_omega_to_angle() */
     pm_q_t i_max;
+    pm_q_t i_injection; /* of i_q while the carrier is on: what leaves saliency */
     pm_q_t i_d_light;
     pm_q_t omega_max;
     pm_unit_t v_share; /* share of v_dc that the voltage vector may reach */

@@ -92,7 +92,8 @@ void reference_vector(drive_t *drive)
     const pm_q_t share = pm_mul(drive->i_ref.d, drive->i_ref.d);
     pm_q_t i_min;
     pm_q_t i_max;
-    reference_range(drive, pm_sqrt(pm_mul(c->i_max, c->i_max) - share), &i_min, &i_max);
+    const pm_q_t most = pm_sqrt(pm_mul(c->i_max, c->i_max) - share);
+    reference_range(drive, drive->position.inject ? pm_min(most, c->i_injection) : most, &i_min, &i_max);
     const pm_q_t i_q = reference_torque(drive, measured_speed(drive), i_min, i_max);
     /* at once it would disturb an observer in proportion to the errors of R and L */
     drive->i_open -= drive->i_open / 16;

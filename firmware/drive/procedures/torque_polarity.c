@@ -10,7 +10,7 @@
 #define ALL_MS   (PULSE_MS + FALL_MS + REST_MS)
 #define SEEN     ((int32_t)PM_TURN(1.0 / 16))
 #define FAR      ((int32_t)PM_TURN(3.0 / 8)) /* no pulse turns it so far */
-#define MOST     8U                          /* pulses of i_max */
+#define MOST     8U                          /* pulses of the largest current */
 
 enum { PART_LOCK, PART_FORTH, PART_BACK, PART_TOLD };
 
@@ -43,18 +43,20 @@ static int32_t turned_by(const drive_t *drive)
     return pm_angle_diff(drive->position.pll.theta, drive->beside.torque_polarity.theta);
 }
 
-/* The other way than before, it counts from the farthest that it has come. */
+/* The other way than before, it counts from the farthest that it has come. With current, cross-saturation shows some of it that is
+ * not there. */
 static bool has_turned(drive_t *drive, bool rests)
 {
     torque_polarity_t *self = &drive->beside.torque_polarity;
     const int32_t turned = turned_by(drive);
+    const int32_t seen = rests ? SEEN : SEEN / 2 * 3;
     if (self->part == (uint8_t)PART_FORTH) {
-        return pm_abs(turned) >= SEEN;
+        return pm_abs(turned) >= seen;
     }
     if (rests && (turned > 0) == self->forwards) {
         self->theta = drive->position.pll.theta;
     }
-    return (self->forwards ? -turned : turned) >= SEEN;
+    return (self->forwards ? -turned : turned) >= seen;
 }
 
 static pm_procedure_t look(drive_t *drive, bool turned)
@@ -63,8 +65,8 @@ static pm_procedure_t look(drive_t *drive, bool turned)
     const torque_polarity_config_t *c = &drive->config.torque_polarity;
     self->ms = 0;
     if (!turned) {
-        self->pulses = (uint8_t)(self->pulses + (self->i == drive->config.i_max ? 1U : 0U));
-        self->i = pm_min(self->i + c->step, drive->config.i_max);
+        self->pulses = (uint8_t)(self->pulses + (self->i == drive->config.i_injection ? 1U : 0U));
+        self->i = pm_min(self->i + c->step, drive->config.i_injection);
         return self->pulses < MOST ? PM_RUNNING : PM_FAILED_NOT_TURNING;
     }
     if (self->part == (uint8_t)PART_FORTH) {

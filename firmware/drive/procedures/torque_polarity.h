@@ -16,9 +16,10 @@
  *
  * 60 ms for injection, 40 ms a pulse: 0.2 s at rest without load, 1.7 s and as much again for the heaviest; 0.7 to 1.7 s until a
  * rotor that is held is refused. Movement: 22.5 electrical degrees forth and what it goes on by itself, 105 at most for a free
- * IPM-1000. Peak current: what turns it, i_max at most, and the carrier. PM_FAILED_NOT_TURNING: not within eight pulses of i_max;
- * PM_FAILED_TURNED: by 135 degrees within a pulse, as a load or its own speed does it; PM_FAILED_SALIENCY: the frame turns as fast
- * as half of speed_trip, as one that nothing holds. No division. State 16 bytes.
+ * IPM-1000. Peak current: what turns it, i_max at most and no more than injection may have, and the carrier.
+ * PM_FAILED_NOT_TURNING: not within eight pulses of that; PM_FAILED_TURNED: by 135 degrees within a pulse, as a load or its own
+ * speed does it; PM_FAILED_SALIENCY: the frame turns as fast as half of speed_trip, as one that nothing holds. No division. State
+ * 16 bytes.
  * Tests: tests/unit/drive/torque_polarity_test.cpp, tests/scenario/start_fallback.yaml, start_weak_magnets.yaml. */
 #ifndef DRIVE_PROCEDURES_TORQUE_POLARITY_H
 #define DRIVE_PROCEDURES_TORQUE_POLARITY_H
@@ -37,7 +38,7 @@ typedef struct {
     pm_angle_t theta; /* from which on it turns */
     pm_q_t i;         /* of this pulse */
     uint16_t ms;
-    uint8_t pulses; /* of i_max, in this direction */
+    uint8_t pulses; /* of the largest current, in this direction */
     uint8_t part;
     bool forwards; /* it turned with +i_q */
 } torque_polarity_t;

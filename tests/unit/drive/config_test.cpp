@@ -1024,16 +1024,15 @@ TEST(Config, RandomSetsHaveNoDeadGain)
     }
 }
 
-// The saliency is gone, or turned round, at rated current: positive feedback of the injection loop.
-TEST(Config, RefusesInjectionWhoseSaliencyTurnsRound)
+// The saliency is gone, or turned round, at rated current: the gain of the injection loop stays positive, the current below that.
+TEST(Config, InjectsBelowTheCurrentThatTurnsTheSaliencyRound)
 {
     for (const double L_qh : {20e-3, 42.55e-3}) {
         const drive_params_t p = changed({{DRIVE_PARAM_L_qh_rated, L_qh}, {DRIVE_PARAM_L_dqh_rated, 0}});
-        drive_config_t c = {};
-        const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
-        if (r.ok && c.injection) {
-            EXPECT_GT(injection_gain(c, 0.4), 0) << L_qh;
-        }
+        const drive_config_t c = configure(p);
+        EXPECT_TRUE(c.injection) << L_qh;
+        EXPECT_GT(injection_gain(c, real(c.i_max)), 0) << L_qh;
+        EXPECT_LT(c.i_injection, c.i_max) << L_qh;
     }
 }
 

@@ -106,6 +106,27 @@ TEST(Reference, DeratedCurrentIsTheSmallerLimit)
     }
 }
 
+// With the carrier on, what leaves it a saliency to see; without, and within the circle, as ever.
+TEST(Reference, CurrentIsLimitedWhileInjecting)
+{
+    for (const double way : {1.0, -1.0}) {
+        for (const bool inject : {false, true}) {
+            for (const double i_d : {0.0, -0.45}) {
+                Drive x = running(DRIVE_MODE_TORQUE);
+                x.d.config.i_injection = PM_Q(0.3);
+                x.d.position.inject = inject;
+                x.d.torque_target = fixed(2 * way, 28);
+                x.d.i_ref.d = fixed(i_d, 28);
+                reference_vector(&x.d);
+                const double circle = std::sqrt(kI_max * kI_max - i_d * i_d);
+                EXPECT_NEAR(real(x.d.i_ref.q), way * (inject ? std::min(0.3, circle) : circle), kCurrent)
+                    << i_d;
+                EXPECT_NE(x.d.status.limits & DRIVE_LIMIT_CURRENT, 0U);
+            }
+        }
+    }
+}
+
 TEST(Reference, AxesAreThoseOfTheLargestTorquePerAmpere)
 {
     const double light = 0.2 / kI_A; // i_d_light

@@ -66,6 +66,23 @@ TEST(TorquePolarity, BehindABrakeTheCurrentGrowsUntilTheRotorTurns)
     }
 }
 
+// Cross-saturation turns what injection sees by up to 6 degrees while there is current: a rotor that has not quite turned far
+// enough seems to have, in every pulse, until the current has gone.
+TEST(TorquePolarity, WhatCrossSaturationShowsEndsNoPulse)
+{
+    plant_config_t braked = weak_magnets();
+    braked.machine.c_A_Wb5 = 120;
+    for (const double brake : {0.4, 0.45, 0.5, 0.55}) {
+        braked.mech.T_coulomb_Nm = brake * kRated_Nm;
+        for (int k = 0; k < kAngles; ++k) {
+            Start x(braked, told(), angle(k));
+            x.run_past(PROCEDURE_torque_polarity);
+            EXPECT_EQ(drive_status(&x.drive())->fault, DRIVE_FAULT_NONE) << brake << ' ' << k;
+            EXPECT_LE(std::abs(x.error_rad()), 20 * kDegree) << brake << ' ' << k;
+        }
+    }
+}
+
 TEST(TorquePolarity, AHeldRotorIsRefusedNotGuessed)
 {
     for (int k = 0; k < kAngles; ++k) {

@@ -225,17 +225,73 @@ TEST(InjectionConfig, PositiveSequenceFollowsTheInductances)
     }
 }
 
-TEST(InjectionConfig, NoSaliencyAtRatedCurrentIsRefused)
+// What follows the axis of the saliency has none to follow there.
+TEST(InjectionConfig, NoSaliencyAtRatedCurrentIsRefusedToSourcesOfTheStator)
 {
-    for (const int32_t id :
-         {INJECTION_pulsating_square, INJECTION_rotating_sine, INJECTION_stationary_square}) {
+    for (const int32_t id : {INJECTION_rotating_sine, INJECTION_stationary_square}) {
         drive_params_t p = with(id);
         p.L_qh_rated = p.L_dh_rated - 1000000;
         p.L_dqh_rated = 0;
         drive_config_t c = {};
         const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
         EXPECT_FALSE(r.ok) << id;
-        EXPECT_TRUE(r.param == DRIVE_PARAM_L_qh_rated || r.param == DRIVE_PARAM_L_dqh_rated) << id;
+        EXPECT_EQ(r.param, DRIVE_PARAM_L_dqh_rated) << id;
+        p.start_method = 0;
+        EXPECT_FALSE(configure(p).injection) << id;
+    }
+}
+
+// Of the parabola of the slope through what there is without current and at rated current; L_d, L_q and L_dq at rated current.
+TEST(InjectionConfig, CurrentEndsBeforeTheSaliency)
+{
+    struct saturated_t {
+        double L_d, L_q, L_dq; // of L_q without current
+    };
+    for (const int32_t id : {INJECTION_pulsating_square, INJECTION_pulsating_sine}) {
+        for (const saturated_t &x :
+             {saturated_t{0.5, 0.7, 0}, saturated_t{0.5, 0.5, 0}, saturated_t{0.5, 0.48, 0.05},
+              saturated_t{0.5, 0.4, 0}, saturated_t{0.5, 0.99, 0}}) {
+            drive_params_t p = with(id);
+            p.L_d = p.L_q / 2;
+            p.L_dh_rated = static_cast<int32_t>(x.L_d * p.L_q);
+            p.L_qh_rated = static_cast<int32_t>(x.L_q * p.L_q);
+            p.L_dqh_rated = static_cast<int32_t>(x.L_dq * p.L_q);
+            const double slope_0 = 0.5 / 0.5;
+            const double slope_r =
+                (x.L_q - x.L_d + 2 * x.L_dq * x.L_dq / x.L_q) / (x.L_d * x.L_q - x.L_dq * x.L_dq);
+            const double gone = std::sqrt(slope_0 / (slope_0 - slope_r)); // of rated current
+            const double most =
+                std::min(0.9 * gone * p.i_rated, static_cast<double>(p.i_max)) / p.i_full_scale;
+            const drive_config_t c = configure(p);
+            EXPECT_NEAR(real(c.i_injection), most, 1e-4) << id << ' ' << x.L_q;
+            EXPECT_LE(real(c.protection.i_stall), 15.0 / 16 * most + 1e-6) << id << ' ' << x.L_q;
+        }
+    }
+}
+
+// Where the axis of the saliency is followed, its amplitude does not vanish with the slope across.
+TEST(InjectionConfig, SourcesOfTheStatorHaveAllOfTheCurrent)
+{
+    for (const int32_t id : {INJECTION_rotating_sine, INJECTION_stationary_square, INJECTION_inform}) {
+        drive_params_t p = with(id);
+        p.L_qh_rated = p.L_dh_rated + 2000000;
+        const drive_config_t c = configure(p);
+        EXPECT_EQ(c.i_injection, c.i_max) << id;
+    }
+}
+
+// Chosen by saliency it injects where at half of rated current some is left, by the same parabola: 1/L_d - 1/L_q falls by less than
+// four times what it is.
+TEST(InjectionConfig, SaliencyIsSeenToHalfOfRatedCurrent)
+{
+    for (const double slope_r : {-3.1, -2.9, 0.0, 0.5}) {
+        drive_params_t p = with(INJECTION_pulsating_square);
+        p.start_method = 0;
+        p.L_d = p.L_q / 2;
+        p.L_dh_rated = p.L_d;
+        p.L_qh_rated = static_cast<int32_t>(p.L_q / (2 - slope_r));
+        p.L_dqh_rated = 0;
+        EXPECT_EQ(configure(p).injection, slope_r > -3) << slope_r;
     }
 }
 
