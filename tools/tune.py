@@ -13,8 +13,9 @@ my_motor.yaml, all that it must have:
     rated: {i_rated_A: 20, speed_rated_rad_s: 40, v_dc_V: 36}   # peak of a phase; mechanical
 
 What else a machine file may have is kept; inverter, sensors and link that are not told are those of a board of the motor's
-class. What `drive:` of the file says stands above what is chosen here. The rules are those of `pmdrive tune`. Saturation is
-taken from c_A_Wb5 of `electrical:`, or from L_q_rated of `drive:`. L_q may be below L_d.
+class: MOSFETs up to 100 V; IGBTs above, or silicon carbide from 40 kHz on. What `drive:` of the file says stands above what is
+chosen here. The rules are those of `pmdrive tune`. Saturation is taken from c_A_Wb5 of `electrical:`, or from L_q_rated of `drive:`.
+L_q may be below L_d.
 
 `injection: 4` or `1` in `drive:` asks for a sine along d or a rotating one: its amplitude, frequency and loops are then chosen by the
 position error that is predicted for each of twelve carriers without load and at rated current (METHODS.md 5.8.3, row 67). It is
@@ -46,7 +47,7 @@ NEEDED = {
     "rated": ("i_rated_A", "speed_rated_rad_s", "v_dc_V"),
 }
 TIMER_HZ = 170e6
-LOW_V = 60  # below: MOSFETs
+LOW_V = 100  # up to there: MOSFETs, which bear half as much again
 FAST_HZ = 40e3  # from here on above LOW_V: silicon carbide
 PWM_HZ = (10e3, 20e3, 40e3, 60e3)
 PER_TURN = 20  # periods of a turn of the field at the speed that trips
