@@ -107,7 +107,7 @@ static pm_q_t saturates(const maker_t *m)
 }
 
 /* The carrier must pass the legs, its answer be four times the noise, the saliency 5 %, and some of it be left at half of rated
- * current, or at all of it. */
+ * current; at all of rated current for sources that follow the axis of the saliency. */
 bool injection_sees_saliency(const maker_t *m)
 {
     const drive_params_t *p = m->params;

@@ -15,6 +15,7 @@ import yaml
 ROOT = Path(__file__).resolve().parents[3]
 TOOL = ROOT / "tools" / "tune.py"
 SCENARIO = Path(__file__).with_name("start.yaml")
+SATURATED = Path(__file__).with_name("saturated.yaml")
 PMSIM = None
 
 # Name: R_s, L_d, L_q, psi_m, pole pairs, J, rated current, speed, link
@@ -49,6 +50,16 @@ def motor(name):
     }
 
 
+def round_at_rated_current(friction):
+    """A PM-SyRM of 6.1 Nm whose rated current leaves L_qh below L_dh; friction in Nm."""
+    return {
+        "name": "PM-SyRM, round at rated current",
+        "electrical": {"R_s_ohm": 0.575, "L_d0_H": 14.29e-3, "L_q0_H": 36.07e-3, "psi_m_Wb": 0.182, "pole_pairs": 2, "c_A_Wb5": 2791},
+        "mechanics": {"J_kgm2": 2.6e-3, "T_coulomb_Nm": friction},
+        "rated": {"i_rated_A": 11.2, "speed_rated_rad_s": 222, "v_dc_V": 496},
+    }
+
+
 class Tune(unittest.TestCase):
     def setUp(self):
         self.folder = tempfile.TemporaryDirectory()
@@ -59,13 +70,18 @@ class Tune(unittest.TestCase):
         self.told.write_text(told if isinstance(told, str) else yaml.safe_dump(told), encoding="utf-8")
         return subprocess.run([sys.executable, str(TOOL), str(self.told), *words], capture_output=True, text=True, check=False)
 
+    def run_seeds(self, machine, scenario):
+        """Three; the exit code and what pmsim says."""
+        self.told.write_text(yaml.safe_dump(machine), encoding="utf-8")
+        result = subprocess.run([PMSIM, "run", str(scenario), "--set", f"machine={self.told}", "--seeds", "3", "--quiet"],
+                                capture_output=True, text=True, check=False)
+        return result.returncode, result.stdout + result.stderr
+
     def runs_into(self, machine, fault):
         """Each of three seeds; NONE: and within all bounds."""
-        self.told.write_text(yaml.safe_dump(machine), encoding="utf-8")
-        result = subprocess.run([PMSIM, "run", str(SCENARIO), "--set", f"machine={self.told}", "--seeds", "3", "--quiet"],
-                                capture_output=True, text=True, check=False)
-        self.assertEqual(result.returncode, 0 if fault == "NONE" else 1, result.stdout + result.stderr)
-        self.assertRegex(result.stdout, rf"fault +{fault} .*median of 3 seeds {fault}")
+        code, text = self.run_seeds(machine, SCENARIO)
+        self.assertEqual(code, 0 if fault == "NONE" else 1, text)
+        self.assertRegex(text, rf"fault +{fault} .*median of 3 seeds {fault}")
 
     def refused(self, told, *what):
         result = self.tune(told)
@@ -158,19 +174,21 @@ class Tune(unittest.TestCase):
     def test_a_machine_that_rated_current_leaves_no_saliency_starts_by_what_less_leaves(self):
         """Friction 47 % of rated torque, L_qh below L_dh at rated current: injection holds the rotor with less. Twin: in open loop
         saliency allows a vector that friction holds."""
-        told = {
-            "name": "PM-SyRM, round at rated current",
-            "electrical": {"R_s_ohm": 0.575, "L_d0_H": 14.29e-3, "L_q0_H": 36.07e-3, "psi_m_Wb": 0.182, "pole_pairs": 2,
-                           "c_A_Wb5": 2791},
-            "mechanics": {"J_kgm2": 2.6e-3, "T_coulomb_Nm": 2.88},
-            "rated": {"i_rated_A": 11.2, "speed_rated_rad_s": 222, "v_dc_V": 496},
-        }
-        tuned = yaml.safe_load(self.tune(told).stdout)
+        tuned = yaml.safe_load(self.tune(round_at_rated_current(2.88)).stdout)
         self.assertEqual(tuned["drive"]["start_method"], 0)
         self.assertLess(tuned["drive"]["L_qh_rated"], tuned["drive"]["L_dh_rated"])
         twin = {**tuned, "drive": {**tuned["drive"], "start_method": 2}}
         for machine, fault in ((tuned, "NONE"), (twin, "STALL")):
             self.runs_into(machine, fault)
+
+    def test_torque_by_injection_ends_before_the_saliency(self):
+        """3.7 degrees. Twin: told 13 mH of L_qh, more than L_dh, it takes 11.7 A in place of 9.5: 7.5 degrees."""
+        tuned = yaml.safe_load(self.tune(round_at_rated_current(0.06)).stdout)
+        twin = {**tuned, "drive": {**tuned["drive"], "L_qh_rated": 13e-3}}
+        code, text = self.run_seeds(tuned, SATURATED)
+        self.assertEqual(code, 0, text)
+        code, text = self.run_seeds(twin, SATURATED)
+        self.assertRegex(text, "FAIL +angle_error_max_deg.* 0 of 3")
 
     def test_the_emf_at_the_hand_over_is_above_what_is_not_known(self):
         for name in MOTORS:
