@@ -8,7 +8,7 @@ const char *pm_need_text(uint32_t missing)
         uint32_t bit;
         const char *text;
     } table[] = {
-#define PM_NEED_ROW(name, needs, bit, what, verb) {bit, "needs " what ", which this board does not " verb},
+#define PM_NEED_ROW(name, needs, bit, what) {bit, "needs " what ": not on this board"},
         PM_NEED_LIST(PM_NEED_ROW, , )
 #undef PM_NEED_ROW
     };

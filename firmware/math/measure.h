@@ -3,7 +3,7 @@
  * A port declares what it has (hal_channels(), hal/hal.h), a method what it needs: the last word of its row
  * PM_METHOD(name, help, traits, needs). Both are sums of the names in PM_NEED_LIST. Checked twice:
  *   configuration   the parameter that chooses a method is refused with pm_need_text():
- *                   "needs the neutral voltage, which this board does not measure"
+ *                   "needs the neutral voltage: not on this board"
  *   build           PM_CHANNELS is what the program carries: everything, or in an image what its manifest
  *                   names. A row that needs more fails the build by the method's name (PM_CHECK_NEEDS), a
  *                   board that has less by the channel's name (PM_CHECK_BOARD).
@@ -38,18 +38,18 @@
  * them before its first pulse (firmware/drive/procedures/charge.h). */
 #define PM_BOOTSTRAP 0x8000U
 
-/* X(name, needs, bit, what it is, what a board without it does not do) */
+/* X(name, needs, bit, what it is) */
 #define PM_NEED_LIST(X, name, needs)                                                                         \
-    X(name, needs, NEEDS_DC_CURRENT, "the DC-link current", "measure")                                       \
-    X(name, needs, NEEDS_TERMINALS, "the terminal voltages", "measure")                                      \
-    X(name, needs, NEEDS_NEUTRAL, "the neutral voltage", "measure")                                          \
-    X(name, needs, NEEDS_SECOND_SAMPLE, "a second sample in the period", "take")                             \
-    X(name, needs, NEEDS_CAPTURES, "edges of terminal comparators", "capture")                               \
-    X(name, needs, NEEDS_CURRENT_MASK, "the validity of each current", "tell")                               \
-    X(name, needs, NEEDS_HALVES, "different halves of a period", "make")                                     \
-    X(name, needs, NEEDS_HELD, "legs held high or low", "make")                                              \
-    X(name, needs, NEEDS_ONE_SWITCH, "PWM on one switch of a leg", "make")                                   \
-    X(name, needs, NEEDS_COMMUTATE, "commutation within the period", "make")
+    X(name, needs, NEEDS_DC_CURRENT, "the DC-link current")                                                  \
+    X(name, needs, NEEDS_TERMINALS, "the terminal voltages")                                                 \
+    X(name, needs, NEEDS_NEUTRAL, "the neutral voltage")                                                     \
+    X(name, needs, NEEDS_SECOND_SAMPLE, "a second sample in the period")                                     \
+    X(name, needs, NEEDS_CAPTURES, "edges of terminal comparators")                                          \
+    X(name, needs, NEEDS_CURRENT_MASK, "the validity of each current")                                       \
+    X(name, needs, NEEDS_HALVES, "different halves of a period")                                             \
+    X(name, needs, NEEDS_HELD, "legs held high or low")                                                      \
+    X(name, needs, NEEDS_ONE_SWITCH, "PWM on one switch of a leg")                                           \
+    X(name, needs, NEEDS_COMMUTATE, "commutation within the period")
 
 #define PM_MEASURED 0x003FU
 #define PM_DONE_AT  (NEEDS_SECOND_SAMPLE | NEEDS_COMMUTATE)
@@ -76,15 +76,15 @@
 
 /* Of a row of a list, in the file that has its dispatch. */
 #define PM_CHECK_NEEDS(name, needs) PM_NEED_LIST(PM_CHECK_NEED, name, needs)
-#define PM_CHECK_NEED(name, needs, bit, what, verb)                                                          \
+#define PM_CHECK_NEED(name, needs, bit, what)                                                                \
     _Static_assert(!PM_HAS(name) || ((needs) & (bit) & ~PM_CHANNELS) == 0U,                                  \
                    #name " needs " what ", which this image does not carry");
 
 /* Of a port, in a file that only its images contain. */
 #define PM_CHECK_BOARD(channels) PM_NEED_LIST(PM_CHECK_CHANNEL, , channels)
-#define PM_CHECK_CHANNEL(name, channels, bit, what, verb)                                                    \
+#define PM_CHECK_CHANNEL(name, channels, bit, what)                                                          \
     _Static_assert((PM_CHANNELS & (bit) & ~(channels)) == 0U,                                                \
-                   "the image carries " what ", which this board does not " verb);
+                   "the image carries " what ": not on this board");
 
 #ifdef __cplusplus
 extern "C" {

@@ -29,7 +29,7 @@ TEST(Needs, AnObserverIsRefusedByTheChannelThatIsMissing)
         const drive_result_t without = configured(id, PM_ALL & ~NEEDS_NEUTRAL);
         EXPECT_FALSE(without.ok) << id;
         EXPECT_EQ(without.param, DRIVE_PARAM_observer) << id;
-        EXPECT_STREQ(without.reason, "needs the neutral voltage, which this board does not measure") << id;
+        EXPECT_STREQ(without.reason, "needs the neutral voltage: not on this board") << id;
     }
     EXPECT_TRUE(configured(OBSERVER_active_flux, PM_ALL).ok);
 }
@@ -42,10 +42,9 @@ TEST(Needs, EveryListRefusesByItsOwnParameter)
         const char *reason;
     } const rows[] = {
         {NEEDS_SECOND_SAMPLE, DRIVE_PARAM_injection,
-         "needs a second sample in the period, which this board does not take"},
-        {NEEDS_HELD, DRIVE_PARAM_regulator, "needs legs held high or low, which this board does not make"},
-        {NEEDS_TERMINALS, DRIVE_PARAM_start_method,
-         "needs the terminal voltages, which this board does not measure"},
+         "needs a second sample in the period: not on this board"},
+        {NEEDS_HELD, DRIVE_PARAM_regulator, "needs legs held high or low: not on this board"},
+        {NEEDS_TERMINALS, DRIVE_PARAM_start_method, "needs the terminal voltages: not on this board"},
     };
     for (const auto &row : rows) {
         const drive_result_t result = configured(OBSERVER_active_flux, PM_ALL & ~row.missing);
