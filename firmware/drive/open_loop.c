@@ -14,6 +14,8 @@
 #define PER_TURN (INT32_MAX / (FOLLOW_TURN / 2))
 /* With more current, before the vector turns once more. */
 #define REST_MS 100U
+/* From the lead of an observer on: the voltage of a step of the current is not that of the rotor. */
+#define SETTLE_MS 5U
 
 static void begin(drive_t *drive)
 {
@@ -75,6 +77,10 @@ void open_loop_resume(drive_t *drive)
                     drive->omega_ramp);
     follow_resume(&drive->follow);
     begin(drive);
+    drive->i_ref = (pm_dq_t){.d = drive->i_open, .q = 0};
+    if (PM_HAS(load_current)) {
+        drive->rest_ms = SETTLE_MS;
+    }
     drive->emf_open = unexplained(drive, v, i);
 }
 
@@ -265,8 +271,17 @@ void open_loop_rested(drive_t *drive)
     position_set_resistance(&drive->position, &c->position, drive->follow.R);
 }
 
+static bool settles(const drive_t *drive)
+{
+    return PM_HAS(load_current) && drive->rest_ms > 0U && drive->follow.follows;
+}
+
 void open_loop_slow(drive_t *drive)
 {
+    if (settles(drive)) {
+        drive->rest_ms--;
+        return;
+    }
     open_loop_hold(drive);
     if (PM_HAS(load_current) && drive->rest_ms > 0U) {
         drive->rest_ms--;
