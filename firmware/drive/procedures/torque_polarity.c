@@ -103,8 +103,9 @@ PM_APART pm_procedure_t procedure_torque_polarity_slow(drive_t *drive)
     if (turned && self->ms < PULSE_MS) {
         self->ms = PULSE_MS;
     }
-    give_current(drive, self->ms < PULSE_MS);
-    return self->ms < ALL_MS ? PM_RUNNING : look(drive, turned);
+    const bool held = self->ms == PULSE_MS && pm_abs(turned_by(drive)) < SEEN / 4;
+    give_current(drive, self->ms < PULSE_MS || held);
+    return self->ms < ALL_MS && !held ? PM_RUNNING : look(drive, turned);
 }
 
 void procedure_torque_polarity_abort(drive_t *drive)

@@ -12,10 +12,11 @@
  *
  * A rotor that comes off its friction is turned by one step too much; injection follows it, and it does not go far by itself, while
  *   3/2 p^2 psi_m step / J <= 1/16 rad (2 pi injection_bandwidth)^2
- *   i_max / 32 <= step <= i_max / 8
+ *   i_max / 25 <= step <= i_max / 8
  *
- * 60 ms for injection, 40 ms a pulse: 0.2 s at rest without load, 1.7 s and as much again for the heaviest; 0.7 to 1.7 s until a
- * rotor that is held is refused. Movement: 22.5 electrical degrees forth and what it goes on by itself, 105 at most for a free
+ * Where a pulse has turned it by less than 5.6 degrees the next follows without a rest. 60 ms for injection, 24 ms a pulse and 16
+ * for a rest: 0.2 s at rest without load, 1.5 s and as much again for the heaviest; 0.4 to 0.9 s until a rotor that is held is
+ * refused. Movement: 22.5 electrical degrees forth and what it goes on by itself, 105 at most for a free
  * IPM-1000. Peak current: what turns it, i_max at most and no more than injection may have, and the carrier.
  * PM_FAILED_NOT_TURNING: not within eight pulses of that; PM_FAILED_TURNED: by 135 degrees within a pulse, as a load or its own
  * speed does it; PM_FAILED_SALIENCY: the frame turns as fast as half of speed_trip, as one that nothing holds. No division. State

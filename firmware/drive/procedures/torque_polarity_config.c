@@ -12,5 +12,5 @@ PM_APART void make_torque_polarity(maker_t *m, torque_polarity_config_t *c)
     const pm_q_t i_max = per_unit(m, DRIVE_PARAM_i_max, m->base.i);
     const pm_q_t step =
         fixed(m, least(pm_num_div(follows, turns), pm_num(1)), Q_BITS, DRIVE_PARAM_injection_bandwidth);
-    c->step = pm_clamp(step, i_max / 32, i_max / 8);
+    c->step = pm_clamp(step, i_max / 25, i_max / 8);
 }
