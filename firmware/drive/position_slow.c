@@ -98,12 +98,13 @@ static void set_shown(position_t *self, pm_dq_t vector)
     (void)pm_lp1(&self->square, pm_mul(d, d) + pm_mul(q, q), K_MEAN);
 }
 
-/* The low-speed source keeps the lead. */
+/* The low-speed source keeps the lead. Below omega_low an offset of the channel may pass for the third harmonic. */
 static bool is_held(position_t *self, const position_config_t *config)
 {
+    const bool slow = pm_abs(self->omega_mean) < config->omega_low;
+    self->shown = slow ? 0 : self->shown;
     const bool held = knows_third(config) && self->inject && self->weight == 0 && self->shown < PM_ONE / 2;
-    const bool late = held && pm_abs(self->omega_mean) >= config->omega_low;
-    self->absent_ms = late ? (uint16_t)(self->absent_ms + 1U) : 0U;
+    self->absent_ms = held && !slow ? (uint16_t)(self->absent_ms + 1U) : 0U;
     return held;
 }
 #else

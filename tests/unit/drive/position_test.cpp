@@ -121,6 +121,30 @@ TEST(Position, WithoutInjectionTheFluxLeadsAlways)
     }
 }
 
+// A third harmonic is believed from speed_low on: below, an offset of its channel may be larger. Row 132.
+TEST(Position, WhatLooksLikeAThirdHarmonicBelowSpeedLowIsNone)
+{
+    position_config_t c = config();
+    c.traits_high = SOURCE_THIRD_TURN;
+    position_t self = started(c);
+    self.shown = PM_ONE;
+    hold(self, c, kLow / 2, 1);
+    EXPECT_EQ(self.shown, 0);
+    hold(self, c, kLow / 2);
+    EXPECT_EQ(self.absent_ms, 0);
+    self.omega_mean = fixed(kHigh, 28);
+    for (int ms = 1; ms < 300; ++ms) {
+        self.shown = 0;
+        hold(self, c, kHigh, 1);
+        ASSERT_EQ(self.weight, 0);
+        ASSERT_EQ(self.absent_ms, ms) << "which is a fault from POSITION_ABSENT_MS on";
+    }
+    self.shown = PM_Q(0.6);
+    hold(self, c, kHigh, 1);
+    EXPECT_GT(self.weight, 0);
+    EXPECT_EQ(self.absent_ms, 0);
+}
+
 // Also one that had another weight before.
 TEST(Position, WithoutACarrierTheWeightIsOne)
 {
