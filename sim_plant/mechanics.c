@@ -11,19 +11,23 @@ static bool two_masses(const mechanics_t *mech)
     return mech->parameters.J_load_kgm2 > 0.0;
 }
 
-static bool constant_load(const plant_mech_t *p)
+static bool by_angle(const plant_mech_t *p)
 {
-    bool constant = p->load_Nms == 0.0 && p->load_Nms2 == 0.0;
+    bool any = false;
     for (int n = 0; n < LOAD_HARMONICS; n++) {
-        constant = constant && (p->load_angle[n].order == 0 || p->load_angle[n].amplitude == 0.0);
+        any = any || (p->load_angle[n].order != 0 && p->load_angle[n].amplitude != 0.0);
     }
-    return constant;
+    return any;
 }
 
 void mechanics_init(mechanics_t *mech, const plant_mech_t *parameters)
 {
-    *mech = (mechanics_t){.parameters = *parameters};
-    mech->plain = !two_masses(mech) && constant_load(parameters);
+    *mech = (mechanics_t){.parameters = *parameters, .drag_Nms = parameters->B_Nms};
+    if (!two_masses(mech)) {
+        mech->drag_Nms += parameters->load_Nms;
+        mech->drag_Nms2 = parameters->load_Nms2;
+        mech->plain = !by_angle(parameters);
+    }
     mechanics_settle(mech, &(mechanics_motion_t){0}, 0.0);
 }
 
@@ -34,10 +38,9 @@ void mechanics_impose(mechanics_t *mech, double omega_mech_rad_s)
     mech->ramping = false;
 }
 
-/* Load torque by speed and angle, without the constant part. */
-static double varying_load_Nm(const plant_mech_t *p, double omega_rad_s, double theta_rad)
+static double load_by_angle_Nm(const plant_mech_t *p, double theta_rad)
 {
-    double torque_Nm = (p->load_Nms + p->load_Nms2 * fabs(omega_rad_s)) * omega_rad_s;
+    double torque_Nm = 0.0;
     for (int n = 0; n < LOAD_HARMONICS; n++) {
         const plant_harmonic_t *h = &p->load_angle[n];
         if (h->order != 0) {
@@ -47,19 +50,21 @@ static double varying_load_Nm(const plant_mech_t *p, double omega_rad_s, double 
     return torque_Nm;
 }
 
+static double load_by_speed_Nm(const plant_mech_t *p, double omega_rad_s)
+{
+    return (p->load_Nms + p->load_Nms2 * fabs(omega_rad_s)) * omega_rad_s;
+}
+
 static double shaft_Nm(const plant_mech_t *p, const mechanics_motion_t *m)
 {
     return p->k_shaft_Nm * m->twist_rad + p->d_shaft_Nms * (m->omega_mech_rad_s - m->omega_load_rad_s);
 }
 
-/* What opposes the rotor beside bias_Nm and its own viscous friction. */
+/* What opposes the rotor beside bias_Nm and the drag. */
 static double resisting_Nm(const mechanics_t *mech, const mechanics_motion_t *m)
 {
-    if (mech->plain) {
-        return 0.0;
-    }
     return two_masses(mech) ? shaft_Nm(&mech->parameters, m)
-                            : varying_load_Nm(&mech->parameters, m->omega_mech_rad_s, m->theta_mech_rad);
+                            : load_by_angle_Nm(&mech->parameters, m->theta_mech_rad);
 }
 
 /* The constant load's share in it. */
@@ -140,8 +145,8 @@ void mechanics_rates(const mechanics_t *mech, const mechanics_motion_t *m, doubl
         .omega_mech_rad_s2 = mechanics_rate(mech, m->omega_mech_rad_s, torque_Nm - resisting_torque_Nm),
     };
     if (two_masses(mech)) {
-        double load_Nm =
-            varying_load_Nm(p, m->omega_load_rad_s, m->theta_mech_rad - m->twist_rad) + mech->load_Nm;
+        double load_Nm = load_by_speed_Nm(p, m->omega_load_rad_s) +
+                         load_by_angle_Nm(p, m->theta_mech_rad - m->twist_rad) + mech->load_Nm;
         rate->omega_load_rad_s2 = (resisting_torque_Nm - load_Nm) / p->J_load_kgm2;
         rate->twist_rad_s = m->omega_mech_rad_s - m->omega_load_rad_s;
     }

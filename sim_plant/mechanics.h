@@ -16,6 +16,8 @@
 #ifndef PLANT_MECHANICS_H
 #define PLANT_MECHANICS_H
 
+#include <math.h>
+
 #include "sim_plant/plant_config.h"
 
 #ifdef __cplusplus
@@ -32,7 +34,9 @@ typedef struct {
     double slide; /* direction of sliding friction: -1, 0 (stuck, or no friction), 1 */
     bool stuck;
     bool plain; /* see mechanics_plain() */
-    /* dw/dt = given + gain (T + bias - B w); gain = 0 when the speed is given */
+    /* dw/dt = given + gain (T + bias - (drag + drag2 |w|) w); gain = 0 when the speed is given. The drag is that of the rotor
+     * and, without a second mass, of the load. */
+    double drag_Nms, drag_Nms2;
     double gain_1_kgm2;
     double bias_Nm;
     double given_rad_s2;
@@ -77,7 +81,7 @@ static inline double mechanics_excess(const mechanics_t *mech, const mechanics_m
                                 : -1.0;
 }
 
-/* One mass whose load is load_Nm alone: then mechanics_rate() says all. */
+/* One mass whose load does not depend on the angle: then mechanics_rate() says all. */
 static inline bool mechanics_plain(const mechanics_t *m)
 {
     return m->plain;
@@ -85,8 +89,16 @@ static inline bool mechanics_plain(const mechanics_t *m)
 
 static inline double mechanics_rate(const mechanics_t *m, double omega_mech_rad_s, double torque_Nm)
 {
-    return m->given_rad_s2 +
-           m->gain_1_kgm2 * (torque_Nm + m->bias_Nm - m->parameters.B_Nms * omega_mech_rad_s);
+    double drag_Nms = m->drag_Nms + m->drag_Nms2 * fabs(omega_mech_rad_s);
+    return m->given_rad_s2 + m->gain_1_kgm2 * (torque_Nm + m->bias_Nm - drag_Nms * omega_mech_rad_s);
+}
+
+/* How that moves. */
+static inline double mechanics_bend(const mechanics_t *m, double omega_mech_rad_s, double omega_mech_rad_s2,
+                                    double torque_Nm_s)
+{
+    double drag_Nms = m->drag_Nms + 2.0 * m->drag_Nms2 * fabs(omega_mech_rad_s);
+    return m->gain_1_kgm2 * (torque_Nm_s - drag_Nms * omega_mech_rad_s2);
 }
 
 /* Rates of any shaft and load. */

@@ -224,7 +224,7 @@ INLINE void other_bends(const circuit_t *c, double torque_Nm_s, double i_dc_A_s,
     double v_dc_s = s->rate.follow[MOTION][1], omega_s = s->rate.follow[MOTION][0];
     bool fed = c->link.connected && !(c->link.blocks && c->link.v_source_V < x[V_DC]);
     double bend_V = (-(fed ? c->link.g_source_S * v_dc_s : 0.0) - i_dc_A_s) * c->link.inv_C_1_F;
-    double omega_s2 = c->mech.gain_1_kgm2 * (torque_Nm_s - c->mech.parameters.B_Nms * omega_s);
+    double omega_s2 = mechanics_bend(&c->mech, x[OMEGA_MECH], omega_s, torque_Nm_s);
     s->omega_e_s = c->machine.pole_pairs * omega_s;
     s->omega_e_s2 = c->machine.pole_pairs * omega_s2;
     s->bend.follow[MOTION] = (pair_t){omega_s2, x[V_DC] > 0.0 ? bend_V : 0.0};

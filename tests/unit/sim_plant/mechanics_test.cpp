@@ -428,7 +428,7 @@ TEST(GivenSpeed, FrictionTurnsWithItBeforeTheRelease)
     EXPECT_NEAR(shaft.x[Shaft::SPEED], -10.0 + 0.5 / 0.01 * 0.1, 1e-9);
 }
 
-TEST(PlainShaft, IsOneMassUnderAConstantLoad)
+TEST(PlainShaft, IsOneMassWhoseLoadNoAngleMoves)
 {
     plant_mech_t plain = one_mass(0.01);
     plain.B_Nms = 0.02;
@@ -446,10 +446,26 @@ TEST(PlainShaft, IsOneMassUnderAConstantLoad)
         EXPECT_NEAR(mechanics_rate(&shaft.mech, omega, 0.0), rate, 1e-10);
         EXPECT_EQ(shaft.rate(shaft.x, 0.0)[Shaft::SPEED], mechanics_rate(&shaft.mech, omega, 0.0));
     }
-    plant_mech_t by_speed = plain, by_square = plain;
-    by_speed.load_Nms = 0.1;
-    by_square.load_Nms2 = 0.1;
-    for (const plant_mech_t &p : {by_speed, by_square, compressor(), two_masses()}) {
+    plant_mech_t fan = plain;
+    fan.load_Nms = 0.1;
+    fan.load_Nms2 = 0.03;
+    for (double omega : {3.0, -3.0}) {
+        Shaft turning(fan);
+        ASSERT_TRUE(mechanics_plain(&turning.mech));
+        turning.x[Shaft::SPEED] = omega;
+        mechanics_motion_t motion = Shaft::motion(turning.x);
+        mechanics_settle(&turning.mech, &motion, 0.0);
+        double friction = turning.mech.slide * fan.T_coulomb_Nm;
+        double rate = (0.7 - friction - (0.02 + 0.1) * omega - 0.03 * omega * std::fabs(omega)) / 0.01;
+        EXPECT_NEAR(mechanics_rate(&turning.mech, omega, 0.7), rate, 1e-10);
+        const double step = 1e-6; // of time: how the rate moves, by its difference
+        double ahead = mechanics_rate(&turning.mech, omega + 5.0 * step, 0.7 + 2.0 * step);
+        double behind = mechanics_rate(&turning.mech, omega - 5.0 * step, 0.7 - 2.0 * step);
+        EXPECT_NEAR(mechanics_bend(&turning.mech, omega, 5.0, 2.0), (ahead - behind) / (2.0 * step), 1e-3);
+    }
+    plant_mech_t fan_on_a_shaft = two_masses();
+    fan_on_a_shaft.load_Nms2 = 0.03;
+    for (const plant_mech_t &p : {compressor(), two_masses(), fan_on_a_shaft}) {
         Shaft other(p);
         EXPECT_FALSE(mechanics_plain(&other.mech));
     }

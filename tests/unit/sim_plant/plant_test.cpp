@@ -238,21 +238,25 @@ TEST(EnergyBalance, OfASecondMassAndAFan)
 // What is negligible takes the general way through the plant instead of the plain one: to the same currents.
 TEST(Plant, GeneralWayAgreesWithThePlainOne)
 {
-    plant_config_t plain = rig::ipm_1000_real(), general = plain;
-    general.winding.saliency[0] = {-4, 1e-18, 0.0};
-    rig::Plant a(plain), b(general);
-    rig::CurrentControl control(plain);
-    for (int k = 0; k < 3000; k++) {
-        plant_pwm_t pwm = control.step(a.truth(), -0.5, k < 2000 ? 4.0 : -3.0);
-        a.run(pwm);
-        b.run(pwm);
-        // both integrate to 1e-6, which is their right to differ by
-        ASSERT_NEAR(a.truth().i_d_A, b.truth().i_d_A, 4e-5) << k;
-        ASSERT_NEAR(a.truth().i_q_A, b.truth().i_q_A, 4e-5) << k;
+    for (double fan_Nms2 : {0.0, 1e-3}) {
+        plant_config_t plain = rig::ipm_1000_real();
+        plain.mech.load_Nms2 = fan_Nms2;
+        plant_config_t general = plain;
+        general.winding.saliency[0] = {-4, 1e-18, 0.0};
+        rig::Plant a(plain), b(general);
+        rig::CurrentControl control(plain);
+        for (int k = 0; k < 3000; k++) {
+            plant_pwm_t pwm = control.step(a.truth(), -0.5, k < 2000 ? 4.0 : -3.0);
+            a.run(pwm);
+            b.run(pwm);
+            // both integrate to 1e-6, which is their right to differ by
+            ASSERT_NEAR(a.truth().i_d_A, b.truth().i_d_A, 4e-5) << k;
+            ASSERT_NEAR(a.truth().i_q_A, b.truth().i_q_A, 4e-5) << k;
+        }
+        EXPECT_NEAR(a.truth().torque_Nm, b.truth().torque_Nm, 4e-5);
+        EXPECT_NEAR(a.truth().omega_mech_rad_s, b.truth().omega_mech_rad_s, 1e-3);
+        EXPECT_NEAR(a.truth().e_in_J, b.truth().e_in_J, 1e-5 * a.truth().e_copper_J);
     }
-    EXPECT_NEAR(a.truth().torque_Nm, b.truth().torque_Nm, 4e-5);
-    EXPECT_NEAR(a.truth().omega_mech_rad_s, b.truth().omega_mech_rad_s, 1e-3);
-    EXPECT_NEAR(a.truth().e_in_J, b.truth().e_in_J, 1e-5 * a.truth().e_copper_J);
 }
 
 // The same for six legs, open loop: duties that turn with the rotor, enough for some amperes. The tolerance
