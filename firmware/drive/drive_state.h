@@ -84,8 +84,7 @@ struct drive {
     uint16_t still_ms; /* standstill while stopping */
     uint16_t agree_ms; /* observer and imposed angle turn alike */
     uint16_t wait_ms;  /* for that, where the observer should */
-    uint16_t
-        rest_ms; /* until the vector turns once more, or after a step until the voltage is that of the rotor */
+    uint16_t rest_ms;  /* until the vector turns once more, or its current has settled */
     follow_t follow;
     PM_IN_IMAGE(six_step, uint16_t block_ms; /* in STAGE_SIX_STEP */
                 uint8_t block_tries;         /* to find synchronism again */
