@@ -199,7 +199,7 @@ void bridge_run(void)
  * the channel, the lower switch's too: in mode 2 it is on where the upper one would be off. */
 static const struct {
     uint8_t outputs, mode;
-} OF_STATE[] = {
+} OF_STATE[PM_LEG_LOWER_INVERTED + 1] = {
     [PM_LEG_OFF] = {0, TIM_OCM_PWM1},
     [PM_LEG_PWM] = {LEG, TIM_OCM_PWM1},
     [PM_LEG_UPPER] = {TIM_CCER_CC1E, TIM_OCM_PWM1},
