@@ -19,7 +19,7 @@
 #define VREFINT_CAL 0x1FFF75AAu
 #define ERASED      0xFF
 #define PAINT       0xC5
-#define BOOT_STEP_S 50e-6
+#define BOOT_STEP_S 1e-6 /* the plant begins with the timer, within this */
 
 static const uint32_t unique_id[3] = {0x00280043u, 0x594E5004u, 0x20373358u};
 
