@@ -7,8 +7,11 @@
  *   y' = y + h f + h^2/2 f',   d = h/3 (f(y') - f - h f'),   y(h) = y' + d
  *
  * d is also what the second order misses, which is the error that is controlled. So a step takes one
- * evaluation of the field, and a change of the legs none. Of the voltages of swinging terminals the third
- * derivative is known at the start as well, so that they gain an order. */
+ * evaluation of the field, and a change of the legs none.
+ *
+ * Terminals that swing with their windings do so at a MHz, far faster than all else moves. There each higher
+ * derivative follows from the one before, and the series goes on: with nine orders a step is a quarter of a
+ * swing, and what follows from the currents is integrated by Simpson's rule. */
 #include "sim_plant/steps.h"
 #include "sim_plant/symmetrical_drops.h"
 #include "sim_plant/symmetrical_rates.h"
@@ -35,51 +38,116 @@ INLINE double error_norm(const circuit_t *c, const rates_t *miss, shape_t shape,
     return worst * c->inv_tolerance;
 }
 
-/* The Taylor series, without the angle. */
-INLINE void predict(const circuit_t *c, const start_t *s, double h, shape_t shape, bool swings, double x[],
-                    field_t *f)
+/* 1 / n */
+static const double swing_part[SWING_ORDER + 1] = {0.0,     1.0,     1.0 / 2, 1.0 / 3, 1.0 / 4,
+                                                   1.0 / 5, 1.0 / 6, 1.0 / 7, 1.0 / 8, 1.0 / 9};
+
+/* By how much a series of swinging terminals and their windings has moved after h, and its rates there. */
+INLINE void swing_at(const circuit_t *c, const start_t *s, double h, shape_t shape, swing_t *moved,
+                     swing_t *rate)
 {
-    const double half = 0.5 * h, third = h / 3.0;
+    *moved = *rate = s->swing[s->order];
+    for (int n = s->order - 1; n >= 1; n--) {
+        const swing_t *of = &s->swing[n];
+        double next = h * swing_part[n], after = h * swing_part[n + 1];
+        for (int p = 0; p < pairs(shape); p++) {
+            rate->flux[p] = of->flux[p] + both(next) * rate->flux[p];
+            moved->flux[p] = of->flux[p] + both(after) * moved->flux[p];
+        }
+        for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
+            int k = bridge_first(legs);
+            rate->leg[k] = of->leg[k] + next * rate->leg[k];
+            moved->leg[k] = of->leg[k] + after * moved->leg[k];
+        }
+        rate->volts = of->volts + both(next) * rate->volts;
+        moved->volts = of->volts + both(after) * moved->volts;
+    }
+}
+
+/* The Taylor series, without the angle. rate: of what swings, at the end. */
+INLINE void predict(const circuit_t *c, const start_t *s, double h, shape_t shape, bool swings, double x[],
+                    field_t *f, swing_t *rate)
+{
+    const double half = 0.5 * h;
     for (int n = 0; n < FOLLOWERS; n++) {
         pair_t mean = s->rate.follow[n] + both(half) * s->bend.follow[n];
         pair_put(&x[FOLLOWER(n)], pair_at(&c->now.x[FOLLOWER(n)]) + both(h) * mean);
     }
-    for (unsigned legs = c->bridge.swinging; swings && legs != 0u; legs &= legs - 1u) {
-        int k = bridge_first(legs);
-        double mean = s->rate.leg_V_s[k] + half * (s->bend.leg_V_s[k] + third * s->leg_V_s3[k]);
-        x[V_LEG(k)] = c->now.x[V_LEG(k)] + h * mean;
-    }
-    for (int p = 0; p < pairs(shape); p++) {
-        pair_t bend = swings ? s->bend.flux_V[p] + both(third) * s->flux_V_s2[p] : s->bend.flux_V[p];
-        f->flux[p] = s->flux[p] + both(h) * (s->rate.flux_V[p] + both(half) * bend);
+    if (swings) {
+        swing_t moved;
+        swing_at(c, s, h, shape, &moved, rate);
+        for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
+            int k = bridge_first(legs);
+            x[V_LEG(k)] = c->now.x[V_LEG(k)] + h * moved.leg[k];
+        }
+        pair_put(&x[FOLLOWER(VOLTS)], pair_at(&c->now.x[FOLLOWER(VOLTS)]) + both(h) * moved.volts);
+        for (int p = 0; p < pairs(shape); p++) {
+            f->flux[p] = s->flux[p] + both(h) * moved.flux[p];
+        }
+    } else {
+        for (int p = 0; p < pairs(shape); p++) {
+            f->flux[p] = s->flux[p] + both(h) * (s->rate.flux_V[p] + both(half) * s->bend.flux_V[p]);
+        }
     }
     for (int set = 0; set < shape.sets && shape.sets > 1; set++) {
         f->core_Wb[set] = s->core_Wb[set] + both(h) * s->core_V[set];
     }
 }
 
-/* d from the rates at the end; where third derivatives are in the series already, what is missing of it. */
+/* d from the rates at the end. */
 INLINE void find_miss(const circuit_t *c, const start_t *s, double h, const rates_t *end, shape_t shape,
-                      bool swings, bool floats, rates_t *miss)
+                      bool floats, rates_t *miss)
 {
-    const double third = h / 3.0, cube = third * 0.5 * h * h;
+    const double third = h / 3.0;
     for (int n = 0; n < FOLLOWERS; n++) {
         miss->follow[n] = both(third) * (end->follow[n] - s->rate.follow[n] - both(h) * s->bend.follow[n]);
     }
     for (int p = 0; p < pairs(shape); p++) {
-        pair_t d = both(third) * (end->flux_V[p] - s->rate.flux_V[p] - both(h) * s->bend.flux_V[p]);
-        miss->flux_V[p] = swings ? both(0.75) * (d - both(cube) * s->flux_V_s2[p]) : d;
-    }
-    for (unsigned legs = c->bridge.swinging; swings && legs != 0u; legs &= legs - 1u) {
-        int k = bridge_first(legs);
-        double d = third * (end->leg_V_s[k] - s->rate.leg_V_s[k] - h * s->bend.leg_V_s[k]);
-        miss->leg_V_s[k] = 0.75 * (d - cube * s->leg_V_s3[k]);
-    }
-    if (swings) {
-        miss->follow[VOLTS] -= both(0.25) * (miss->follow[VOLTS] - both(cube) * s->v_V_s2[0]);
+        miss->flux_V[p] = both(third) * (end->flux_V[p] - s->rate.flux_V[p] - both(h) * s->bend.flux_V[p]);
     }
     if (floats) {
         miss->flux_V[0] = two_phase_part(c, miss->flux_V[0]);
+    }
+}
+
+/* Rates within a step, h after its start. */
+INLINE void rates_between(const circuit_t *c, const start_t *s, double h, shape_t shape, rates_t *rate)
+{
+    double x[ELEMENTS];
+    field_t f = c->field;
+    swing_t end;
+    tied_t tied = s->tied;
+    rotor_t rotor = frame_turn(c->now.rotor, h * (s->omega_e + 0.5 * h * s->omega_e_s));
+    predict(c, s, h, shape, true, x, &f, &end);
+    field_at(&c->machine, rotor, shape, &f);
+    rates_at(c, rotor, &f, x, shape, true, false, s->steady, &tied, rate);
+}
+
+/* The same where terminals swing, of whose series these are the rates at the end: nearly all of the third
+ * derivative is in it. Over a long step what follows takes Simpson's rule, with the rates in its middle. */
+INLINE void find_swing_miss(const circuit_t *c, const start_t *s, double h, const swing_t *rate,
+                            const rates_t *end, shape_t shape, rates_t *miss, rates_t *error)
+{
+    const double fourth = 0.25 * h;
+    find_miss(c, s, h, end, shape, false, miss);
+    for (int p = 0; p < pairs(shape); p++) {
+        miss->flux_V[p] = both(fourth) * (end->flux_V[p] - rate->flux[p]);
+    }
+    for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        miss->leg_V_s[k] = fourth * (end->leg_V_s[k] - rate->leg[k]);
+    }
+    miss->follow[VOLTS] = both(fourth) * (end->follow[VOLTS] - rate->volts);
+    *error = *miss;
+    if (s->order == SWING_BRIEF) {
+        return;
+    }
+    rates_t between;
+    rates_between(c, s, 0.5 * h, shape, &between);
+    for (int n = 0; n < VOLTS; n++) {
+        pair_t mean = (s->rate.follow[n] + both(4.0) * between.follow[n] + end->follow[n]) * both(1.0 / 6.0);
+        miss->follow[n] = both(h) * (mean - s->rate.follow[n] - both(0.5 * h) * s->bend.follow[n]);
+        error->follow[n] = miss->follow[n] - error->follow[n];
     }
 }
 
@@ -111,7 +179,8 @@ INLINE void open_volts(const circuit_t *c, const start_t *s, double h, const fie
 INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape, bool swings, bool floats,
                    point_t *to, field_t *f)
 {
-    rates_t end, miss;
+    rates_t end, miss, wrong;
+    swing_t swing;
     tied_t tied;
     double turn = h * (s->omega_e + 0.5 * h * (s->omega_e_s + h / 3.0 * s->omega_e_s2));
     double part = swings ? 1.0 : PART;
@@ -119,14 +188,22 @@ INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape
     for (int p = 0; p < pairs(shape); p++) {
         tied.switch_V[p] = s->tied.switch_V[p];
     }
+    for (int k = 0; k < shape.legs; k++) { /* for drop_part() */
+        tied.zones[k] = steady ? 0.0 : s->tied.zones[k];
+        tied.share[k] = steady ? 0.0 : s->tied.share[k];
+    }
     to->rotor = frame_turn(c->now.rotor, turn);
-    predict(c, s, h, shape, swings, to->x, f);
+    predict(c, s, h, shape, swings, to->x, f, &swing);
     field_at(&c->machine, to->rotor, shape, f);
     if (floats) {
         two_phase_release(c, to->rotor, f);
     }
     rates_at(c, to->rotor, f, to->x, shape, swings, floats, steady, &tied, &end);
-    find_miss(c, s, h, &end, shape, swings, floats, &miss);
+    if (swings) {
+        find_swing_miss(c, s, h, &swing, &end, shape, &miss, &wrong);
+    } else {
+        find_miss(c, s, h, &end, shape, floats, &miss);
+    }
     add_miss(c, &miss, swings, to->x);
     to->x[THETA_E] = c->now.x[THETA_E] + turn;
     field_shift(&c->machine, to->rotor, shape, miss.flux_V, f);
@@ -142,7 +219,7 @@ INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape
     }
     to->torque_Nm = f->torque_Nm;
     part = steady ? part : drop_part(&s->tied, &tied, shape, part);
-    return part * error_norm(c, &miss, shape, swings);
+    return part * error_norm(c, swings ? &wrong : &miss, shape, swings);
 }
 
 static void retake(const circuit_t *c, const void *start, double h, point_t *to)
@@ -163,52 +240,122 @@ static void retake(const circuit_t *c, const void *start, double h, point_t *to)
     }
 }
 
-/* Until a swinging terminal arrives at its diode, by the first three derivatives; h if not before. */
-INLINE double arrival_s(const circuit_t *c, const start_t *s, int k, double h)
+/* How far the series of terminal k is beyond the end ahead of it after t, and how fast it gets there. */
+typedef struct {
+    double sign, end_V, drift_V_s;
+} ahead_t;
+
+INLINE double beyond_V(const circuit_t *c, const start_t *s, int k, const ahead_t *ahead, double t,
+                       double *speed)
 {
-    double rate = s->rate.leg_V_s[k], bend = 0.5 * s->bend.leg_V_s[k], jerk = s->leg_V_s3[k] / 6.0;
-    double end_V = rate > 0.0 ? c->now.x[V_DC] + c->bridge.v_diode_V : -c->bridge.v_diode_V;
-    double away_V = end_V - c->now.x[V_LEG(k)];
-    double t = 0.0;
-    if (rate == 0.0 || away_V * rate <= 0.0) {
-        return h;
+    double moved = s->swing[s->order].leg[k], rate = moved;
+    for (int n = s->order - 1; n >= 1; n--) {
+        rate = s->swing[n].leg[k] + t * swing_part[n] * rate;
+        moved = s->swing[n].leg[k] + t * swing_part[n + 1] * moved;
     }
-    for (int round = 0; round < 4; round++) {
-        double speed = rate + t * (2.0 * bend + t * 3.0 * jerk);
-        if (speed * rate <= 0.0) {
-            return h;
-        }
-        t += (away_V - t * (rate + t * (bend + t * jerk))) / speed;
-        if (round == 0 && t > 4.0 * h) {
-            return h;
-        }
-    }
-    return t > 0.0 && t < h ? t : h;
+    *speed = ahead->sign * (rate - ahead->drift_V_s);
+    return ahead->sign * (c->now.x[V_LEG(k)] - ahead->end_V + t * (moved - ahead->drift_V_s));
 }
 
-/* What swinging terminals allow. */
-INLINE double swing_s(const circuit_t *c, const start_t *s, double h)
+/* Where it turns back within h */
+INLINE double peak_s(const circuit_t *c, const start_t *s, int k, const ahead_t *ahead, double h)
 {
-    double bend = 0.0, jerk = 0.0;
+    double early = 0.0, late = h, speed;
+    for (int round = 0; round < 12; round++) {
+        double t = 0.5 * (early + late);
+        beyond_V(c, s, k, ahead, t, &speed);
+        *(speed > 0.0 ? &early : &late) = t;
+    }
+    return late;
+}
+
+/* Until a swinging terminal arrives at its diode; h if not before. A step is a part of a swing, in which the speed
+ * hardly exceeds those at its ends. */
+INLINE double arrival_s(const circuit_t *c, const start_t *s, int k, double h)
+{
+    double rate = s->swing[1].leg[k];
+    bool up = rate > 0.0;
+    ahead_t ahead = {.sign = up ? 1.0 : -1.0,
+                     .end_V = up ? c->now.x[V_DC] + c->bridge.v_diode_V : -c->bridge.v_diode_V,
+                     .drift_V_s = up ? s->rate.follow[MOTION][1] : 0.0};
+    double speed;
+    double start_V = ahead.sign * (c->now.x[V_LEG(k)] - ahead.end_V);
+    double end_V = beyond_V(c, s, k, &ahead, h, &speed);
+    if (start_V >= 0.0 || (end_V <= 0.0 && start_V + 1.2 * h * larger(fabs(rate), fabs(speed)) <= 0.0)) {
+        return h;
+    }
+    double early = 0.0, late = h;
+    if (end_V <= 0.0) {
+        late = speed < 0.0 ? peak_s(c, s, k, &ahead, h) : h;
+        if (beyond_V(c, s, k, &ahead, late, &speed) <= 0.0) {
+            return h;
+        }
+    }
+    double t = -start_V / fabs(rate), close_V = 0.01 * SNAP * c->now.x[V_DC];
+    t = t < late ? t : late;
+    for (int round = 0; round < 20; round++) {
+        double at_V = beyond_V(c, s, k, &ahead, t, &speed);
+        if (fabs(at_V) < close_V) {
+            break;
+        }
+        *(at_V > 0.0 ? &late : &early) = t;
+        t -= at_V / speed;
+        t = t > early && t < late ? t : 0.5 * (early + late);
+    }
+    return t;
+}
+
+/* The next derivative after a series of swinging terminals, V, as far as their swing of omega makes it. */
+INLINE double swing_ahead(const circuit_t *c, const start_t *s, double omega)
+{
+    double damping = c->bridge.g_winding_S * c->bridge.inv_c_leg_1_F;
+    double next = 0.0;
     for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
         int k = bridge_first(legs);
-        h = arrival_s(c, s, k, h);
-        bend = larger(bend, fabs(s->bend.leg_V_s[k]));
-        jerk = larger(jerk, fabs(s->leg_V_s3[k]));
+        double before = fabs(s->swing[s->order - 1].leg[k]), last = fabs(s->swing[s->order].leg[k]);
+        next = larger(next, omega * omega * before + (omega + damping) * last);
     }
-    double damping = c->bridge.g_winding_S * c->bridge.inv_c_leg_1_F;
-    double square = c->machine.gamma_leg_1_H * c->bridge.inv_c_leg_1_F; /* of the angular frequency */
-    double fourth_V = damping > 0.0 ? bend * square + jerk * damping : bend * square;
-    double error = fourth_V * h * h * h * h * (c->inv_v_scale_1_V * c->inv_tolerance / 24.0);
-    return error > 0.5 ? h * sqrt(sqrt(0.5 / error)) : h;
+    return next;
+}
+
+INLINE double first_arrival_s(const circuit_t *c, const start_t *s, double h)
+{
+    for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
+        h = arrival_s(c, s, bridge_first(legs), h);
+    }
+    return h;
+}
+
+/* What swinging terminals allow. The series is as long as the step needs it. */
+INLINE double swing_s(const circuit_t *c, start_t *s, shape_t shape, double h)
+{
+    const double left_V = 0.1 / (c->inv_v_scale_1_V * c->inv_tolerance); /* d is 2.5 times what is missed */
+    const double omega = sqrt(c->machine.gamma_leg_1_H * c->bridge.inv_c_leg_1_F);
+    const double soon_s = 0.1 / omega;
+    swing_series(c, shape, s, SWING_BRIEF);
+    double brief = first_arrival_s(c, s, h < soon_s ? h : soon_s), square = brief * brief;
+    if (brief < soon_s && brief * square * square * swing_ahead(c, s, omega) <= SWING_BRIEF_NEXT * left_V) {
+        return brief;
+    }
+    swing_series(c, shape, s, SWING_ORDER);
+    double longest = pow(SWING_FACTORIAL * left_V / swing_ahead(c, s, omega), 1.0 / (SWING_ORDER + 1));
+    return first_arrival_s(c, s, longest < h ? longest : h);
 }
 
 /* What the error of a step says about the next. */
-INLINE void control(circuit_t *c, double h, double error)
+INLINE void control(circuit_t *c, double h, double error, bool swings)
 {
-    if (error < 0.2 && h > 0.5 * c->step_s) {
+    if (!swings && error < 0.2 && h > 0.5 * c->step_s) {
         c->step_s = error < 0.02 ? 3.0 * h : 1.5 * h;
     }
+}
+
+/* Whether a step has to be shortened to end at its event. */
+INLINE bool past_event(const circuit_t *c, const point_t *to, bool *event)
+{
+    excess_t excess = steps_excess(c, to);
+    *event = steps_event(excess);
+    return *event && !steps_landed(excess);
 }
 
 /* The end of a step becomes the present point. */
@@ -242,26 +389,22 @@ INLINE double take_steps(circuit_t *c, double left_s, shape_t shape, bool swings
         }
         double h = swings || c->step_s > left_s ? left_s : c->step_s;
         h = steps_turn_s(c, start.omega_e, h);
-        h = swings ? swing_s(c, &start, h) : h;
+        h = swings ? swing_s(c, &start, shape, h) : h;
         double zone = zone_s(c, &start, shape, h);
         bool smooth = zone == h;
         h = zone;
         h = h > 0.999 * left_s ? left_s : h; /* no sliver at the end */
-        double error = step(c, &start, h, shape, swings, floats, to, &c->field);
-        while (!(error <= 1.0) && h > 1e-9 * left_s) {
-            h = steps_shorter_s(h, error);
-            c->step_s = swings || !smooth ? c->step_s : h;
-            error = step(c, &start, h, shape, swings, floats, to, &c->field);
-        }
-        if (!swings) {
-            control(c, h, error);
-        }
-        if (steps_watching(c, to)) {
-            excess_t excess = steps_excess(c, to);
-            *event = steps_event(excess);
-            if (*event && !steps_landed(excess)) {
-                h = steps_locate(c, h, retake, &start, to);
-                step(c, &start, h, shape, swings, floats, to, &c->field);
+        bool again = true, located = false;
+        while (again) { /* one call of step(), which is compiled into it */
+            double error = step(c, &start, h, shape, swings, floats, to, &c->field);
+            again = !located && !(error <= 1.0) && h > 1e-9 * left_s; /* NaN too */
+            if (again) {
+                h = steps_shorter_s(h, error);
+                c->step_s = swings || !smooth ? c->step_s : h;
+            } else if (!located) {
+                control(c, h, error, swings);
+                again = located = steps_watching(c, to) && past_event(c, to, event);
+                h = located ? steps_locate(c, h, retake, &start, to) : h;
             }
         }
         if (steps_probing(c)) {

@@ -33,14 +33,25 @@ typedef struct {
     double leg_V_s[PLANT_LEGS]; /* and of swinging terminals */
 } rates_t;
 
+/* A derivative of what takes part in the swing of terminals with the windings. */
+typedef struct {
+    pair_t flux[PAIRS], volts; /* of the field's flux, and of the integral of the voltage */
+    double leg[PLANT_LEGS];
+} swing_t;
+
+#define SWING_ORDER      9         /* of their series, at most, */
+#define SWING_FACTORIAL  3628800.0 /* of the next, */
+#define SWING_BRIEF      4         /* and where a terminal arrives soon, */
+#define SWING_BRIEF_NEXT 120.0     /* of the next */
+
 /* A start of steps: where it is, and first and second derivatives. */
 typedef struct {
     pair_t flux[PAIRS], core_Wb[PLANT_SETS]; /* of the field */
     rates_t rate, bend;
     double omega_e, omega_e_s, omega_e_s2;
     pair_t core_V[PLANT_SETS], i_A_s[PAIRS];
-    double leg_V_s3[PLANT_LEGS];            /* third ones of swinging terminals, nearly, */
-    pair_t v_V_s2[PAIRS], flux_V_s2[PAIRS]; /* and what these do to voltages and linkages */
+    swing_t swing[SWING_ORDER + 1]; /* by order, from the first */
+    int order;                      /* that of the last */
     tied_t tied;
     pair_t slope_Wb, bend_Wb; /* of the magnet's harmonics, where legs float */
     bool steady;              /* no drop turns over in the step */
@@ -282,26 +293,78 @@ INLINE void bends_at(const circuit_t *c, const pair_t i_A_s[], shape_t shape, bo
     }
 }
 
-/* Third derivatives that swinging terminals bring, without those of rotation. */
-INLINE void swing_bends(const circuit_t *c, shape_t shape, start_t *s)
+/* Second derivatives of the currents */
+INLINE void current_bends(const circuit_t *c, shape_t shape, const start_t *s, pair_t i_A_s2[])
+{
+    pair_t turned[PAIRS], core[PLANT_SETS];
+    const double omega = s->omega_e, square = omega * omega;
+    for (int p = 0; p < pairs(shape); p++) {
+        turned[p] = s->bend.flux_V[p];
+        if (p < shape.sets) {
+            turned[p] -= both(2.0 * omega) * across(s->rate.flux_V[p]) + both(square) * s->flux[p];
+        }
+    }
+    field_rates(&c->machine, c->now.rotor, 0.0, shape, &c->field, turned, core, i_A_s2);
+    for (int set = 0; set < shape.sets; set++) {
+        i_A_s2[set] += both(2.0 * omega) * across(s->i_A_s[set]) + both(square) * c->field.i_A[set];
+    }
+}
+
+/* The derivative after from, whose currents move like that: other voltages stand still. */
+INLINE void swing_next(const circuit_t *c, shape_t shape, const swing_t *from, const pair_t i_A[],
+                       swing_t *to)
 {
     const machine_t *m = &c->machine;
-    pair_t core_V_s[PLANT_SETS], i_A_s2[PAIRS];
-    field_rates(m, c->now.rotor, 0.0, shape, &c->field, s->bend.flux_V, core_V_s, i_A_s2);
+    const winding_t *w = &m->winding;
+    const bridge_t *b = &c->bridge;
+    pair_t v_V[PAIRS];
     for (int p = 0; p < pairs(shape); p++) {
-        s->v_V_s2[p] = both(-c->bridge.r_series_ohm) * i_A_s2[p];
+        v_V[p] = both(-b->r_series_ohm) * i_A[p];
+    }
+    for (unsigned legs = b->swinging; legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        double leg_A = along(w, shape, k, i_A);
+        to->leg[k] = -leg_A * b->inv_c_leg_1_F;
+        spread(w, shape, k, from->leg[k] + b->r_on_ohm * leg_A, v_V);
+    }
+    for (unsigned legs = b->swinging; b->g_winding_S > 0.0 && legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        to->leg[k] -= resistor_A(b, w, shape, k, v_V) * b->inv_c_leg_1_F;
+    }
+    for (int p = 0; p < pairs(shape); p++) {
+        to->flux[p] = of_state(m, shape, p, v_V[p] - both(m->R_s_ohm) * i_A[p]);
+    }
+    to->volts = v_V[0];
+}
+
+/* One order of the series, of the rates that are known of it. */
+INLINE void swing_known(const circuit_t *c, shape_t shape, const rates_t *rate, swing_t *to)
+{
+    for (int p = 0; p < pairs(shape); p++) {
+        to->flux[p] = rate->flux_V[p];
     }
     for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
         int k = bridge_first(legs);
-        s->leg_V_s3[k] = -along(&m->winding, shape, k, i_A_s2) * c->bridge.inv_c_leg_1_F;
-        spread(&m->winding, shape, k, s->bend.leg_V_s[k], s->v_V_s2);
+        to->leg[k] = rate->leg_V_s[k];
     }
-    for (unsigned legs = c->bridge.swinging; c->bridge.g_winding_S > 0.0 && legs != 0u; legs &= legs - 1u) {
-        int k = bridge_first(legs);
-        s->leg_V_s3[k] -= resistor_A(&c->bridge, &m->winding, shape, k, s->v_V_s2) * c->bridge.inv_c_leg_1_F;
+    to->volts = rate->follow[VOLTS];
+}
+
+/* The series as far as that order, from the rates that are known. */
+INLINE void swing_series(const circuit_t *c, shape_t shape, start_t *s, int order)
+{
+    pair_t core[PLANT_SETS], i_A[PAIRS];
+    if (s->order == 0) {
+        swing_known(c, shape, &s->rate, &s->swing[1]);
+        swing_known(c, shape, &s->bend, &s->swing[2]);
+        current_bends(c, shape, s, i_A);
+        swing_next(c, shape, &s->swing[2], i_A, &s->swing[3]);
+        s->order = 3;
     }
-    for (int p = 0; p < pairs(shape); p++) {
-        s->flux_V_s2[p] = of_state(m, shape, p, s->v_V_s2[p] - both(m->R_s_ohm) * i_A_s2[p]);
+    for (; s->order < order; s->order++) {
+        const swing_t *last = &s->swing[s->order];
+        field_rates(&c->machine, c->now.rotor, 0.0, shape, &c->field, last->flux, core, i_A);
+        swing_next(c, shape, last, i_A, &s->swing[s->order + 1]);
     }
 }
 
@@ -319,9 +382,7 @@ INLINE void begin(const circuit_t *c, shape_t shape, bool swings, bool floats, s
              &s->tied, &s->rate);
     field_rates(&c->machine, c->now.rotor, s->omega_e, shape, &c->field, s->rate.flux_V, s->core_V, s->i_A_s);
     bends_at(c, s->i_A_s, shape, swings, floats, s);
-    if (swings) {
-        swing_bends(c, shape, s);
-    }
+    s->order = 0;
 }
 
 INLINE void know_field(circuit_t *c, shape_t shape)

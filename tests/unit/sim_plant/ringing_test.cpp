@@ -12,8 +12,10 @@ namespace
 constexpr double L = 25e-6, C = 2e-9, V = 24.0; // BLDC-HS, 580 kHz
 constexpr double L_leg = 1.5 * L;               // of a leg against the two others
 constexpr double r_winding = 280.0, R_leg = 1.5 * r_winding;
-constexpr double terminal_V = 1e-4 * V; // some twenty steps a period to 1e-6 of the link each
-constexpr double balance = 1e-4;        // of what the capacitance takes
+constexpr double terminal_V = 1e-4 * V;      // some twenty steps a period to 1e-6 of the link each
+constexpr double balance = 1e-4;             // of what the capacitance takes
+constexpr double long_terminal_V = 1e-5 * V; // after 11 swings
+constexpr double long_balance = 2e-4;
 
 plant_config_t bldc_hs(double r_winding_ohm)
 {
@@ -61,6 +63,22 @@ void expect_swing(const plant_config_t &config, double conductance_S)
     }
     EXPECT_EQ(highest_V > 0.95 * V, conductance_S == 0.0);
     EXPECT_EQ(lowest_V < 0.05 * V, conductance_S == 0.0);
+}
+
+// Where nobody looks in between, a step of the series is a quarter of a swing: the same circuit, and as well balanced. Losses go
+// with the square of the swing, at twice its frequency.
+TEST(Ringing, InLongSteps)
+{
+    for (double conductance_S : {1.0 / R_leg, 0.0}) {
+        rig::Plant plant(bldc_hs(conductance_S > 0.0 ? r_winding : 0.0));
+        plant.run(step());
+        for (int n = 1; n <= 20; n++) {
+            plant_truth_t t = plant.at(n * 1e-6);
+            EXPECT_NEAR(t.v_leg_V[2], swing_V(n * 1e-6, conductance_S), long_terminal_V) << n;
+            double residual_J = t.e_in_J - t.e_copper_J - t.e_device_J - t.e_mech_J - t.e_field_J;
+            EXPECT_NEAR(residual_J, 0.0, long_balance * C * V * V) << n;
+        }
+    }
 }
 
 TEST(Ringing, FollowsTheRlcCircuit)
