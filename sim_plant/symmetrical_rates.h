@@ -51,9 +51,9 @@ typedef struct {
     double omega_e, omega_e_s, omega_e_s2;
     pair_t core_V[PLANT_SETS], i_A_s[PAIRS];
     swing_t swing[SWING_ORDER + 1]; /* by order, from the first */
-    int order;                      /* that of the last */
     tied_t tied;
     pair_t slope_Wb, bend_Wb; /* of the magnet's harmonics, where legs float */
+    int order;                /* of the last of the swing */
     bool steady;              /* no drop turns over in the step */
 } start_t;
 
