@@ -9,12 +9,13 @@
  * d is also what the second order misses, which is the error that is controlled. So a step takes one
  * evaluation of the field, and a change of the legs none.
  *
- * Terminals that swing with their windings do so at a MHz, far faster than all else moves. There each higher
- * derivative follows from the one before, and the series goes on: with nine orders a step is a quarter of a
- * swing, and what follows from the currents is integrated by Simpson's rule. */
+ * Terminals that swing with their windings do so at 0.1 to 1 MHz, far faster than all else moves. Of them the
+ * series goes on (symmetrical_swing.h): with nine orders a step is a quarter of a swing, and what follows from
+ * the currents is integrated by Simpson's rule. */
 #include "sim_plant/steps.h"
 #include "sim_plant/symmetrical_drops.h"
 #include "sim_plant/symmetrical_rates.h"
+#include "sim_plant/symmetrical_swing.h"
 
 #include <math.h>
 
@@ -36,32 +37,6 @@ INLINE double error_norm(const circuit_t *c, const rates_t *miss, shape_t shape,
     }
     worst = larger(worst, larger(u * c->inv_u_scale, v * c->inv_v_scale_1_V));
     return worst * c->inv_tolerance;
-}
-
-/* 1 / n */
-static const double swing_part[SWING_ORDER + 1] = {0.0,     1.0,     1.0 / 2, 1.0 / 3, 1.0 / 4,
-                                                   1.0 / 5, 1.0 / 6, 1.0 / 7, 1.0 / 8, 1.0 / 9};
-
-/* By how much a series of swinging terminals and their windings has moved after h, and its rates there. */
-INLINE void swing_at(const circuit_t *c, const start_t *s, double h, shape_t shape, swing_t *moved,
-                     swing_t *rate)
-{
-    *moved = *rate = s->swing[s->order];
-    for (int n = s->order - 1; n >= 1; n--) {
-        const swing_t *of = &s->swing[n];
-        double next = h * swing_part[n], after = h * swing_part[n + 1];
-        for (int p = 0; p < pairs(shape); p++) {
-            rate->flux[p] = of->flux[p] + both(next) * rate->flux[p];
-            moved->flux[p] = of->flux[p] + both(after) * moved->flux[p];
-        }
-        for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
-            int k = bridge_first(legs);
-            rate->leg[k] = of->leg[k] + next * rate->leg[k];
-            moved->leg[k] = of->leg[k] + after * moved->leg[k];
-        }
-        rate->volts = of->volts + both(next) * rate->volts;
-        moved->volts = of->volts + both(after) * moved->volts;
-    }
 }
 
 /* The Taylor series, without the angle. rate: of what swings, at the end. */
@@ -238,108 +213,6 @@ static void retake(const circuit_t *c, const void *start, double h, point_t *to)
         step(c, start, h, DOUBLE, swings, false, to, &f);
         break;
     }
-}
-
-/* How far the series of terminal k is beyond the end ahead of it after t, and how fast it gets there. */
-typedef struct {
-    double sign, end_V, drift_V_s;
-} ahead_t;
-
-INLINE double beyond_V(const circuit_t *c, const start_t *s, int k, const ahead_t *ahead, double t,
-                       double *speed)
-{
-    double moved = s->swing[s->order].leg[k], rate = moved;
-    for (int n = s->order - 1; n >= 1; n--) {
-        rate = s->swing[n].leg[k] + t * swing_part[n] * rate;
-        moved = s->swing[n].leg[k] + t * swing_part[n + 1] * moved;
-    }
-    *speed = ahead->sign * (rate - ahead->drift_V_s);
-    return ahead->sign * (c->now.x[V_LEG(k)] - ahead->end_V + t * (moved - ahead->drift_V_s));
-}
-
-/* Where it turns back within h */
-INLINE double peak_s(const circuit_t *c, const start_t *s, int k, const ahead_t *ahead, double h)
-{
-    double early = 0.0, late = h, speed;
-    for (int round = 0; round < 12; round++) {
-        double t = 0.5 * (early + late);
-        beyond_V(c, s, k, ahead, t, &speed);
-        *(speed > 0.0 ? &early : &late) = t;
-    }
-    return late;
-}
-
-/* Until a swinging terminal arrives at its diode; h if not before. A step is a part of a swing, in which the speed
- * hardly exceeds those at its ends. */
-INLINE double arrival_s(const circuit_t *c, const start_t *s, int k, double h)
-{
-    double rate = s->swing[1].leg[k];
-    bool up = rate > 0.0;
-    ahead_t ahead = {.sign = up ? 1.0 : -1.0,
-                     .end_V = up ? c->now.x[V_DC] + c->bridge.v_diode_V : -c->bridge.v_diode_V,
-                     .drift_V_s = up ? s->rate.follow[MOTION][1] : 0.0};
-    double speed;
-    double start_V = ahead.sign * (c->now.x[V_LEG(k)] - ahead.end_V);
-    double end_V = beyond_V(c, s, k, &ahead, h, &speed);
-    if (start_V >= 0.0 || (end_V <= 0.0 && start_V + 1.2 * h * larger(fabs(rate), fabs(speed)) <= 0.0)) {
-        return h;
-    }
-    double early = 0.0, late = h;
-    if (end_V <= 0.0) {
-        late = speed < 0.0 ? peak_s(c, s, k, &ahead, h) : h;
-        if (beyond_V(c, s, k, &ahead, late, &speed) <= 0.0) {
-            return h;
-        }
-    }
-    double t = -start_V / fabs(rate), close_V = 0.01 * SNAP * c->now.x[V_DC];
-    t = t < late ? t : late;
-    for (int round = 0; round < 20; round++) {
-        double at_V = beyond_V(c, s, k, &ahead, t, &speed);
-        if (fabs(at_V) < close_V) {
-            break;
-        }
-        *(at_V > 0.0 ? &late : &early) = t;
-        t -= at_V / speed;
-        t = t > early && t < late ? t : 0.5 * (early + late);
-    }
-    return t;
-}
-
-/* The next derivative after a series of swinging terminals, V, as far as their swing of omega makes it. */
-INLINE double swing_ahead(const circuit_t *c, const start_t *s, double omega)
-{
-    double damping = c->bridge.g_winding_S * c->bridge.inv_c_leg_1_F;
-    double next = 0.0;
-    for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
-        int k = bridge_first(legs);
-        double before = fabs(s->swing[s->order - 1].leg[k]), last = fabs(s->swing[s->order].leg[k]);
-        next = larger(next, omega * omega * before + (omega + damping) * last);
-    }
-    return next;
-}
-
-INLINE double first_arrival_s(const circuit_t *c, const start_t *s, double h)
-{
-    for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
-        h = arrival_s(c, s, bridge_first(legs), h);
-    }
-    return h;
-}
-
-/* What swinging terminals allow. The series is as long as the step needs it. */
-INLINE double swing_s(const circuit_t *c, start_t *s, shape_t shape, double h)
-{
-    const double left_V = 0.1 / (c->inv_v_scale_1_V * c->inv_tolerance); /* d is 2.5 times what is missed */
-    const double omega = sqrt(c->machine.gamma_leg_1_H * c->bridge.inv_c_leg_1_F);
-    const double soon_s = 0.1 / omega;
-    swing_series(c, shape, s, SWING_BRIEF);
-    double brief = first_arrival_s(c, s, h < soon_s ? h : soon_s), square = brief * brief;
-    if (brief < soon_s && brief * square * square * swing_ahead(c, s, omega) <= SWING_BRIEF_NEXT * left_V) {
-        return brief;
-    }
-    swing_series(c, shape, s, SWING_ORDER);
-    double longest = pow(SWING_FACTORIAL * left_V / swing_ahead(c, s, omega), 1.0 / (SWING_ORDER + 1));
-    return first_arrival_s(c, s, longest < h ? longest : h);
 }
 
 /* What the error of a step says about the next. */
