@@ -81,6 +81,24 @@ TEST(Ringing, InLongSteps)
     }
 }
 
+// At 80,000 r/min, with a saliency of 10 %, the EMF and the inductance of the leg move during a swing: against the general way.
+TEST(Ringing, OfATurningRotor)
+{
+    plant_config_t config = bldc_hs(r_winding);
+    config.machine.L_q0_H = 1.1 * L;
+    config.mech.locked = false;
+    rig::Plant series(config);
+    config.winding.dR_ohm[0] = 1e-12;
+    rig::Plant general(config);
+    plant_set_speed(series, 8377.6);
+    plant_set_speed(general, 8377.6);
+    series.run(step());
+    general.run(step());
+    for (int n = 1; n <= 20; n++) {
+        EXPECT_NEAR(series.at(n * 1e-6).v_leg_V[2], general.at(n * 1e-6).v_leg_V[2], terminal_V) << n;
+    }
+}
+
 TEST(Ringing, FollowsTheRlcCircuit)
 {
     double Q = R_leg * std::sqrt(C / L_leg);
