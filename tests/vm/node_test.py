@@ -244,9 +244,10 @@ def babble(seconds, frames_per_ms):
     other = VirtualBus(BUS)
     sent, began = 0, time.monotonic()
     while (passed_s := time.monotonic() - began) < seconds:
-        if frames_per_ms is None or sent < 1000.0 * passed_s * frames_per_ms:
+        due = 100 if frames_per_ms is None else int(1000.0 * passed_s * frames_per_ms) - sent
+        for _ in range(due):
             sent += other.send(0x001, bytes(8))
-        else:
+        if due <= 0:
             time.sleep(0.0005)
     return sent
 
