@@ -38,6 +38,17 @@ static void set_operating_point(active_flux_t *self, const active_flux_config_t 
 void active_flux_tie(active_flux_t *self, const active_flux_config_t *config)
 {
     self->k_seed = to_feedback(config->k_seed);
+    self->k_turn = 0;
+}
+
+/* The observer leads. */
+static void untie(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in)
+{
+    const pm_q_t load = flux_relative(self, pm_mulh(self->inductance, in->i_dq.q));
+    const pm_q_t half = pm_clamp(in->omega < 0 ? -load : load, -PM_ONE / 4, PM_ONE / 2);
+    self->k_seed = 0;
+    const pm_q_t turn = config->g == 0 ? 0 : pm_mul(in->omega, half) * 2;
+    self->k_turn = to_feedback(pm_mul(turn, config->model.t_s));
 }
 
 void active_flux_reset(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in)
@@ -67,9 +78,10 @@ void active_flux_step(active_flux_t *self, const active_flux_config_t *config, c
     active.d = pm_mulh_sub(active.d, model.first, in->i_dq.d);
     active.q = pm_mulh_sub(active.q, model.first, in->i_dq.q);
 
+    const int32_t lack = model.second - active.d;
     const pm_pair_t g = pm_pair(&self->k_amplitude, &self->k_seed);
-    const pm_dq_t back = {.d = pm_mulh(model.second - active.d, pm_add_sat(g.first, g.second)),
-                          .q = pm_mulh(active.q, g.second)};
+    const pm_dq_t back = {.d = pm_mulh(lack, pm_add_sat(g.first, g.second)),
+                          .q = pm_mulh_sub(pm_mulh(active.q, g.second), lack, self->k_turn)};
     flux_keep(self, psi, back, in->dir);
     self->active = active;
     flux_describe(self, active, out);
@@ -91,10 +103,10 @@ void active_flux_slow(active_flux_t *self, const active_flux_config_t *config, c
         active_flux_tie(self, config);
         psi = observer_active_flux(&config->model, in->i_dq);
         self->psi_a = psi;
-        const pm_q_t lack = pm_mul(out->vector.q, in->i_dq.q);
-        self->R = observer_resistance(&config->resistance, &config->model, self->R, in->omega, lack);
+        self->R = observer_resistance(&config->resistance, &config->model, self->R, in->omega, out->vector.q,
+                                      in->i_dq.q);
     } else {
-        self->k_seed = 0;
+        untie(self, config, in);
         const pm_q_t lack = pm_sub_sat(self->psi_ref, out->vector.d);
         psi = observer_amplitude(&config->model, in->i_dq, self->psi_ref, lack, &self->psi_a);
     }

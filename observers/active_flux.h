@@ -6,24 +6,28 @@
  *   eps    = psi_a,q / psi_ref
  *   misfit = 1 - psi_a,d / psi_ref
  * Correction without a lag: the flux is fed back along the rotor frame,
- *   psi   += T_s [k_d (psi_ref - psi_a,d), -k_q psi_a,q]
+ *   psi   += T_s [k_d (psi_ref - psi_a,d), k_t (psi_ref - psi_a,d) - k_q psi_a,q]
  *   k_d    = g |omega| + k_q
+ *   k_t    = t omega,  t = 2 sign(omega) L_q i_q / psi_ref within -1/2 and 1; 0 with g = 0
  * g |omega| holds the amplitude and so removes the drift of the integration, which appears as a ripple of
- * the amplitude; it moves no angle as long as psi_ref is the mean amplitude. k_q > 0 ties the flux to the
- * present position while injection leads; it is zero when this observer leads. psi_ref is psi_a of
- * model.h and what that lacks, which it follows slowly within a band: an error of psi_m moves no angle either.
+ * the amplitude; k_t makes it stiffer when motoring and softer when braking, against the speed control, which
+ * R and L_q that are too high make swing (docs/decisions/004-resistance.md). Neither moves an angle as long as
+ * psi_ref is the mean amplitude. k_q > 0 ties the flux to the present position while injection leads, without
+ * k_t; it is zero when this observer leads. psi_ref is psi_a of model.h and what that lacks, which it follows
+ * slowly within a band: an error of psi_m moves no angle either.
  * While the flux is tied, its distance from the current model shows the error of the resistance, and R is
  * adapted to it:
  *   k_q psi_a,q = (R - R^) i_q
- * The adapted R is kept when the observer leads. R overestimated by 50 % would otherwise make the observer
- * unstable under load below a third of rated speed (docs/decisions/004-resistance.md).
+ * where its drop outweighs what lacks for other reasons. The adapted R is kept when the observer leads. R
+ * overestimated by 50 % would otherwise make the observer unstable under load below a third of rated speed
+ * (docs/decisions/004-resistance.md).
  * L_q(i) is that of model.h: a constant L_q costs IPM-1000 2.4 degrees at rated load.
  *
  * The integrated quantity is psi + R T_s/2 i, which needs one current only: the mean of both ends then
- * appears as R T_s/2 beside L_q. L_q(i), g |omega| and R T_s are renewed at 1 kHz. Formats are chosen so
+ * appears as R T_s/2 beside L_q. L_q(i), g |omega|, k_t and R T_s are renewed at 1 kHz. Formats are chosen so
  * that each line is a chain of multiply-accumulates without a shift.
  *
- * Called each period; the result belongs to k. Range: |psi| < 4, |i| < 2, L_q < 4; k_d and k_q are clamped to
+ * Called each period; the result belongs to k. Range: |psi| < 4, |i| < 2, L_q < 4; k_d, k_q and k_t are clamped to
  * 1/8 per period. eps and misfit have 19 fractional bits.
  * Tests: tests/unit/observers/active_flux_test.cpp, tests/scenario. */
 #ifndef OBSERVERS_ACTIVE_FLUX_H
@@ -51,6 +55,7 @@ typedef struct {
     int32_t reference;   /* psi_ref, Q25 */
     int32_t k_amplitude; /* k_d T_s, Q34 */
     int32_t k_seed;      /* present k_q T_s, Q34 */
+    int32_t k_turn;      /* k_t T_s, Q34 */
     pm_gain_t inverse;   /* 1 / psi_ref, Q26 */
     pm_dq_t active;      /* active flux of the last step, Q25 */
     pm_q_t psi_ref;

@@ -88,7 +88,7 @@ obs_out_t emf_last(const emf_t *self)
     return out;
 }
 
-/* Difference from the extended EMF, times the current along which it lies: the error of R. */
+/* Distance of E_q from the extended EMF: the error of R, times i_q. */
 static pm_q_t lacking(const emf_t *self, const emf_config_t *config, pm_q_t saliency, pm_q_t E_q,
                       const obs_in_t *in)
 {
@@ -96,7 +96,7 @@ static pm_q_t lacking(const emf_t *self, const emf_config_t *config, pm_q_t sali
     const pm_wide_t lag = pm_gain(in->omega - self->omega, config->speed_lag);
     const pm_q_t omega = pm_add_sat(in->omega, pm_narrow_sat(lag));
     const pm_q_t E_ex = pm_add_sat(pm_mul_sat(omega, self->psi_ref), pm_mul_sat(change, saliency));
-    return pm_mul(pm_sub_sat(E_q, E_ex), in->i_dq.q);
+    return pm_sub_sat(E_q, E_ex);
 }
 
 void emf_slow(emf_t *self, const emf_config_t *config, const emf_machine_t *machine, const obs_in_t *in,
@@ -107,7 +107,7 @@ void emf_slow(emf_t *self, const emf_config_t *config, const emf_machine_t *mach
         set_from_model(self, config, in);
         /* not with the loop's own speed: where it dips below the limit, E_q exceeds its w psi_a */
         self->R = observer_resistance(&config->resistance, &config->model, self->R, self->omega_cross,
-                                      lacking(self, config, machine->saliency, out.vector.q, in));
+                                      lacking(self, config, machine->saliency, out.vector.q, in), in->i_dq.q);
     } else {
         const pm_q_t lack = pm_mul(out.misfit, self->psi_ref);
         self->psi_ref = observer_amplitude(&config->model, in->i_dq, self->psi_ref, lack, &self->psi_a);

@@ -32,11 +32,12 @@ pm_q_t observer_amplitude(const observer_model_t *model, pm_dq_t i, pm_q_t refer
 }
 
 pm_q_t observer_resistance(const observer_resistance_t *config, const observer_model_t *model, pm_q_t R,
-                           pm_q_t omega, pm_q_t lack)
+                           pm_q_t omega, pm_q_t error, pm_q_t i_q)
 {
-    if (pm_abs(omega) >= config->omega) {
+    const pm_q_t drop = pm_mul(model->R, pm_abs(i_q));
+    if (pm_abs(omega) >= config->omega || drop < config->drop + pm_mul(pm_abs(omega), model->psi_m)) {
         return R;
     }
-    return pm_clamp(R + pm_narrow(pm_gain(lack, config->k)), pm_half(model->R),
+    return pm_clamp(R + pm_narrow(pm_gain(pm_mul(error, i_q), config->k)), pm_half(model->R),
                     pm_add_sat(model->R, model->R));
 }

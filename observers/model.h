@@ -39,7 +39,8 @@ typedef struct {
 /* Adaptation of R while the position is known from another source (docs/decisions/004-resistance.md). */
 typedef struct {
     pm_gain_t k;  /* per slow step, Q26; 0: R stays */
-    pm_q_t omega; /* R follows below this speed: above, errors of psi_m outweigh it */
+    pm_q_t omega; /* R follows below this speed ... */
+    pm_q_t drop;  /* ... and where its drop exceeds the EMF by this: what else lacks is then outweighed */
 } observer_resistance_t;
 
 pm_q_t observer_active_flux(const observer_model_t *model, pm_dq_t i);
@@ -54,7 +55,7 @@ pm_q_t observer_amplitude(const observer_model_t *model, pm_dq_t i, pm_q_t refer
 /* The next R, from the power that the model lacks: error (of flux or voltage) along the current, times the
  * current. Between half and twice the parameter. */
 pm_q_t observer_resistance(const observer_resistance_t *config, const observer_model_t *model, pm_q_t R,
-                           pm_q_t omega, pm_q_t lack);
+                           pm_q_t omega, pm_q_t error, pm_q_t i_q);
 
 #ifdef __cplusplus
 }

@@ -66,6 +66,8 @@ void make_resistance(maker_t *m, observer_resistance_t *c, pm_num_t k)
         c->k = fixed(m, least(k, pm_num(RESISTANCE_K_MOST)), GAIN_BITS, DRIVE_PARAM_i_rated);
     }
     c->omega = speed(m, DRIVE_PARAM_speed_low) / 2;
+    c->drop =
+        pm_mul(per_unit(m, DRIVE_PARAM_R_s, m->impedance), per_unit(m, DRIVE_PARAM_i_rated, m->base.i)) / 8;
 }
 
 void round_only(maker_t *m)

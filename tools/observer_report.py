@@ -348,9 +348,9 @@ speed control, below 30 % speed 10 and 3 Hz (SPM-400: 15 and 4); the observer al
 electrical degrees.
 
 **The drive's default is `active_flux`.** It runs salient and round machines alike, down to the lowest speed. Its model contains no
-speed, which the position loop would feed back, and only `mras_simple` costs less. R is learnt while injection leads, from what the
-compensation of dead time leaves too: that is 1.4 degrees of mean error at 20 % of IPM-1000 and rated load, the most of all; with
-the exact R it is 0.6 (`tests/scenario/ipm_active_flux.yaml`). An EMF observer has a smaller error there and in a load step; use it where
+speed, which the position loop would feed back, and only `mras_simple` costs less. R is learnt while injection leads, where its drop
+outweighs the EMF; an amplitude feedback that follows the load keeps it where R or L_q is told a fifth too high
+(docs/decisions/004-resistance.md). An EMF observer has a smaller error in a load step; use it where
 the speed stays above 20 %. The Kalman filter of full order is better at low speed and in a load step, at six times the
 instructions, but a wrong psi_m moves its angle; the reduced one may slip in an open-loop start if R is underestimated.
 """

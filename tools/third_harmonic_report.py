@@ -106,7 +106,7 @@ TAKE = """## Which to take
   the fundamental with the same loop; R and inductances are not known or change; from 5 % of speed on with loops of 10 and 3 Hz.
   An integral, whose drift is removed (`tests/scenario/third_integration.yaml`, `third_dynamics.yaml`).
 - **`third_sogi`**: the same from 10 % on for speeds that change slowly, thirty instructions less and the least error in steady state, a
-  tenth of the mean of `active_flux` at any load; noise hardly shows. Its pair takes a part of a cycle to follow the speed. At
+  tenth of the mean of `active_flux` without load, a fourth at rated load; noise hardly shows. Its pair takes a part of a cycle to follow the speed. At
   5 % it wants slower loops, 8 and 2 Hz: within 1.5 degrees (`tests/scenario/third_sogi.yaml`), and errs by 12 degrees under load with those of this page.
 - **`third_crossings`**: a speed that changes slowly, or a comparator instead of a converter: between crossings it knows no more than
   the last speed.

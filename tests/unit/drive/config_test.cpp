@@ -218,6 +218,7 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
         {"flux k_seed", c.position.observer.active_flux.k_seed, 32, 300 * T},
         {"flux k_R", c.position.observer.active_flux.resistance.k, 26, 300 / 8.0 / (W * i_r * i_r)},
         {"flux omega_R", c.position.observer.active_flux.resistance.omega, 28, 10.5 * P / W},
+        {"flux drop_R", c.position.observer.active_flux.resistance.drop, 28, R / Z * i_r / 8},
         {"omega_low", c.position.omega_low, 28, 21 * P / W},
         {"omega_high", c.position.omega_high, 28, 40 * P / W},
         {"per_span", c.position.per_span, 20, W / (19 * P)},

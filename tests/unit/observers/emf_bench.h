@@ -16,6 +16,7 @@ inline emf_config_t emf_config(const Machine &m, const Base &b, double L_d_H, do
     c.model = model(m, b, L_d_H, L_q_H, L_q_rated_H, i_rated_A);
     c.resistance.k = fixed(1.0 / 64 / (i_rated * i_rated), 26);
     c.resistance.omega = PM_Q(0.06);
+    c.resistance.drop = fixed(real(c.model.R) * i_rated / 8, 28);
     c.k_filter = fixed(k, 32);
     c.lag = fixed((2 - k) / k, 26);
     c.rate = fixed(1 / (b.period_s * b.omega_rad_s), 20);

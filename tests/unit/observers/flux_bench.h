@@ -18,6 +18,7 @@ inline active_flux_config_t flux_config(const Machine &m, const Base &b, double 
     c.k_seed = fixed(300 * b.period_s, 32);
     c.resistance.k = fixed(300.0 / 8 / (b.omega_rad_s * i_rated * i_rated), 26);
     c.resistance.omega = PM_Q(0.06);
+    c.resistance.drop = fixed(real(c.model.R) * i_rated / 8, 28);
     return c;
 }
 
