@@ -32,13 +32,15 @@ static void set_operating_point(active_flux_t *self, const active_flux_config_t 
     const pm_q_t L_q = observer_L_q(&config->model, in->i_dq);
     self->drop = to_drop(pm_frac(self->R, config->model.t_s));
     self->inductance = pm_add_sat(to_inductance(L_q), self->drop / 4); /* R T_s / 2 */
-    self->k_amplitude = to_feedback(pm_mul(pm_abs(in->omega), config->g));
+    self->k_d = pm_add_sat(to_feedback(pm_mul(pm_abs(in->omega), config->g)), self->k_q);
 }
 
 void active_flux_tie(active_flux_t *self, const active_flux_config_t *config)
 {
-    self->k_seed = to_feedback(config->k_seed);
-    self->k_turn = 0;
+    const int32_t k_q = to_feedback(config->k_seed);
+    self->k_d = pm_add_sat(self->k_d - self->k_q, k_q);
+    self->k_q = k_q;
+    self->k_t = 0;
 }
 
 /* The observer leads. */
@@ -46,9 +48,9 @@ static void untie(active_flux_t *self, const active_flux_config_t *config, const
 {
     const pm_q_t load = flux_relative(self, pm_mulh(self->inductance, in->i_dq.q));
     const pm_q_t half = pm_clamp(in->omega < 0 ? -load : load, -PM_ONE / 4, PM_ONE / 2);
-    self->k_seed = 0;
     const pm_q_t turn = config->g == 0 ? 0 : pm_mul(in->omega, half) * 2;
-    self->k_turn = to_feedback(pm_mul(turn, config->model.t_s));
+    self->k_q = 0;
+    self->k_t = to_feedback(pm_mul(turn, config->model.t_s));
 }
 
 void active_flux_reset(active_flux_t *self, const active_flux_config_t *config, const obs_in_t *in)
@@ -57,8 +59,10 @@ void active_flux_reset(active_flux_t *self, const active_flux_config_t *config, 
     self->step = config->model.t_s / 4;
     self->psi_a = observer_active_flux(&config->model, in->i_dq);
     set_reference(self, self->psi_a);
-    set_operating_point(self, config, in);
+    self->k_d = 0;
+    self->k_q = 0;
     active_flux_tie(self, config);
+    set_operating_point(self, config, in);
     const pm_dq_t drawn = {.d = pm_mulh(self->inductance, in->i_dq.d),
                            .q = pm_mulh(self->inductance, in->i_dq.q)};
     /* Q25, and Q26 by the factor two of the transform */
@@ -79,9 +83,10 @@ void active_flux_step(active_flux_t *self, const active_flux_config_t *config, c
     active.q = pm_mulh_sub(active.q, model.first, in->i_dq.q);
 
     const int32_t lack = model.second - active.d;
-    const pm_pair_t g = pm_pair(&self->k_amplitude, &self->k_seed);
-    const pm_dq_t back = {.d = pm_mulh(lack, pm_add_sat(g.first, g.second)),
-                          .q = pm_mulh_sub(pm_mulh(active.q, g.second), lack, self->k_turn)};
+    const pm_pair_t k = pm_pair(&self->k_q, &self->k_t);
+    pm_dq_t back;
+    back.q = pm_mulh_sub(pm_mulh(active.q, k.first), lack, k.second);
+    back.d = pm_mulh(lack, self->k_d);
     flux_keep(self, psi, back, in->dir);
     self->active = active;
     flux_describe(self, active, out);

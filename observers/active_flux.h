@@ -47,17 +47,17 @@ typedef struct {
 } active_flux_config_t;
 
 typedef struct {
-    pm_ab_t psi;         /* stator flux + R T_s/2 i, Q26 */
-    pm_ab_t i;           /* current at k-1 */
-    int32_t step;        /* T_s w_base, Q30 */
-    int32_t drop;        /* R T_s w_base, Q30 */
-    int32_t inductance;  /* L_q(i) + R T_s/2, Q29 */
-    int32_t reference;   /* psi_ref, Q25 */
-    int32_t k_amplitude; /* k_d T_s, Q34 */
-    int32_t k_seed;      /* present k_q T_s, Q34 */
-    int32_t k_turn;      /* k_t T_s, Q34 */
-    pm_gain_t inverse;   /* 1 / psi_ref, Q26 */
-    pm_dq_t active;      /* active flux of the last step, Q25 */
+    pm_ab_t psi;        /* stator flux + R T_s/2 i, Q26 */
+    pm_ab_t i;          /* current at k-1 */
+    int32_t step;       /* T_s w_base, Q30 */
+    int32_t drop;       /* R T_s w_base, Q30 */
+    int32_t inductance; /* L_q(i) + R T_s/2, Q29 */
+    int32_t reference;  /* psi_ref, Q25 */
+    int32_t k_d;        /* times T_s, as the next two, Q34 */
+    int32_t k_q;
+    int32_t k_t;
+    pm_gain_t inverse; /* 1 / psi_ref, Q26 */
+    pm_dq_t active;    /* active flux of the last step, Q25 */
     pm_q_t psi_ref;
     pm_q_t psi_a; /* what of it is the model's */
     pm_q_t R;     /* adapted */

@@ -48,8 +48,8 @@ void flux_linkage_step(flux_linkage_t *self, const flux_linkage_config_t *config
     pm_dq_t rotor = restored(self, pm_park_half(psi, in->dir));
     rotor.d = pm_mulh_sub(rotor.d, flux->inductance, in->i_dq.d);
     rotor.q = pm_mulh_sub(rotor.q, flux->inductance, in->i_dq.q);
-    const pm_dq_t back = {.d = pm_mulh(flux->reference - rotor.d, flux->k_seed),
-                          .q = pm_mulh(rotor.q, flux->k_seed)};
+    const pm_dq_t back = {.d = pm_mulh(flux->reference - rotor.d, flux->k_q),
+                          .q = pm_mulh(rotor.q, flux->k_q)};
     flux_keep(flux, psi, back, in->dir);
     flux->active = rotor;
     flux_describe(flux, rotor, out);

@@ -214,7 +214,7 @@ Ripple ripple(const Fixture &f, double omega, Complex v_error_V, Complex i_error
     const obs_in_t first = rotation.seen(0, rotation.omega_rad_s);
     active_flux_t state;
     active_flux_reset(&state, &f.config, &first);
-    state.k_seed = 0; // it leads
+    bench::lead(state);
     const int turn =
         static_cast<int>(std::lround(2 * bench::kPi / std::abs(rotation.omega_rad_s) / f.base.period_s));
     Ripple r = {0, 0, 0};
@@ -262,7 +262,7 @@ TEST(ActiveFlux, AWrongFluxDecaysAtTheRateDerived)
             const obs_in_t first = rotation.seen(0, rotation.omega_rad_s);
             active_flux_t state;
             active_flux_reset(&state, &f.config, &first);
-            state.k_seed = 0;
+            bench::lead(state);
             const double wrong = 0.1;
             state.psi.alpha += bench::fixed(wrong, 26);
             const double rate = g * std::abs(rotation.omega_rad_s) / 2;
@@ -337,8 +337,8 @@ TEST(ActiveFlux, WithoutAGainItIsAnIntegrator)
     active_flux_reset(&state, &f.config, &in);
     const obs_out_t last = active_flux_last(&state);
     active_flux_slow(&state, &f.config, &in, &last, PM_ONE);
-    EXPECT_EQ(state.k_turn, 0);
-    EXPECT_EQ(state.k_amplitude, 0);
+    EXPECT_EQ(state.k_t, 0);
+    EXPECT_EQ(state.k_d, 0);
 }
 
 TEST(ActiveFlux, AWrongStartIsForgottenInClosedLoop)
@@ -348,7 +348,7 @@ TEST(ActiveFlux, AWrongStartIsForgottenInClosedLoop)
         Closed closed(f, Rotation(f.machine, f.base, 0.5, {0, 2}));
         const obs_in_t in = closed.rotation.seen(wrong_deg * kDegree, closed.rotation.omega_rad_s);
         active_flux_reset(&closed.state, &f.config, &in);
-        closed.state.k_seed = 0;
+        bench::lead(closed.state);
         const double tau = 2 / (0.5 * closed.rotation.omega_rad_s);
         double worst = 0;
         for (int k = 0; k < static_cast<int>(tau / f.base.period_s); ++k) {
@@ -384,7 +384,7 @@ TEST(ActiveFlux, ErrorSignalIsTheAngleForSmallErrors)
         const obs_in_t first = rotation.seen(0, rotation.omega_rad_s);
         active_flux_t state;
         active_flux_reset(&state, &f.config, &first);
-        state.k_seed = 0;
+        bench::lead(state);
         rotation.advance();
         const obs_in_t in = rotation.seen(rotation.theta_rad - error, rotation.omega_rad_s);
         obs_out_t out;

@@ -27,4 +27,11 @@ inline active_flux_config_t flux_config(const Machine &linear, const Base &b, do
     return flux_config(linear, b, linear.L_d0_H, linear.L_q0_H, linear.L_q0_H, 4.0, g);
 }
 
+// Not tied to the position any more, as after a slow step with weight.
+inline void lead(active_flux_t &state)
+{
+    state.k_d -= state.k_q;
+    state.k_q = 0;
+}
+
 } // namespace bench
