@@ -35,6 +35,7 @@ static void set_operating_point(active_flux_t *self, const active_flux_config_t 
     self->k_d = pm_add_sat(to_feedback(pm_mul(pm_abs(in->omega), config->g)), self->k_q);
 }
 
+/* Also between two slow steps, which renew k_d. */
 void active_flux_tie(active_flux_t *self, const active_flux_config_t *config)
 {
     const int32_t k_q = to_feedback(config->k_seed);

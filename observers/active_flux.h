@@ -8,7 +8,8 @@
  * Correction without a lag: the flux is fed back along the rotor frame,
  *   psi   += T_s [k_d (psi_ref - psi_a,d), k_t (psi_ref - psi_a,d) - k_q psi_a,q]
  *   k_d    = g |omega| + k_q
- *   k_t    = t omega,  t = 2 sign(omega) L_q i_q / psi_ref within -1/2 and 1; 0 with g = 0
+ *   k_t    = t omega
+ *   t      = 2 sign(omega) L_q i_q / psi_ref within -1/2 and 1; 0 with g = 0
  * g |omega| holds the amplitude and so removes the drift of the integration, which appears as a ripple of
  * the amplitude; k_t makes it stiffer when motoring and softer when braking, against the speed control, which
  * R and L_q that are too high make swing (docs/decisions/004-resistance.md). Neither moves an angle as long as

@@ -290,8 +290,10 @@ TEST(ActiveFlux, AWrongFluxDecaysAtTheRateDerived)
     }
 }
 
-// With a current it is stiffer or softer: seen from the rotor p d = omega q - g |omega| d, p q = -omega (1 + t) d,
-// t = 2 sign(omega) L_q i_q / psi_a within -1/2 and 1.
+// With a current it is stiffer or softer. Seen from the rotor:
+//   p d = omega q - g |omega| d
+//   p q = -omega (1 + t) d
+//   t   = 2 sign(omega) L_q i_q / psi_a within -1/2 and 1
 TEST(ActiveFlux, TheCurrentMakesTheAmplitudeStiff)
 {
     const Fixture f = ipm_linear();
