@@ -20,7 +20,7 @@ import zero_report
 from campaigns import worker
 from campaigns.draw import factors
 from campaigns.pool import Pool
-from observer_report import PMSIM, ROOT, degrees, fact, fail, methods, plt, table
+from observer_report import PMSIM, ROOT, count_lost, degrees, fact, fail, methods, plt, table, worst_of
 
 MACHINE = "IPM-1000"
 LIST = "injection/injections.def"
@@ -55,7 +55,8 @@ def standstill(cases=None, sections=""):
                       for load in LOADS for turn in TURNS for angle in ANGLES]
     profile = """  - {t_s: 0.0, mode: torque, torque_rel: 0, imposed_speed_rel: 0, enable: true}
   - {t_s: 0.6, torque_rel: $load, ramp_s: 0.3}"""
-    return Source(profile, cases, 1.5, 2.0, "", sections)
+    # for as long as it takes: not the protection of the motor is measured
+    return Source(profile, cases, 1.5, 2.0, "t_stall: 60, ", sections)
 
 
 TURNING = f"""  - {{t_s: 0.0, mode: speed, speed_rel: {SPEED}*$turn, enable: true}}
@@ -167,20 +168,10 @@ def needs_in_words(needs):
     return [words.get(need, need) for need in re.findall(r"NEEDS_\w+", needs)]
 
 
-def worst(part):
-    """Of some results the one with the largest error; a lost one before all."""
-    return max(part, key=lambda r: (r[0], r[3]))
-
-
-def cell(result):
-    lost, mean, rms, largest = result
-    return "lost" if lost else f"{degrees(mean)}, {degrees(rms)}, {degrees(largest)}"
-
-
 def by_load(results, per_load):
     """Load -> direction -> worst result."""
     each = per_load // len(TURNS)
-    return [[worst(results[k * per_load + d * each:k * per_load + (d + 1) * each]) for d in range(len(TURNS))]
+    return [[worst_of(results[k * per_load + d * each:k * per_load + (d + 1) * each]) for d in range(len(TURNS))]
             for k in range(len(LOADS))]
 
 
@@ -189,15 +180,18 @@ def plot(results, path):
     loads = [100 * load for load in LOADS]
     for axis, key, per_load in (axes[0], "standstill", len(TURNS) * len(ANGLES)), (axes[1], "slow", len(TURNS)):
         for n, (name, r) in enumerate(results.items()):
-            parts = [worst(part) for part in by_load(r[key], per_load)]
-            axis.plot(loads, [np.nan if p[0] else p[3] for p in parts], f"C{n}o-", ms=4, label=f"{name}, largest")
-            axis.plot(loads, [np.nan if p[0] else abs(p[1]) for p in parts], f"C{n}s--", ms=3, label=f"{name}, |mean|")
+            parts = [worst_of(part) for part in by_load(r[key], per_load)]
+            axis.plot(loads, [np.nan if p.lost else p.largest for p in parts], f"C{n}o-", ms=4)
+            axis.plot(loads, [np.nan if p.lost else abs(p.mean) for p in parts], f"C{n}s--", ms=3)
         axis.set(xlabel="load, % of rated", xticks=loads)
         axis.grid(True, alpha=0.3)
     axes[0].set(ylabel="error, deg", title=f"{MACHINE}: standstill, worst of directions and angles", ylim=(0, None))
     axes[1].set_title(f"{MACHINE}: {100 * SPEED:.0f} % speed, worst of directions")
-    axes[0].legend(fontsize=8)
-    figure.tight_layout()
+    names = [plt.Line2D([], [], color=f"C{n}", label=name) for n, name in enumerate(results)]
+    kinds = [plt.Line2D([], [], color="k", marker="o", ms=4, label="largest"),
+             plt.Line2D([], [], color="k", marker="s", ms=3, ls="--", label="|mean|")]
+    figure.tight_layout(rect=(0, 0, 0.84, 1))
+    figure.legend(handles=names + kinds, loc="center right", fontsize=8)
     figure.savefig(path, dpi=110, metadata={"Software": None})
     plt.close(figure)
 
@@ -238,7 +232,7 @@ electrical degrees, plant minus estimate: mean, rms, largest.
 
 
 def disturbed(r):
-    parts = [worst(r["disturbed"][k:k + len(TURNS)]) for k in range(0, len(r["disturbed"]), len(TURNS))]
+    parts = [worst_of(r["disturbed"][k:k + len(TURNS)]) for k in range(0, len(r["disturbed"]), len(TURNS))]
     return dict(zip([name for name, _ in DISTURBED], parts))
 
 
@@ -246,23 +240,15 @@ def which(results):
     """The words of each source's file, with the figures of this page."""
     lines = ["## Which to take\n"]
     for name, r in results.items():
-        step, reverse = (degrees_or_lost(r[key]) for key in ("step", "reversal"))
+        step, reverse = (worst_of(r[key]).one("largest") for key in ("step", "reversal"))
         d = disturbed(r)
         none, double, usual, noisy = (d[key] for key in ("no leg capacitance", "1 nF", "0.5 nF", "noise 2 LSB"))
-        lost = sum(m[0] for m in r["machines"])
+        lost = count_lost(r["machines"])
         lines.append(f"- **`{name}`**: {fact(f'injection/{name}.yaml', 'take')}. Measured: load step {step}, reversal {reverse}; "
-                     f"leg capacitance of 0, 0.5 and 1 nF: mean {', '.join('lost' if x[0] else degrees(x[1]) for x in (none, usual, double))}; "
-                     f"noise of 0.5 and 2 LSB: rms {', '.join('lost' if x[0] else degrees(x[2]) for x in (usual, noisy))}; "
+                     f"leg capacitance of 0, 0.5 and 1 nF: mean {', '.join(x.one('mean') for x in (none, usual, double))}; "
+                     f"noise of 0.5 and 2 LSB: rms {', '.join(x.one('rms') for x in (usual, noisy))}; "
                      f"{lost} of {len(r['machines'])} machines lost.")
     return "\n".join(lines) + "\n"
-
-
-def degrees_or_lost(results):
-    return cell_largest(worst(results))
-
-
-def cell_largest(result):
-    return "lost" if result[0] else degrees(result[3])
 
 
 def page(rows, results, plot_name, values, bytes_of):
@@ -292,33 +278,41 @@ def page(rows, results, plot_name, values, bytes_of):
         body = []
         for name, r in results.items():
             loads = by_load(r[key], per_load)
-            body += [[f"`{name}`, {'forwards' if turn > 0 else 'backwards'}", *(cell(part[d]) for part in loads)]
+            body += [[f"`{name}`, {'forwards' if turn > 0 else 'backwards'}", *(str(part[d]) for part in loads)]
                      for d, turn in enumerate(TURNS)]
         text += [title + "\n", table(["source", *heads], body)]
     text.append(f"## Dynamics and wrong parameters\n\nAt {100 * SPEED:.0f} % speed, largest error of both directions: load 0 to 50 % as a "
                 f"step and within 0.3 s, reversal without load. Machines: R_s, L_d, L_q and psi_m told wrong by up to 10 %, each for "
-                "itself, half load within 0.3 s, directions in turn. Lost: a fault, or 60 degrees of error.\n")
+                "itself, half load within 0.3 s, directions in turn. Lost: a fault, or 60 degrees of error. Open loop: what "
+                "is measured says that the source would err too much, and the drive imposes the current vector instead.\n")
     body = []
     for name, r in results.items():
-        kept = [m for m in r["machines"] if not m[0]]
-        body.append([f"`{name}`", *(degrees_or_lost(r[key]) for key in ("step", "ramp", "reversal")),
+        kept = [m for m in r["machines"] if not m.lost]
+        body.append([f"`{name}`", *(worst_of(r[key]).one("largest") for key in ("step", "ramp", "reversal")),
                      f"{len(r['machines']) - len(kept)} of {len(r['machines'])}",
-                     degrees(max((m[1] for m in kept), key=abs)) if kept else "-",
-                     degrees(max(m[3] for m in kept)) if kept else "-"])
+                     degrees(max((m.mean for m in kept), key=abs)) if kept else "-",
+                     degrees(max(m.largest for m in kept)) if kept else "-"])
     text.append(table(["source", "load step", "load within 0.3 s", "reversal", "machines lost", "their largest mean error",
                        "their largest error"], body))
     text.append(f"## Inverter and converter\n\n{100 * SPEED:.0f} % speed, half load, worst direction, one change at a time:\n")
     text.append(table(["source", *(name for name, _ in DISTURBED)],
-                      [[f"`{name}`", *map(cell, disturbed(r).values())] for name, r in results.items()]))
+                      [[f"`{name}`", *map(str, disturbed(r).values())] for name, r in results.items()]))
     return "\n".join(text)
 
 
 def probe_page(names, path):
-    """Half load at slow speed, forwards, every source; and the section on the neutral."""
+    """Every source: rated load at standstill, half load at slow speed, a step of the load, noise; and the section on the neutral."""
     number = place_in_list()
-    common.check(path, [("free rotor under speed control", "50 %", f"`{name}`, forwards",
-                         slow(), (number[name], [f"{key}={value}" for key, value in settings(name).items()], "0.5 1"))
-                        for name in names] + zero_report.probes())
+    probes = []
+    for name in names:
+        own = [f"{key}={value}" for key, value in settings(name).items()]
+        probes += [common.Probe(heading, column, f"`{name}`" + way, study, number[name], cases, own, figure)
+                   for heading, column, way, study, cases, figure in (
+                       ("Standstill, held", "100 %", ", forwards", standstill(), [f"1 1 {angle}" for angle in ANGLES], ""),
+                       ("free rotor under speed control", "50 %", ", forwards", slow(), ["0.5 1"], ""),
+                       ("## Dynamics", "load step", "", load_step(), ["1", "-1"], "largest"),
+                       ("## Inverter and converter", "noise 2 LSB", "", disturbances(), ["noise 2 LSB 1", "noise 2 LSB -1"], ""))]
+    common.check(path, probes + zero_report.probes())
 
 
 def main():

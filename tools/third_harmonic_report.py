@@ -94,11 +94,6 @@ def chosen():
             if name in FUNDAMENTAL or name.startswith("third_")}
 
 
-def cell(result):
-    lost, mean, rms, largest = result
-    return "lost" if lost else f"{degrees(mean)}, {degrees(rms)}, {degrees(largest)}"
-
-
 TAKE = """## Which to take
 
 - **No lead to the star point**: an observer of the fundamental, `active_flux` first.
@@ -132,10 +127,9 @@ largest.
 
 def row_of_machines(results):
     """Lost, and median and worst of the others: largest errors, and of the means their magnitude."""
-    lost = sum(r[0] for r in results)
-    largest = sorted(r[3] for r in results if not r[0])
-    rms = sorted(r[2] for r in results if not r[0])
-    return [f"{lost} of {len(results)}", *[f"{degrees(x[len(x) // 2])}, {degrees(x[-1])}" for x in (rms, largest)]]
+    largest = sorted(r.largest for r in results if not r.lost)
+    rms = sorted(r.rms for r in results if not r.lost)
+    return [f"{common.count_lost(results)} of {len(results)}", *[f"{degrees(x[len(x) // 2])}, {degrees(x[-1])}" for x in (rms, largest)]]
 
 
 def page(names, results, counted, sizes):
@@ -152,11 +146,11 @@ def page(names, results, counted, sizes):
     text.append("## Speed and load\n")
     for k, load in enumerate(LOADS):
         text.append(f"{100 * load:.0f} % of the rated load:\n")
-        rows = [[f"`{name}`", *[cell(r["steady"][n * len(LOADS) + k]) for n in range(len(SPEEDS))]] for name, r in results.items()]
+        rows = [[f"`{name}`", *[str(r["steady"][n * len(LOADS) + k]) for n in range(len(SPEEDS))]] for name, r in results.items()]
         text.append(table(["source", *[f"{100 * s:.0f} %" for s in SPEEDS]], rows))
     text.append("## Wrong parameters and noise\n\nHalf speed, half load, one parameter at a time told wrong by so much; L_q -40 % is L_d. "
                 "Noise is that of all channels.\n")
-    rows = [[f"`{name}`", *map(cell, r["wrong"])] for name, r in results.items()]
+    rows = [[f"`{name}`", *map(str, r["wrong"])] for name, r in results.items()]
     text.append(table(["source", *[name for name, _ in WRONG]], rows))
     text.append("## Dynamics\n\nLargest error of both directions: half load as a step and off again, and a reversal without load; with "
                 "the bandwidth of the position loop.\n")
@@ -172,6 +166,15 @@ def page(names, results, counted, sizes):
     return "\n".join(text)
 
 
+def probe_page(names, path):
+    """Every source: rated load at half speed, and half load with L_q told too great."""
+    probes = []
+    for name, (n, *_) in names.items():
+        probes += [common.Probe("100 % of the rated load", "50 %", f"`{name}`", steady(), n, ("0.5 1",)),
+                   common.Probe("## Wrong parameters", "L_q +50 %", f"`{name}`", wrong(), n, ("L_q +50 %",))]
+    common.check(path, probes)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--machines", type=int, default=100)
@@ -181,8 +184,7 @@ def main():
     names = chosen()
     path = options.out / "third_harmonic.md"
     if options.check:
-        common.check(path, [("100 % of the rated load", "50 %", f"`{name}`", steady(), (n, (), "0.5 1"))
-                            for name, (n, *_) in names.items()])
+        probe_page(names, path)
         return
     studies = {"steady": steady(), "wrong": wrong(), "machines": machines(options.machines),
                **{f"{kind} {speed} {loop}": dynamics(kind, speed, loop) for kind, speed, loop in DYNAMICS}}

@@ -6,7 +6,7 @@ import random
 
 import observer_report as common
 from campaigns.draw import factors
-from observer_report import degrees, table
+from observer_report import count_lost, degrees, table, worst_of
 
 HEADING = "## Voltage at the neutral beside currents"
 SPEED = 0.05
@@ -119,25 +119,12 @@ def first_cell(machine, source):
     return f"{machine}, `{name}`, {f_Hz} Hz, loop {loop_Hz} Hz"
 
 
-def worst(part):
-    return max(part, key=lambda r: (r[0], r[3]))
-
-
-def cell(result):
-    lost, mean, rms, largest = result
-    return "lost" if lost else f"{degrees(mean)}, {degrees(rms)}, {degrees(largest)}"
-
-
-def largest(result):
-    return "lost" if result[0] else degrees(result[3])
-
-
 def kept(results):
-    alive = [r for r in results if not r[0]]
-    lost = len(results) - len(alive)
+    alive = [r for r in results if not r.lost]
+    lost = count_lost(results)
     if not alive:
         return f"{lost} lost"
-    return f"{lost} lost, {degrees(max((r[1] for r in alive), key=abs))}, {degrees(max(r[3] for r in alive))}"
+    return f"{lost} lost, {degrees(max((r.mean for r in alive), key=abs))}, {degrees(max(r.largest for r in alive))}"
 
 
 def noise_ratio(m, omega):
@@ -172,7 +159,7 @@ def formulas():
 def figure(results, machine, name, key, place):
     """Of the source of that name whose loop is the first of the list."""
     source = next(s for s in SOURCES if s[:3] == name)
-    return worst(results[machine, source][key][place:place + 2])
+    return worst_of(results[machine, source][key][place:place + 2])
 
 
 def words(results):
@@ -184,24 +171,20 @@ def words(results):
              (("sine", sine), ("zero", zero), ("square", square), ("zero square", zero_square))}
         ten = {key: figure(results, machine, name, "steady", 2 * len(LOADS)) for key, name in
                (("square", square), ("zero square", zero_square))}
-        lines.append(f"- {machine}, dL_0 / K = {2 * m['dL_0'] / (m['L_q'] - m['L_d']):.2g}: rms without load {degrees(r['sine'][2])} by the "
-                     f"current of a sine and {degrees(r['zero'][2])} at the neutral, {degrees(r['square'][2])} and "
-                     f"{degrees(r['zero square'][2])} with a square wave; with converters of 10 bits {largest_rms(ten['square'])} and "
-                     f"{largest_rms(ten['zero square'])}.")
+        lines.append(f"- {machine}, dL_0 / K = {2 * m['dL_0'] / (m['L_q'] - m['L_d']):.2g}: rms without load {r['sine'].one('rms')} by the "
+                     f"current of a sine and {r['zero'].one('rms')} at the neutral, {r['square'].one('rms')} and "
+                     f"{r['zero square'].one('rms')} with a square wave; with converters of 10 bits {ten['square'].one('rms')} and "
+                     f"{ten['zero square'].one('rms')}.")
     return "\n".join(lines) + "\n"
-
-
-def largest_rms(result):
-    return "lost" if result[0] else degrees(result[2])
 
 
 def section(results, count):
     heads = [*(f"{100 * load:.0f} %" for load in LOADS), "10 bits, 0 %", "noise 2 LSB, 0 %", "load step", "reversal"]
     body, drawn = [], []
     for (machine, source), r in results.items():
-        pairs = [worst(r["steady"][k:k + 2]) for k in range(0, len(r["steady"]), 2)]
+        pairs = [worst_of(r["steady"][k:k + 2]) for k in range(0, len(r["steady"]), 2)]
         first = first_cell(machine, source)
-        body.append([first, *map(cell, pairs), largest(worst(r["step"])), largest(worst(r["reversal"]))])
+        body.append([first, *map(str, pairs), worst_of(r["step"]).one("largest"), worst_of(r["reversal"]).one("largest")])
         drawn.append([first, kept(r["one"]), kept(r["tenth"]) if "tenth" in r else "-"])
     return "\n".join([
         HEADING + "\n",
@@ -231,10 +214,10 @@ def section(results, count):
 
 
 def probes():
-    """Half load, forwards, every source: what common.check() wants. Its worst direction stands there: 0 % of both."""
+    """No load, forwards, every source: what common.check() wants. The worst direction stands there: 0 % of both."""
     out = []
     for machine in MACHINES:
         for source in SOURCES:
             _, n, *own = source
-            out.append((HEADING, "0 %", first_cell(machine, source), steady(machine), (n, own_settings(*own), "load 0 1")))
+            out.append(common.Probe(HEADING, "0 %", first_cell(machine, source), steady(machine), n, ("load 0 1",), own_settings(*own)))
     return out

@@ -100,6 +100,6 @@ def run_file(program, wanted, scenario, settings=(), words=()):
                 rows = list(csv.reader(file))
         else:
             one = json.loads((folder / "result.json").read_text(encoding="utf-8"))["expectations"]
-            rows = [[item["name"] for item in one], [item["value"] for item in one]]
+            rows = [[item["name"] for item in one], ["nan" if item["value"] is None else item["value"] for item in one]]
         trace = (folder / "trace.csv").read_text(encoding="utf-8") if words else ""
         return {"code": code, "errors": errors, "rows": rows, "trace": trace}

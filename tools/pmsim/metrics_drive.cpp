@@ -127,16 +127,17 @@ class LimitTime : public Metric
     uint32_t mask_ = 0;
 };
 
-class DrivenTime : public Metric
+// Time in which something holds, in the samples of the window.
+template <bool (*holds)(const rig_sample_t &)> class TimeOf : public Metric
 {
   public:
-    DrivenTime(const Expectation &, const Setup &setup) : period_s_(1.0 / setup.plant.inverter.f_pwm_Hz)
+    TimeOf(const Expectation &, const Setup &setup) : period_s_(1.0 / setup.plant.inverter.f_pwm_Hz)
     {
     }
 
     void add(const Sample &s) override
     {
-        time_s_ += s.rig.driven ? period_s_ : 0.0;
+        time_s_ += holds(s.rig) ? period_s_ : 0.0;
     }
 
     MetricValue value() const override
@@ -147,6 +148,16 @@ class DrivenTime : public Metric
   private:
     double period_s_, time_s_ = 0.0;
 };
+
+bool driven(const rig_sample_t &rig)
+{
+    return rig.driven;
+}
+
+bool dragged(const rig_sample_t &rig)
+{
+    return rig.driven && rig.dragged;
+}
 
 // The plant's own honesty: what goes in, minus losses, mechanical work and stored field energy.
 class EnergyResidual : public Metric
@@ -209,7 +220,9 @@ std::vector<SpecialMetric> drive_metrics()
           false,
           {}},
          make_special<Faults>},
-        {{"driven_s", "s", "time with the bridge on", false, false, {}}, make_special<DrivenTime>},
+        {{"driven_s", "s", "time with the bridge on", false, false, {}}, make_special<TimeOf<driven>>},
+        {{"open_loop_s", "s", "time in which the current vector is imposed", false, false, {}},
+         make_special<TimeOf<dragged>>},
         {{"restarts", "1", "starts after the first fault of the window", false, false, {}},
          make_special<Faults>},
         {{"energy_residual_rel",

@@ -426,6 +426,16 @@ TEST(Metrics, FoundAngleErrorIsTheWorstOfItsStarts)
     EXPECT_TRUE(std::isnan(gather("found_angle_error_deg", running).number));
 }
 
+// A vector that is imposed counts while the bridge is on.
+TEST(Metrics, OpenLoopIsTheTimeWithAnImposedVector)
+{
+    const auto story = [](Sample &s, int k) {
+        s.rig.dragged = k >= 100 && k < 300;
+        s.rig.driven = k >= 150;
+    };
+    EXPECT_NEAR(gather("open_loop_s", story).number, 150 * 1e-4, exact);
+}
+
 // Two faults of which one is a lost position; the bridge is off at once, and a start follows each.
 TEST(Metrics, EveryFaultCountsOnce)
 {
@@ -443,6 +453,7 @@ TEST(Metrics, EveryFaultCountsOnce)
     EXPECT_EQ(gather("restarts", story).number, 2.0);
     EXPECT_EQ(gather("driven_after_fault_periods", story).number, 200.0 + 400.0);
     EXPECT_NEAR(gather("driven_s", story).number, 700 * 1e-4, exact);
+    EXPECT_EQ(gather("open_loop_s", story).number, 0.0);
     Expectation late;
     late.metric = "fault_delay_s";
     late.t0_s = 0.004;
