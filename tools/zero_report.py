@@ -214,10 +214,11 @@ def section(results, count):
 
 
 def probes():
-    """No load, forwards, every source: what common.check() wants. The worst direction stands there: 0 % of both."""
+    """No load, every source: what common.check() wants."""
     out = []
     for machine in MACHINES:
         for source in SOURCES:
             _, n, *own = source
-            out.append(common.Probe(HEADING, "0 %", first_cell(machine, source), steady(machine), n, ("load 0 1",), own_settings(*own)))
+            out.append(common.Probe(HEADING, "0 %", first_cell(machine, source), steady(machine), n,
+                                    [f"load 0 {turn}" for turn in TURNS], own_settings(*own)))
     return out
