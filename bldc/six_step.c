@@ -8,12 +8,29 @@
 /* In a sector: with fewer one ahead of the crossing may be near to it, and the EMF is far above its noise. */
 #define SAMPLES 8U
 
-/* What is expected of the next sector. */
+/* What is expected of the next sector, after a crossing or one that is missed. */
 static void follow(six_step_t *self)
 {
     self->expected.t_60 = commutation_t_60(&self->commutation);
     const uint32_t next = sector_next(self->commutation.crossed);
     self->expected.at = self->commutation.crossing + self->expected.t_60 - (uint32_t)self->phase.shift[next];
+    self->moved = true;
+}
+
+/* A sample at `at` was still ahead of the crossing. */
+static void wait_for(six_step_t *self, uint32_t at)
+{
+    commutation_ahead(&self->commutation, at);
+    self->moved = self->moved || (int32_t)(at - self->commutation.crossing - self->expected.t_60) > 0;
+}
+
+/* The commutation is due at another instant. */
+static void move(six_step_t *self, const six_step_config_t *config)
+{
+    const commutation_t *c = &self->commutation;
+    self->moved = false;
+    self->due = commutation_due(c, &config->commutation);
+    self->lost = self->lost || commutation_state(c, &config->commutation) == COMMUTATION_LOST;
 }
 
 static void open_sector(six_step_t *self, const six_step_config_t *config, uint32_t sector, uint32_t since)
@@ -51,7 +68,7 @@ static void begin(six_step_t *self, const six_step_config_t *config, uint32_t se
     self->crossing.found = true;
     self->commutated = now;
     self->legs = pattern_states(&config->pattern, sector, self->reverse);
-    const six_step_plan_t none = {.sector = (uint8_t)sector};
+    const six_step_plan_t none = {.sector = (uint16_t)sector};
     self->plan[0] = none;
     self->plan[1] = none;
 }
@@ -126,7 +143,7 @@ static void look(six_step_t *self, const six_step_config_t *config, const six_st
     if (zero_crossing_step(&self->crossing, &config->crossing, &in->sample, when, &self->expected)) {
         found(self, self->crossing.at, on);
     } else if (self->crossing.ahead) {
-        commutation_ahead(&self->commutation, self->crossing.at);
+        wait_for(self, self->crossing.at);
     } else {
         /* nothing is known of it yet */
     }
@@ -153,7 +170,7 @@ PM_APART static void look_third(six_step_t *self, const six_step_config_t *confi
         follow(self);
         third_harmonic_skip(&self->third);
     } else if (self->third.y < 0 && (int32_t)(at - c->crossing) > 0) {
-        commutation_ahead(c, at);
+        wait_for(self, at);
     } else {
         /* past a crossing that was found, or not yet beyond it */
     }
@@ -168,7 +185,7 @@ static void plan_sample(six_step_plan_t *plan, const pattern_config_t *pattern, 
         sample.at = plan->commutate_at < sample.at ? sample.at : 0U;
     }
     plan->sample_at = sample.at;
-    plan->legs = (uint8_t)sample.legs;
+    plan->legs = (uint16_t)sample.legs;
 }
 
 void six_step_step(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in,
@@ -184,7 +201,9 @@ void six_step_step(six_step_t *self, const six_step_config_t *config, const six_
     } else {
         /* nothing new */
     }
-    self->lost = self->lost || commutation_state(c, &config->commutation) == COMMUTATION_LOST;
+    if (self->moved) {
+        move(self, config);
+    }
     if (self->plan[0].commutate_at != 0U) {
         self->commutated = ended + self->plan[0].commutate_at;
     }
@@ -194,10 +213,11 @@ void six_step_step(six_step_t *self, const six_step_config_t *config, const six_
     plan->commutate_at = 0;
     pattern_duties(&config->pattern, c->sector, self->reverse, in->u, &out->legs);
     out->legs.legs = self->legs;
-    const int32_t due = (int32_t)(commutation_due(c, &config->commutation) - coming);
+    const int32_t due = (int32_t)(self->due - coming);
     if (due < period) {
         plan->commutate_at = (uint16_t)pm_max(due, 1);
         c->sector = (uint8_t)sector_next(c->sector);
+        self->moved = true;
         self->legs = pattern_states(&config->pattern, c->sector, self->reverse);
     }
     plan_sample(plan, &config->pattern, in->u);

@@ -15,9 +15,9 @@
  * (commutation.h) `lost` is set and all legs are off from the next call on, until the next reset.
  *
  * six_step_step(), instructions on Cortex-M4 with five periods in a sector:
- *   without a crossing             228 on average, at most 290
- *   with one                       367             378
- *   after one, thresholds learnt   304             407, where it commutates too
+ *   without a crossing             210 on average, at most 279, where it commutates
+ *   with one                       382             394
+ *   after one, thresholds learnt   294             367
  * Tests: tests/target/bldc, tests/unit/bldc/six_step_test.cpp. */
 #ifndef BLDC_SIX_STEP_H
 #define BLDC_SIX_STEP_H
@@ -74,8 +74,8 @@ typedef struct {
 /* What was asked for one period. */
 typedef struct {
     uint16_t commutate_at, sample_at;
-    uint8_t sector; /* at the start */
-    uint8_t legs;   /* zero_legs_t at the sample */
+    uint16_t sector; /* at the start */
+    uint16_t legs;   /* zero_legs_t at the sample */
 } six_step_plan_t;
 
 typedef struct {
@@ -84,10 +84,12 @@ typedef struct {
     thresholds_t thresholds;
     zero_expected_t expected;
     six_step_plan_t plan[2]; /* [1] of the period that begins now, [0] of the one that has ended */
-    uint32_t commutated;     /* instant of the last commutation */
+    uint32_t commutated;     /* instants of the last commutation */
+    uint32_t due;            /* and of the next */
     uint32_t alike; /* crossings in succession of the kind that thresholds are learnt from, up to SECTORS */
     uint16_t legs;  /* PM_LEGS_... of commutation.sector */
     bool learn;     /* from the last crossing */
+    bool moved;     /* `due` is not that of the commutation any more */
     bool reverse;
     bool lost;
     third_harmonic_t third;
@@ -99,17 +101,13 @@ typedef struct {
 void six_step_reset(six_step_t *self, const six_step_config_t *config, pm_angle_t theta, pm_q_t omega,
                     uint32_t now);
 
-/* Legs that conduct at the start of the period that begins now, before the call for it. */
-static inline sector_t six_step_legs(const six_step_t *self)
-{
-    return sector_legs(self->plan[1].sector, self->reverse);
-}
-
-/* Of these, the current of the one that stays across the last commutation: that of both but for the freewheeling. */
+/* Of the two legs that conduct at the start of the period that begins now, before the call for it, the current of the one that
+ * has stayed across the last commutation: that of both but for the freewheeling. */
 static inline pm_q_t six_step_current(const six_step_t *self, const pm_q_t i[PM_LEGS])
 {
-    const sector_t legs = six_step_legs(self);
-    return sector_rising(self->plan[1].sector) ? i[legs.high] : -i[legs.low];
+    const uint32_t sector = self->plan[1].sector;
+    const pm_q_t of = i[sector_stayed(sector, self->reverse)];
+    return sector_rising(sector) ? of : -of; /* the high leg, or the low one */
 }
 
 /* The rotor stands at theta, in the middle of a sector, and will turn forwards or back by 30 degrees in t_30 counts

@@ -34,7 +34,7 @@ PM_APART static void look_for_third(drive_t *drive, const drive_in_t *in, six_st
         take_sample(drive, in, &seen->sample);
         const third_missing_in_t at = {.sample = &seen->sample,
                                        .v_zero = seen->v_zero,
-                                       .sector = plan->sector,
+                                       .sector = (uint8_t)plan->sector,
                                        .leg = sector_legs(plan->sector, self->six_step.reverse).open,
                                        .legs = (zero_legs_t)plan->legs};
         third_missing_step(&self->missing, &drive->config.block.six_step.missing, &at);
@@ -61,7 +61,11 @@ void block_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
     self->i = six_step_current(&self->six_step, i);
     line_current_step(&self->current, &c->current, self->i, drive->status.v_dc);
 
-    six_step_in_t seen = {.now = self->now, .sampled = pm_sampled(&in->more, 0), .u = self->current.u};
+    six_step_in_t seen; /* by members: to clear those of a sample that is not there takes 45 instructions */
+    seen.now = self->now;
+    seen.sampled = pm_sampled(&in->more, 0);
+    seen.u = self->current.u;
+    seen.v_zero = 0;
 #if PM_CARRIES(NEEDS_NEUTRAL)
     seen.v_zero = neutral_signal(&drive->neutral, &drive->config.neutral, in->more.v_neutral);
     if (pm_rarely(c->six_step.crossings == CROSSINGS_third_harmonic)) {
