@@ -3,6 +3,8 @@
 #include "firmware/math/compiler.h"
 #include "firmware/math/root.h"
 
+#include <stddef.h>
+
 #define SIXTH PM_TURN(1.0 / 6)
 
 /* In a sector: with fewer one ahead of the crossing may be near to it, and the EMF is far above its noise. */
@@ -140,7 +142,7 @@ static void look(six_step_t *self, const six_step_config_t *config, const six_st
     }
     const bool on = plan->legs == ZERO_LEGS_APART;
     const zero_instant_t when = {start + plan->sample_at, (zero_legs_t)plan->legs};
-    if (zero_crossing_step(&self->crossing, &config->crossing, &in->sample, when, &self->expected)) {
+    if (zero_crossing_step(&self->crossing, &config->crossing, in->sample, when, &self->expected)) {
         found(self, self->crossing.at, on);
     } else if (self->crossing.ahead) {
         wait_for(self, self->crossing.at);
@@ -194,7 +196,7 @@ void six_step_step(six_step_t *self, const six_step_config_t *config, const six_
     const int32_t period = 2 * (int32_t)config->pattern.half_period;
     const uint32_t ended = in->now - (uint32_t)period, coming = in->now + (uint32_t)period;
     commutation_t *c = &self->commutation;
-    if (in->sampled) {
+    if (in->sample != NULL) {
         look(self, config, in, ended);
     } else if (pm_rarely(config->crossings == CROSSINGS_third_harmonic)) {
         look_third(self, config, in);

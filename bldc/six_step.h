@@ -15,8 +15,8 @@
  * (commutation.h) `lost` is set and all legs are off from the next call on, until the next reset.
  *
  * six_step_step(), instructions on Cortex-M4 with five periods in a sector:
- *   without a crossing             210 on average, at most 279, where it commutates
- *   with one                       382             394
+ *   without a crossing             211 on average, at most 282, where it commutates
+ *   with one                       386             398
  *   after one, thresholds learnt   294             367
  * Tests: tests/target/bldc, tests/unit/bldc/six_step_test.cpp. */
 #ifndef BLDC_SIX_STEP_H
@@ -57,11 +57,12 @@ typedef struct {
 } six_step_config_t;
 
 typedef struct {
-    uint32_t now;         /* counts at t_k */
-    bool sampled;         /* what was asked for two calls ago is here; not with the third harmonic */
-    zero_sample_t sample; /* of CROSSINGS_virtual_third what six_step_from_mean() makes of it */
-    pm_q_t u;             /* patterns.h */
-    pm_q_t v_zero;        /* at t_k, drive/neutral.h; CROSSINGS_third_harmonic only */
+    uint32_t now; /* counts at t_k */
+    const zero_sample_t
+        *sample;   /* what was asked for two calls ago, null: it is not here; with the third harmonic null, of
+                                    CROSSINGS_virtual_third what six_step_from_mean() makes of it */
+    pm_q_t u;      /* patterns.h */
+    pm_q_t v_zero; /* at t_k, drive/neutral.h; CROSSINGS_third_harmonic only */
 } six_step_in_t;
 
 typedef struct {

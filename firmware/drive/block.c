@@ -26,20 +26,20 @@ static bool is_starting(const drive_t *drive)
 }
 
 /* Whether the third harmonic is there shows beside the open terminal, at the start; the crossings are not the terminal's. */
-PM_APART static void look_for_third(drive_t *drive, const drive_in_t *in, six_step_in_t *seen)
+PM_APART static void look_for_third(drive_t *drive, const drive_in_t *in, pm_q_t v_zero)
 {
     block_t *self = &drive->block;
     const six_step_plan_t *plan = &self->six_step.plan[0];
-    if (seen->sampled && plan->commutate_at == 0U && !self->six_step.lost && is_starting(drive)) {
-        take_sample(drive, in, &seen->sample);
-        const third_missing_in_t at = {.sample = &seen->sample,
-                                       .v_zero = seen->v_zero,
+    if (pm_sampled(&in->more, 0) && plan->commutate_at == 0U && !self->six_step.lost && is_starting(drive)) {
+        zero_sample_t sample;
+        take_sample(drive, in, &sample);
+        const third_missing_in_t at = {.sample = &sample,
+                                       .v_zero = v_zero,
                                        .sector = (uint8_t)plan->sector,
                                        .leg = sector_legs(plan->sector, self->six_step.reverse).open,
                                        .legs = (zero_legs_t)plan->legs};
         third_missing_step(&self->missing, &drive->config.block.six_step.missing, &at);
     }
-    seen->sampled = false;
 }
 #endif
 
@@ -61,22 +61,22 @@ void block_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
     self->i = six_step_current(&self->six_step, i);
     line_current_step(&self->current, &c->current, self->i, drive->status.v_dc);
 
-    six_step_in_t seen; /* by members: to clear those of a sample that is not there takes 45 instructions */
-    seen.now = self->now;
-    seen.sampled = pm_sampled(&in->more, 0);
-    seen.u = self->current.u;
-    seen.v_zero = 0;
+    zero_sample_t sample;
+    six_step_in_t seen = {.now = self->now, .u = self->current.u};
+    bool sampled = pm_sampled(&in->more, 0);
 #if PM_CARRIES(NEEDS_NEUTRAL)
     seen.v_zero = neutral_signal(&drive->neutral, &drive->config.neutral, in->more.v_neutral);
     if (pm_rarely(c->six_step.crossings == CROSSINGS_third_harmonic)) {
-        look_for_third(drive, in, &seen);
+        look_for_third(drive, in, seen.v_zero);
+        sampled = false;
     }
 #endif
-    if (seen.sampled) {
-        take_sample(drive, in, &seen.sample);
+    if (sampled) {
+        take_sample(drive, in, &sample);
         if (pm_rarely(c->six_step.crossings == CROSSINGS_virtual_third)) {
-            six_step_from_mean(&self->six_step, &seen.sample);
+            six_step_from_mean(&self->six_step, &sample);
         }
+        seen.sample = &sample;
     }
     six_step_out_t next;
     six_step_step(&self->six_step, &c->six_step, &seen, &next);

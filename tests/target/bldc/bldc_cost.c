@@ -35,18 +35,17 @@ static const six_step_config_t preset = {
 };
 
 /* Terminals at an instant in a sector; sector 0 begins at 30 degrees at instant 0. */
-static void terminals(uint32_t at, uint32_t sector, six_step_in_t *in)
+static void terminals(uint32_t at, uint32_t sector, zero_sample_t *sample)
 {
     const sector_t legs = sector_legs(sector, false);
     const pm_angle_t theta = (pm_angle_t)((uint64_t)at * 0x2AAAAAABU / T_60) - PM_TURN(1.0 / 12) +
                              (pm_angle_t)(0U - sector) * 0x2AAAAAABU;
     const pm_q_t e = pm_unit(PM_Q(0.39), pm_dir(theta).sin);
-    in->sample.v_dc = PM_Q(0.6);
-    in->sample.v[legs.high] = in->sample.v_dc;
-    in->sample.v[legs.low] = 0;
-    in->sample.v[legs.open] =
-        pm_clamp(in->sample.v_dc / 2 + (sector_rising(sector) ? e : -e), 0, in->sample.v_dc);
-    in->sample.v[0] += in->sample.v[0] / 100;
+    sample->v_dc = PM_Q(0.6);
+    sample->v[legs.high] = sample->v_dc;
+    sample->v[legs.low] = 0;
+    sample->v[legs.open] = pm_clamp(sample->v_dc / 2 + (sector_rising(sector) ? e : -e), 0, sample->v_dc);
+    sample->v[0] += sample->v[0] / 100;
 }
 
 static six_step_config_t config; /* not known to the compiler */
@@ -56,6 +55,7 @@ int main(void)
     config = preset;
     static six_step_t self, ahead;
     static six_step_in_t in;
+    static zero_sample_t sample;
     six_step_out_t out;
     six_step_reset(&self, &config, PM_TURN(1.0 / 12), PM_ONE, 0);
     in.u = PM_Q(0.85);
@@ -72,9 +72,9 @@ int main(void)
         }
         /* of the period that has been planned a call ago */
         const six_step_plan_t *plan = &self.plan[0];
-        in.sampled = plan->sample_at != 0U;
+        in.sample = plan->sample_at != 0U ? &sample : NULL;
         const bool next = plan->commutate_at != 0U && plan->commutate_at < plan->sample_at;
-        terminals(in.now + plan->sample_at, next ? sector_next(plan->sector) : plan->sector, &in);
+        terminals(in.now + plan->sample_at, next ? sector_next(plan->sector) : plan->sector, &sample);
     }
     printf("bldc_cost plain %u crossing %u learning %u lost %d t_60 %lu u_V %08lx %08lx %08lx state %lu "
            "config %lu\n",

@@ -263,18 +263,18 @@ class Rig
         six_step_in_t in = {};
         in.now = now_;
         in.u = fixed(u, PM_Q_BITS);
-        in.sampled = sampled_ && config.crossings != CROSSINGS_third_harmonic;
+        const bool sampled = sampled_ && config.crossings != CROSSINGS_third_harmonic;
+        zero_sample_t sample;
         for (int k = 0; k < 3; ++k) {
-            in.sample.v[k] = fixed(adc_.v_leg[k] / 65536.0 + wrong_reference_V / kBase_V, PM_Q_BITS);
+            sample.v[k] = fixed(adc_.v_leg[k] / 65536.0 + wrong_reference_V / kBase_V, PM_Q_BITS);
         }
         if (options.one_channel) {
-            const pm_q_t mean = (in.sample.v[0] + in.sample.v[1] + in.sample.v[2]) / 3;
-            in.sample.v[0] = in.sample.v[1] = in.sample.v[2] = mean;
+            const pm_q_t mean = (sample.v[0] + sample.v[1] + sample.v[2]) / 3;
+            sample.v[0] = sample.v[1] = sample.v[2] = mean;
         }
-        in.sample.v_neutral = fixed(adc_.v_neutral[0] / 65536.0, PM_Q_BITS);
-        in.sample.v_neutral -= (in.sample.v[0] + in.sample.v[1] + in.sample.v[2]) / 3;
-        in.sample.v_dc =
-            fixed(adc_.v_dc / 65536.0 * machine.plant.sensor.v_full_scale_V / kBase_V, PM_Q_BITS);
+        sample.v_neutral = fixed(adc_.v_neutral[0] / 65536.0, PM_Q_BITS);
+        sample.v_neutral -= (sample.v[0] + sample.v[1] + sample.v[2]) / 3;
+        sample.v_dc = fixed(adc_.v_dc / 65536.0 * machine.plant.sensor.v_full_scale_V / kBase_V, PM_Q_BITS);
         plant_adc_t edge;
         plant_sample(plant_.get(), &edge);
         in.v_zero =
@@ -283,21 +283,21 @@ class Rig
         if (options.legs_unknown) {
             six_step.plan[0].legs = ZERO_LEGS_APART;
         }
-        seen = {in.sampled, in.sample, static_cast<zero_legs_t>(six_step.plan[0].legs), sampled_rad_,
-                sampled_in_};
+        seen = {sampled, sample, static_cast<zero_legs_t>(six_step.plan[0].legs), sampled_rad_, sampled_in_};
         if (++since_slow_ * period_s_ >= 1e-3) {
             since_slow_ = 0;
             six_step_slow(&six_step, &config);
         }
         if (options.virtual_third) {
-            six_step_from_mean(&six_step, &in.sample);
+            six_step_from_mean(&six_step, &sample);
         }
+        in.sample = sampled ? &sample : nullptr;
         six_step_out_t out;
         const bool before = six_step.crossing.found;
         const uint32_t sector = six_step.crossing.sector;
         looked_ = now_ - 2 * machine.plant.inverter.timer_counts + six_step.plan[0].sample_at;
-        if (!options.late_rule && in.sampled && is_late(in)) {
-            in.sampled = false;
+        if (!options.late_rule && sampled && is_late(in)) {
+            in.sample = nullptr;
         }
         const bool ahead = six_step.crossing.ahead;
         six_step_step(&six_step, &config, &in, &out);
@@ -469,7 +469,7 @@ class Rig
                                      static_cast<zero_legs_t>(plan.legs)};
         zero_expected_t expected = six_step.expected;
         expected.at = when.at; // due
-        return zero_crossing_step(&copy, &config.crossing, &in.sample, when, &expected);
+        return zero_crossing_step(&copy, &config.crossing, in.sample, when, &expected);
     }
 
     // Up to a count of the period, in parts of it.
