@@ -47,14 +47,12 @@ static pm_q_t on_share(const pattern_config_t *config, pm_q_t u)
 
 void pattern_duties(const pattern_config_t *config, uint32_t sector, bool reverse, pm_q_t u, pm_legs_t *out)
 {
+    const sector_t at = sector_legs(sector, reverse);
     const pm_q_t D = on_share(config, u);
     const pm_q_t low = config->id == PATTERN_H_PWM_L_PWM ? D : PM_ONE - D;
-    const bool rising = sector_rising(sector); /* the low leg stays */
-    const pm_q_t change = rising ? D : low;
-    out->duty[0] = change;
-    out->duty[1] = change;
-    out->duty[2] = change;
-    out->duty[sector_stays(sector, reverse)] = rising ? low : D;
+    out->duty[at.high] = D;
+    out->duty[at.low] = low;
+    out->duty[at.open] = sector_rising(sector) ? D : low;
 }
 
 pattern_sample_t pattern_sample(const pattern_config_t *config, uint32_t sector, pm_q_t u)

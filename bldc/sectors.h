@@ -48,17 +48,4 @@ static inline sector_t sector_legs(uint32_t sector, bool reverse)
     return legs[reverse ? 1 : 0][sector];
 }
 
-/* The leg that conducts in the next sector too, and the one that has in the sector before. */
-static inline uint32_t sector_stays(uint32_t sector, bool reverse)
-{
-    static const uint8_t leg[2][SECTORS] = {{0, 2, 1, 0, 2, 1}, {0, 1, 2, 0, 1, 2}};
-    return leg[reverse ? 1 : 0][sector];
-}
-
-static inline uint32_t sector_stayed(uint32_t sector, bool reverse)
-{
-    static const uint8_t leg[2][SECTORS] = {{1, 0, 2, 1, 0, 2}, {2, 0, 1, 2, 0, 1}};
-    return leg[reverse ? 1 : 0][sector];
-}
-
 #endif

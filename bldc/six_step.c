@@ -26,7 +26,7 @@ static void wait_for(six_step_t *self, uint32_t at)
     self->moved = self->moved || (int32_t)(at - self->commutation.crossing - self->expected.t_60) > 0;
 }
 
-/* The commutation is due at another instant. */
+/* After what moves the next commutation, or ends the commutation for good. */
 static void move(six_step_t *self, const six_step_config_t *config)
 {
     const commutation_t *c = &self->commutation;

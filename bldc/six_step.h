@@ -58,9 +58,9 @@ typedef struct {
 
 typedef struct {
     uint32_t now; /* counts at t_k */
-    const zero_sample_t
-        *sample;   /* what was asked for two calls ago, null: it is not here; with the third harmonic null, of
-                                    CROSSINGS_virtual_third what six_step_from_mean() makes of it */
+    /* What was asked for two calls ago; NULL where it is not here, and with CROSSINGS_third_harmonic. Of
+     * CROSSINGS_virtual_third what six_step_from_mean() makes of it. */
+    const zero_sample_t *sample;
     pm_q_t u;      /* patterns.h */
     pm_q_t v_zero; /* at t_k, drive/neutral.h; CROSSINGS_third_harmonic only */
 } six_step_in_t;
@@ -85,12 +85,12 @@ typedef struct {
     thresholds_t thresholds;
     zero_expected_t expected;
     six_step_plan_t plan[2]; /* [1] of the period that begins now, [0] of the one that has ended */
-    uint32_t commutated;     /* instants of the last commutation */
-    uint32_t due;            /* and of the next */
+    uint32_t commutated;     /* instant of the last commutation */
+    uint32_t due;            /* of the next, commutation_due(); not while `moved` */
     uint32_t alike; /* crossings in succession of the kind that thresholds are learnt from, up to SECTORS */
     uint16_t legs;  /* PM_LEGS_... of commutation.sector */
     bool learn;     /* from the last crossing */
-    bool moved;     /* `due` is not that of the commutation any more */
+    bool moved;     /* a crossing, a wait or a commutation has: `due` is to be made again */
     bool reverse;
     bool lost;
     third_harmonic_t third;
@@ -102,13 +102,17 @@ typedef struct {
 void six_step_reset(six_step_t *self, const six_step_config_t *config, pm_angle_t theta, pm_q_t omega,
                     uint32_t now);
 
-/* Of the two legs that conduct at the start of the period that begins now, before the call for it, the current of the one that
- * has stayed across the last commutation: that of both but for the freewheeling. */
+/* Legs that conduct at the start of the period that begins now, before the call for it. */
+static inline sector_t six_step_legs(const six_step_t *self)
+{
+    return sector_legs(self->plan[1].sector, self->reverse);
+}
+
+/* Of these, the current of the one that stays across the last commutation: that of both but for the freewheeling. */
 static inline pm_q_t six_step_current(const six_step_t *self, const pm_q_t i[PM_LEGS])
 {
-    const uint32_t sector = self->plan[1].sector;
-    const pm_q_t of = i[sector_stayed(sector, self->reverse)];
-    return sector_rising(sector) ? of : -of; /* the high leg, or the low one */
+    const sector_t legs = six_step_legs(self);
+    return sector_rising(self->plan[1].sector) ? i[legs.high] : -i[legs.low];
 }
 
 /* The rotor stands at theta, in the middle of a sector, and will turn forwards or back by 30 degrees in t_30 counts

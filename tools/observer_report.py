@@ -143,8 +143,8 @@ class Study:
 
 
 def cells(path, heading, column):
-    """First cell of a row -> its cell in the named column, of the first table after a line of a page. heading: of that line;
-    with " / " between them of one after another."""
+    """First cell of a row -> its cell in the named column, of the first table of a page behind a line. heading: what is in that line;
+    "A / B": the first line with B behind one with A."""
     text = path.read_text(encoding="utf-8")
     for part in heading.split(" / "):
         text = text.split(part, 1)[-1]
@@ -183,9 +183,13 @@ def check(path, probes):
     """Fails with all cells that are not what is measured now."""
     with Pool() as pool:
         jobs = [(probe, probe.study.submit(pool, probe.method, probe.settings, probe.cases)) for probe in probes]
-        found = [(probe, worst_of(probe.study.result(job))) for probe, job in jobs]
+        found = [(probe, probe.study.result(job)) for probe, job in jobs]
     stale = []
-    for probe, result in found:
+    for probe, results in found:
+        if results is None:
+            stale.append(f"{path.relative_to(ROOT)}: {probe.row}: the drive refuses it")
+            continue
+        result = worst_of(results)
         shown = cells(path, probe.heading, probe.column).get(probe.row, "nothing")
         if shown == "nothing" or probe.differs(shown, result):
             now = result.one(probe.figure) if probe.figure else result
@@ -442,7 +446,8 @@ def page(all_results, names, plots, counted, sizes, help_of, count):
     text.append(f"The {count} machines differ from the drive's parameters by up to 20 % in R, L_d, L_q, psi and dead "
                 "time, each for itself (L_d and L_q alike for observers that know one L_s), 1 % in the gain and 20 mA in the "
                 "offset of each current channel; each starts, runs at 60 % speed with half load, reverses and stops. Lost: a "
-                "fault, 60 degrees of error, or open loop for more than half of the time between 1 and 2 s; with the drive's default of the speed control, 4 Hz, in brackets "
+                "fault, 60 degrees of error, or open loop for more than half of the time between 1 and 2 s; with the drive's "
+                "default of the speed control, 4 Hz, in brackets "
                 "with 5 Hz: if L_q is overestimated by 20 %, angle and speed control excite each other.\n")
     return "\n".join(text)
 

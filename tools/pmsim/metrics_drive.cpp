@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "tools/pmsim/names.h"
@@ -100,21 +101,29 @@ class Faults : public Metric
     double count_ = 0.0, lost_ = 0.0, latency_ = 0.0, driven_ = 0.0, restarts_ = 0.0;
 };
 
-// Seconds for which a limit flag is up.
-class LimitTime : public Metric
+// Time for which something holds: by the metric's name a limit flag, the bridge or the imposed vector.
+class TimeOf : public Metric
 {
   public:
-    LimitTime(const Expectation &e, const Setup &setup) : period_s_(1.0 / setup.plant.inverter.f_pwm_Hz)
+    TimeOf(const Expectation &e, const Setup &setup) : period_s_(1.0 / setup.plant.inverter.f_pwm_Hz)
     {
-        const std::vector<std::string> &names = limit_names();
-        for (size_t bit = 0; bit < names.size(); ++bit) {
-            mask_ |= e.metric == "limit_" + names[bit] + "_s" ? 1U << bit : 0U;
+        if (e.metric == "driven_s") {
+            holds_ = [](const rig_sample_t &rig) { return rig.driven; };
+        } else if (e.metric == "open_loop_s") {
+            holds_ = [](const rig_sample_t &rig) { return rig.driven && rig.dragged; };
+        } else {
+            const std::vector<std::string> &names = limit_names();
+            uint32_t mask = 0;
+            for (size_t bit = 0; bit < names.size(); ++bit) {
+                mask |= e.metric == "limit_" + names[bit] + "_s" ? 1U << bit : 0U;
+            }
+            holds_ = [mask](const rig_sample_t &rig) { return (rig.limits & mask) != 0U; };
         }
     }
 
     void add(const Sample &s) override
     {
-        time_s_ += (s.rig.limits & mask_) != 0U ? period_s_ : 0.0;
+        time_s_ += holds_(s.rig) ? period_s_ : 0.0;
     }
 
     MetricValue value() const override
@@ -123,41 +132,9 @@ class LimitTime : public Metric
     }
 
   private:
-    double period_s_, time_s_ = 0.0;
-    uint32_t mask_ = 0;
-};
-
-// Time in which something holds, in the samples of the window.
-template <bool (*holds)(const rig_sample_t &)> class TimeOf : public Metric
-{
-  public:
-    TimeOf(const Expectation &, const Setup &setup) : period_s_(1.0 / setup.plant.inverter.f_pwm_Hz)
-    {
-    }
-
-    void add(const Sample &s) override
-    {
-        time_s_ += holds(s.rig) ? period_s_ : 0.0;
-    }
-
-    MetricValue value() const override
-    {
-        return {time_s_, ""};
-    }
-
-  private:
+    std::function<bool(const rig_sample_t &)> holds_;
     double period_s_, time_s_ = 0.0;
 };
-
-bool driven(const rig_sample_t &rig)
-{
-    return rig.driven;
-}
-
-bool dragged(const rig_sample_t &rig)
-{
-    return rig.driven && rig.dragged;
-}
 
 // The plant's own honesty: what goes in, minus losses, mechanical work and stored field energy.
 class EnergyResidual : public Metric
@@ -220,9 +197,9 @@ std::vector<SpecialMetric> drive_metrics()
           false,
           {}},
          make_special<Faults>},
-        {{"driven_s", "s", "time with the bridge on", false, false, {}}, make_special<TimeOf<driven>>},
+        {{"driven_s", "s", "time with the bridge on", false, false, {}}, make_special<TimeOf>},
         {{"open_loop_s", "s", "time in which the current vector is imposed", false, false, {}},
-         make_special<TimeOf<dragged>>},
+         make_special<TimeOf>},
         {{"restarts", "1", "starts after the first fault of the window", false, false, {}},
          make_special<Faults>},
         {{"energy_residual_rel",
@@ -235,7 +212,7 @@ std::vector<SpecialMetric> drive_metrics()
     };
     for (const std::string &name : limit_names()) {
         const std::string help = "time for which the limit flag is up";
-        list.push_back({{"limit_" + name + "_s", "s", help, false, false, {}}, make_special<LimitTime>});
+        list.push_back({{"limit_" + name + "_s", "s", help, false, false, {}}, make_special<TimeOf>});
     }
     return list;
 }

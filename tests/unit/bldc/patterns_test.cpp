@@ -51,8 +51,6 @@ TEST(Sectors, AreThoseOfTheEmf)
             const sector_t next = sector_legs(sector_next(s), reverse);
             EXPECT_EQ(sector_rising(s) ? next.high : next.low, at.open) << s;
             EXPECT_EQ(sector_rising(s) ? next.low : next.high, sector_rising(s) ? at.low : at.high) << s;
-            EXPECT_EQ(sector_stays(s, reverse), sector_rising(s) ? at.low : at.high) << s;
-            EXPECT_EQ(sector_stayed(sector_next(s), reverse), sector_stays(s, reverse)) << s;
         }
     }
     EXPECT_EQ(sector_distance(5, 0), 1U);

@@ -301,6 +301,9 @@ class Rig
         }
         const bool ahead = six_step.crossing.ahead;
         six_step_step(&six_step, &config, &in, &out);
+        // The instant that is kept is the one that would be made now.
+        EXPECT_TRUE(six_step.moved ||
+                    six_step.due == commutation_due(&six_step.commutation, &config.commutation));
         if (six_step.crossing.found && !(before && six_step.crossing.sector == sector)) {
             const double ago_s = static_cast<double>(now_ - six_step.crossing.at) * count_s_;
             crossing_deg = wrapped_deg(angle_rad() - omega_e() * ago_s -
