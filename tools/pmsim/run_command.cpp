@@ -81,6 +81,11 @@ void add_run_options(Command &command, RunOptions &options)
             "run everything with so many seeds, from the scenario's own on; a bound must hold for each")
         ->positive()
         ->show_default();
+    command
+        .add_option("--only", options.only,
+                    "the run of this name alone, as `worst:` gives it, may be repeated; with --seeds where "
+                    "it has a seed")
+        ->one_each();
     command.add_flag("--quiet", options.quiet, "expectations only, no progress");
     command.add_flag("--json", options.json, "result as JSON on standard output");
 }
@@ -90,6 +95,9 @@ int run_and_report(const RunOptions &options)
     ScenarioFile file(options.scenario, parse_settings(options.settings));
     if (options.seeds > 1) {
         file.repeat(options.seeds);
+    }
+    if (!options.only.empty()) {
+        file.keep(options.only);
     }
     print_notes(file.scenario(file.runs().front()).setup);
     const std::filesystem::path out = options.out;

@@ -13,7 +13,7 @@ class Command;
 
 struct RunOptions {
     std::string scenario, out;
-    std::vector<std::string> settings;
+    std::vector<std::string> settings, only;
     uint64_t decimate = 0;
     int jobs = 2, seeds = 1;
     bool quiet = false, json = false;

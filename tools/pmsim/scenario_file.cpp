@@ -143,6 +143,21 @@ void ScenarioFile::repeat(int seeds)
     runs_ = std::move(repeated);
 }
 
+void ScenarioFile::keep(const std::vector<std::string> &names)
+{
+    for (const std::string &name : names) {
+        const auto is_called = [&name](const Run &run) { return run.name == name; };
+        if (std::none_of(runs_.begin(), runs_.end(), is_called)) {
+            throw InputError("no run is called '" + name + "'; the first of " + std::to_string(runs_.size()) +
+                             " is '" + runs_.front().name + "'");
+        }
+    }
+    const auto is_left_out = [&names](const Run &run) {
+        return std::find(names.begin(), names.end(), run.name) == names.end();
+    };
+    runs_.erase(std::remove_if(runs_.begin(), runs_.end(), is_left_out), runs_.end());
+}
+
 Scenario ScenarioFile::scenario(const Run &run) const
 {
     Variables variables = run.variables;

@@ -30,7 +30,8 @@ class ScenarioFile
     const std::vector<Run> &runs() const;
     void
     repeat(int seeds); // each run with so many seeds, from the scenario's own on: one more variable, `seed`
-    Scenario scenario(const Run &run) const; // reads the whole document with the run's variables
+    void keep(const std::vector<std::string> &names); // the runs of these names alone
+    Scenario scenario(const Run &run) const;          // reads the whole document with the run's variables
 
   private:
     Value document_;

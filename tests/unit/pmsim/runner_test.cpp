@@ -76,6 +76,19 @@ TEST(Runner, EachSeedHasItsWorstRunAndTheyAreRanked)
     EXPECT_EQ(seen.worst_run, 2U);
 }
 
+TEST(Runner, RunsAreKeptByTheirNames)
+{
+    ScenarioFile file = file_of(small_scenario() + "sweep: {unused: [0, 1]}\n");
+    file.repeat(2);
+    file.keep({"unused=1 seed=2", "unused=0 seed=1", "unused=1 seed=2"});
+    ASSERT_EQ(file.runs().size(), 2U);
+    EXPECT_EQ(file.runs()[0].name, "unused=0 seed=1");
+    EXPECT_EQ(file.scenario(file.runs()[1]).seed, 2U);
+    EXPECT_EQ(error_of([&file] { file.keep({"unused=0"}); }),
+              "no run is called 'unused=0'; the first of 2 is 'unused=0 seed=1'");
+    EXPECT_EQ(file.runs().size(), 2U);
+}
+
 TEST(Runner, SameSeedSameTraceOtherSeedOtherTrace)
 {
     const std::string one = trace_of(small_scenario() + "seed: 3\n", "pmsim_a.csv");
