@@ -2,7 +2,7 @@
 #include "injection/saliency_config.h"
 
 /* The mean of two samples is half a period old: up to there control of the current overshoots by a tenth. From
- * -F / (2 L_d) to F / (2 L_d) in a period, with the edges at about a quarter and three quarters of it. */
+ * -F / (2 L_d) to F / (2 L_d) in a period; a leg's edges are at both ends of that and in the next period in its middle. */
 injection_limits_t pulsating_square_limits(const maker_t *m)
 {
     return (injection_limits_t){

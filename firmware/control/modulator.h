@@ -12,9 +12,11 @@
  *   f = i / (2 I_1) up to I_1, 1 - I_1 / (2 i) beyond
  * f is made of two linear parts, 3/4 up to 1.7 I_1 and 1/4 up to 8 times that; error 0.07. Without
  * capacitance, or where `comp_zone` is larger than 1.7 I_1, there is one part, up to `comp_zone`.
- * A carrier that swings the current about its mean has each leg switch on and off on either side of it, by s for
- * the vector: below that the edges see the carrier's signs and lose nothing in the mean. While one is added, f is one
- * part up to s, which is what the legs' shares of a vector that turns give in the mean.
+ * A carrier that swings the current about its mean, from -S to S for the vector in one period and back in the next, has the
+ * leg that it lifts most switch on and off at the ends of the swing, and in the next period, when that leg is the lowest, in
+ * its middle. So half of what is lost has the sign of the mean current; the other half has that of the carrier at both
+ * edges up to S, which is none in the mean. While one is added f is two halves: one up to S / 8, one up to S. Where S / 8 is
+ * below `comp_zone` or 1.7 I_1 it is one part up to S / 2, and where that too is, f is what it is without a carrier.
  * The returned vector is the one without compensation, which is what the motor then receives. Legs are
  * shares of the period up to the last step, where one saturation keeps each within the timer's counts.
  *

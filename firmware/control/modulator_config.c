@@ -28,9 +28,16 @@ void make_modulator(maker_t *m, modulator_config_t *c)
     m->comp_zone = two_parts ? by_capacitance : least_zone;
     c->per_zone[0] = per_edge(m, m->comp_zone);
     c->far[0] = two_parts ? PM_FRAC(0.25) : 0;
-    const bool swings = pm_num_cmp(m->swing, m->comp_zone) > 0;
-    c->per_zone[1] = swings ? per_edge(m, m->swing) : c->per_zone[0];
-    c->far[1] = swings ? 0 : c->far[0];
+    c->per_zone[1] = c->per_zone[0];
+    c->far[1] = c->far[0];
+    if (pm_num_cmp(m->swing, m->comp_zone) > 0) {
+        c->per_zone[1] = per_edge(m, m->swing);
+        c->far[1] = 0;
+        if (c->per_zone[1] < c->per_zone[0] / 4) {
+            c->per_zone[1] *= 4;
+            c->far[1] = PM_FRAC(0.4999);
+        }
+    }
     c->counts = m->params->timer_counts;
     c->whole = pm_share_whole(c->counts);
     c->top = seen_on_time(m);

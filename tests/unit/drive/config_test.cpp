@@ -609,6 +609,25 @@ TEST(Config, ACarrierThatDeadTimeTakesDoesNotLead)
     EXPECT_EQ(made(2, 9333), 0);
 }
 
+// The edges of a square wave's legs: half up to an eighth of the swing and half up to all of it; one part up to half of the swing where
+// that eighth is inside of the zone without a carrier; that zone where the half is too.
+TEST(Config, ASquareWaveHasItsOwnZones)
+{
+    const auto made = [](double comp_zone) {
+        return configure(changed({{DRIVE_PARAM_v_injection, 100}, {DRIVE_PARAM_comp_zone, comp_zone}}))
+            .modulator;
+    };
+    const double swing = 100 * 1e-4 / (2 * 43e-3); // 0.116 A
+    const auto edge = [](const modulator_config_t &c) { return 10 / (c.per_zone[1] * 0x1p-20); };
+    EXPECT_NEAR(edge(made(0.012)), swing / 8, 1e-4);
+    EXPECT_NEAR(made(0.012).far[1] * 0x1p-32, 0.5, 0.001);
+    EXPECT_EQ(made(0.012).far[0], 0);
+    EXPECT_NEAR(edge(made(0.02)), swing / 2, 1e-4);
+    EXPECT_EQ(made(0.02).far[1], 0);
+    EXPECT_NEAR(edge(made(0.06)), 0.06, 1e-4);
+    EXPECT_EQ(made(0.06).far[1], 0);
+}
+
 // Without dead time there is nothing that the capacitance of a leg could give back.
 TEST(Config, CapacitanceOfALegNeedsADeadTime)
 {
