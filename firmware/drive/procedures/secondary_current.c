@@ -6,8 +6,8 @@
 #if PM_HAS(secondary_current)
 
 #define LOCK_MS 30U
-#define MORE    8U   /* times the number of values at most, */
-#define MOST    256U /* and so many */
+#define MOST    256U /* values, */
+#define MOST_MS 512U /* and what they take */
 #define SHARE   1024
 
 void procedure_secondary_current_begin(drive_t *drive)
@@ -78,7 +78,7 @@ static pm_procedure_t judge(drive_t *drive)
         polarity_judge(c, polarity_mean(&self->x), allowance(drive), noise, &margin, &north);
     if (result == PM_DONE) {
         leave_polarity(drive, margin, north);
-    } else if (self->wanted < MORE * c->values && self->wanted < MOST) {
+    } else if (self->wanted < MOST && 2U * self->wanted * c->block_ms <= MOST_MS) {
         self->wanted = (uint16_t)(2U * self->wanted);
         return PM_RUNNING;
     } else {

@@ -16,7 +16,7 @@
  * signs alike, 0.001 with opposite ones. What saturation makes has y opposite to x, and small: half of what resistance makes of
  * delta, 0.1 x. So y counts where it has the sign of x, else by what is beyond half of x, 27 degrees.
  * b F^2 / 4 is small: 0.6 mA at 35 V and 500 Hz, 11 mA at 70 V and 250 Hz, with sigma = 0.15 mA after 50 ms. While
- * the margin is below five sigma the number of values is doubled, three times at most, up to 256.
+ * the margin is below five sigma the number of values is doubled, up to 256 and as long as they take no more than 512 ms.
  *
  * 16 or 32 values, 64 ms; with too little margin up to 512 ms. Peak current: the carrier's, no other; no movement.
  * A v_injection below four times the dead-time voltage, T_dt f_pwm v_dc, is refused by name, and a carrier of less than 16
