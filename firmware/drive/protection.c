@@ -75,12 +75,12 @@ static bool lasts(uint16_t *timer, bool condition, uint16_t limit)
 
 /* At once where the quality is none. Where the observer alone has little of it, an eighth as fast: an estimate that turns at another
  * speed than the rotor meets it now and then, and its quality comes and goes. Injection has little with a
- * small carrier, and whether a rotor follows an imposed vector is seen elsewhere (follow.h). */
+ * small carrier, and counts from its first slip on; whether a rotor follows an imposed vector is seen elsewhere (follow.h). */
 static bool is_lost(drive_t *drive, bool judged)
 {
     const position_t *p = &drive->position;
     const uint16_t lost = (uint16_t)(drive->lost + (p->quality == 0 ? 8U : 1U));
-    const bool alone = drive->stage == STAGE_VECTOR && p->weight == PM_ONE;
+    const bool alone = drive->stage == STAGE_VECTOR && (p->weight == PM_ONE || p->slip.count != 0U);
     const bool low = p->quality < (alone ? PM_Q(0.375) : 1);
     drive->lost = judged && low ? lost : 0U;
     return drive->lost / 8U > drive->config.protection.lost_ms;

@@ -347,16 +347,21 @@ TEST(Protection, LimitsThemselvesAreAllowed)
             EXPECT_EQ(calls(x, 10000), beyond ? c.stall_ms + 1 : 10000);
         }
     }
-    // Without any quality at once; with little of it, where the observer has the lead alone, eight times as late.
+    // Without any quality at once; with little of it, where the observer has the lead alone or injection has slipped, eight times as
+    // late.
     for (const int quality : {0, 1, PM_Q(0.375) - 1, PM_Q(0.375)}) {
         for (const int weight : {PM_ONE - 1, PM_ONE}) {
-            Drive x = turning();
-            x.d.position.quality = quality;
-            x.d.position.weight = weight;
-            const bool lost = quality == 0 || (quality < PM_Q(0.375) && weight == PM_ONE);
-            const int after_ms = quality == 0 ? c.lost_ms + 1 : 8 * (c.lost_ms + 1);
-            EXPECT_EQ(calls(x, 10000), lost ? after_ms : 10000);
-            EXPECT_EQ(x.d.fault, lost ? DRIVE_FAULT_POSITION_LOST : DRIVE_FAULT_NONE);
+            for (const uint8_t slips : {uint8_t(0), uint8_t(1)}) {
+                Drive x = turning();
+                x.d.position.quality = quality;
+                x.d.position.weight = weight;
+                x.d.position.slip.count = slips;
+                const bool judged = weight == PM_ONE || slips != 0U;
+                const bool lost = quality == 0 || (quality < PM_Q(0.375) && judged);
+                const int after_ms = quality == 0 ? c.lost_ms + 1 : 8 * (c.lost_ms + 1);
+                EXPECT_EQ(calls(x, 10000), lost ? after_ms : 10000);
+                EXPECT_EQ(x.d.fault, lost ? DRIVE_FAULT_POSITION_LOST : DRIVE_FAULT_NONE);
+            }
         }
     }
     // It may come and go, not be good for a moment.
