@@ -14,9 +14,10 @@
  * capacitance, or where `comp_zone` is larger than 1.7 I_1, there is one part, up to `comp_zone`.
  * A carrier that swings the current about its mean, from -S to S for the vector in one period and back in the next, has the
  * leg that it lifts most switch on and off at the ends of the swing, and in the next period, when that leg is the lowest, in
- * its middle. So half of what is lost has the sign of the mean current; the other half has that of the carrier at both
- * edges up to S, which is none in the mean. While one is added f is two halves: one up to S / 8, one up to S. Where S / 8 is
- * below `comp_zone` or 1.7 I_1 it is one part up to S / 2, and where that too is, f is what it is without a carrier.
+ * its middle. So half of what is lost has the sign of the mean current, and half the signs at the ends of the swing:
+ *   lost = 1/2 sign(i) + 1/4 (sign(i + S) + sign(i - S))
+ * of which the second is none below S. While a carrier is added f is two halves: one up to S / 8, one up to S. Where S / 8
+ * is inside of the zone without a carrier it is one part up to S / 2, and where that is too, f is as without.
  * The returned vector is the one without compensation, which is what the motor then receives. Legs are
  * shares of the period up to the last step, where one saturation keeps each within the timer's counts.
  *

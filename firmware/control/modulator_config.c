@@ -33,7 +33,7 @@ void make_modulator(maker_t *m, modulator_config_t *c)
     if (pm_num_cmp(m->swing, m->comp_zone) > 0) {
         c->per_zone[1] = per_edge(m, m->swing);
         c->far[1] = 0;
-        if (c->per_zone[1] < c->per_zone[0] / 4) {
+        if (c->per_zone[1] < c->per_zone[0] / 4) { /* a quarter of the swing is beyond the zone */
             c->per_zone[1] *= 4;
             c->far[1] = PM_FRAC(0.4999);
         }

@@ -366,7 +366,7 @@ ENTRIES = (
     Entry(0x2600, 9, "t_stall", "protections", "i32", "locked", "s", -3, 0, 50, 60000, 1000, False, True, "application", "none", {}, ('stall fault: time with three quarters of rated current, or its torque, '
  'without turning'), ""),
     Entry(0x2600, 10, "t_lost", "protections", "i32", "locked", "s", -3, 0, 1, 1000, 30, False, True, "application", "none", {}, ('position lost: time without any quality; eight times as long with an '
- "observer's below 3/8"), ""),
+ "observer's below 3/8, or injection's that has slipped"), ""),
     Entry(0x2600, 11, "t_winding", "protections", "i32", "locked", "s", 0, 0, 1, 2000, 60, False, True, "application", "none", {}, 'overload: thermal time constant of the windings, which bear i_rated for good', ""),
     Entry(0x2600, 12, "fault_short", "protections", "i32", "locked", "1", 0, 0, 0, 1, 0, False, True, "application", "none", {0: 'every fault opens the bridge', 1: 'low switches on while the EMF exceeds v_dc'}, ('what follows a fault in field weakening; 1 needs i_trip above the '
  'short-circuit current, psi_m / L_d and its transient'), ""),
