@@ -217,7 +217,8 @@ ENTRIES = (
     Entry(0x2200, 0, "control.count", "control", "u8", "const", "", 0, 0, None, None, 13, False, False, "none", "none", {}, 'highest sub-index', ""),
     Entry(0x2200, 1, "i_max", "control", "i32", "live", "A", -3, 0, 50, 4000000, 5000, False, True, "application", "none", {}, 'limit of the current amplitude', ""),
     Entry(0x2200, 2, "speed_max", "control", "i32", "live", "rad/s", -3, 0, 1000, 20000000, 150000, False, True, "application", "none", {}, 'largest speed reference', ""),
-    Entry(0x2200, 3, "acceleration", "control", "i32", "live", "rad/s2", -3, 0, 100, 1000000000, 200000, False, True, "application", "none", {}, 'slope of the speed reference', ""),
+    Entry(0x2200, 3, "acceleration", "control", "i32", "live", "rad/s2", -3, 0, 100, 1000000000, 200000, False, True, "application", "none", {}, ('slope of the speed reference; a position loop lags pole pairs times it over '
+ '(2 pi bandwidth)^2 behind: at most 0.12 rad'), ""),
     Entry(0x2200, 4, "current_bandwidth", "control", "i32", "live", "Hz", -3, 0, 10000, 5000000, 500000, False, True, "application", "none", {}, 'current control bandwidth', "1.3.2.2 #5"),
     Entry(0x2200, 5, "speed_bandwidth", "control", "i32", "live", "Hz", -3, 0, 100, 200000, 4000, False, True, "application", "none", {}, 'speed control bandwidth', "1.3.2.2 #5"),
     Entry(0x2200, 6, "mtpa", "control", "i32", "live", "1", 0, 0, 0, 1, 1, False, True, "application", "none", {}, '1: maximum torque per ampere; 0: i_d = 0', "1.3.2.2 #5"),
@@ -526,8 +527,8 @@ FAULTS = (
     Fault(5, "OVER_TEMPERATURE", 'over-temperature', 0x4310, 'let it cool; lower i_max or improve the cooling'),
     Fault(6, "SENSOR_OFFSET", 'current sensor offset out of range', 0x5210, 'currents are not zero with the bridge off: check the sensors'),
     Fault(7, "SENSOR_SUM", 'phase currents do not add up to zero', 0x5211, 'a sensor fails, or current leaks to earth'),
-    Fault(8, "POSITION_LOST", 'position lost', 0x7305, ('check R_s, L_d, L_q, psi_m; raise speed_low and speed_high; see '
- 'measured.quality in a trace')),
+    Fault(8, "POSITION_LOST", 'position lost', 0x7305, ('check R_s, L_d, L_q, psi_m; raise speed_low and speed_high; lower '
+ 'acceleration; see measured.quality in a trace')),
     Fault(9, "POSITION_NOT_FOUND", 'initial position not found', 0x7306, 'raise i_pulse, or align: start_method = 3 or 2'),
     Fault(10, "STALL", 'stall', 0x7121, 'the shaft is blocked or the load too large for i_max'),
     Fault(11, "OVER_SPEED", 'over-speed', 0x8481, 'speed_trip must leave room above speed_max for overshoot'),
