@@ -6,11 +6,15 @@ import argparse
 import os
 import shlex
 import shutil
+import struct
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
 PAGE_ADDRESS, PAGE_SIZE = 0x0801F000, 2048
+PAGE_HEADER, PAIR, PAGE_MAGIC = 16, 8, 0x33504D50  # firmware/params/store.h
+ELF = b"\x7fELF"
 FAILED, USAGE, NO_OPENOCD, NO_PROBE, NO_PROCESSOR = 1, 2, 3, 4, 5
 EPILOG = """\
 Exit codes: 0 written and verified; 2 usage; 3 OpenOCD is missing; 4 no probe; 5 no processor answers; 1 else.
@@ -36,6 +40,18 @@ def add_options(parser):
     parser.add_argument("--dry-run", action="store_true", help="print the command, do nothing")
 
 
+def _is_page(data):
+    """Whether the firmware would take it: store_check() of firmware/params/store.c."""
+    if len(data) < PAGE_HEADER:
+        return False
+    magic, _, _, count = struct.unpack_from("<4I", data)
+    end = PAGE_HEADER + PAIR * count
+    if magic != PAGE_MAGIC or len(data) < end + 8:
+        return False
+    crc = zlib.crc32(data[:end])
+    return struct.unpack_from("<2I", data, end) == (crc, crc ^ 0xFFFFFFFF)
+
+
 def _program(options):
     """OpenOCD's own words: braces keep blanks in a path."""
     if bool(options.image) == bool(options.parameters):
@@ -43,11 +59,16 @@ def _program(options):
     path = Path(options.parameters or options.image)
     if not path.is_file() or not os.access(path, os.R_OK):
         raise FlashError(USAGE, f"cannot read {path}")
+    data = path.read_bytes()
     if not options.parameters:
+        if not data.startswith(ELF):
+            raise FlashError(USAGE, f"{path} is no ELF file", "a page of parameters is written with --parameters")
         return f"program {{{path}}} verify reset exit"
-    size = path.stat().st_size
-    if not 0 < size <= PAGE_SIZE:
-        raise FlashError(USAGE, f"{path} has {size} bytes; a page has {PAGE_SIZE}")
+    if len(data) > PAGE_SIZE:
+        raise FlashError(USAGE, f"{path} has {len(data)} bytes; a page has {PAGE_SIZE}")
+    if not _is_page(data):
+        raise FlashError(USAGE, f"{path} is no page of parameters, or it is damaged",
+                         "`pmsim params --machine MACHINE.yaml --page PAGE.bin` makes one")
     return f"program {{{path}}} 0x{PAGE_ADDRESS:08X} verify reset exit"
 
 
