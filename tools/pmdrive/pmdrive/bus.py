@@ -1,4 +1,5 @@
 """The way to the bus: adapters and interfaces by a short text, and who is there."""
+import socket
 import time
 
 import can
@@ -7,6 +8,7 @@ import canopen
 from .drive import Drive
 from .errors import BusError, NotDone, UsageError
 
+CONNECT_S = 3.0
 KINDS = "can0, vcan0 (SocketCAN); socketcand:HOST:PORT[:CHANNEL]; slcan:DEVICE; or INTERFACE:CHANNEL of python-can"
 
 
@@ -31,12 +33,17 @@ def arguments(spec, bitrate):
 def open_network(spec, bitrate=500000):
     network = canopen.Network()
     network.NOTIFIER_CYCLE = 0.05  # closing waits for it
+    usual = socket.getdefaulttimeout()
+    if spec.startswith("socketcand"):
+        socket.setdefaulttimeout(CONNECT_S)  # of its greeting
     try:
         network.connect(**arguments(spec, bitrate))
     except (can.CanError, OSError, ValueError, ImportError) as error:
         do = ("does `pmsim node` or another server listen there? It takes one client at a time" if spec.startswith("socketcand")
               else f"is the adapter plugged in and the interface up (`ip link`)? It may be: {KINDS}")
         raise BusError(f"cannot open {spec}: {error}", do) from None
+    finally:
+        socket.setdefaulttimeout(usual)
     return network
 
 
