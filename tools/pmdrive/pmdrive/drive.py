@@ -16,6 +16,7 @@ LOAD = int.from_bytes(b"load", "little")
 OPEN = int.from_bytes(b"open", "little")
 TOGETHER = 0x06040043  # abort code of the check of all parameters together
 STORE_S = 5.0  # most that flash takes
+NAMED = 6  # changed values in an error
 TRIES = 10  # where another client of the drive is answered in between
 GROUPS = ("all", "communication", "application", "machine")
 # Statusword: (mask, value): state of CiA 402
@@ -43,6 +44,17 @@ def error_text(code):
 def fault_text(code):
     """Of drive_fault."""
     return dictionary.FAULTS[code - 1].text if 0 < code <= len(dictionary.FAULTS) else "unknown" if code else "none"
+
+
+def _advice(culprit, changed):
+    """What to mend when the drive has refused values together."""
+    others = [entry.name for entry in changed if entry is not culprit]
+    named = ", ".join(others[:NAMED]) + (f" and {len(others) - NAMED} more" if len(others) > NAMED else "")
+    if not others:
+        return f"nothing was changed: mend {culprit.name}, or those that it has to fit"
+    if culprit in changed:
+        return f"nothing was changed: mend {culprit.name}, or what it has to fit among {named}"
+    return f"nothing was changed: {culprit.name} was not among the changes; it does not go with {named}"
 
 
 class Drive:
@@ -131,7 +143,8 @@ class Drive:
                 with contextlib.suppress(NoAnswer, Disturbed, BusError):
                     self._write(names.find("parameters_open"), 0)
 
-    def _write(self, entry, raw):
+    def _write(self, entry, raw, changed=()):
+        """`changed`: what a batch that is closed by it has."""
         try:
             self.download(entry.index, entry.sub, entry.encode(raw), entry.label)
         except Refused as error:
@@ -142,7 +155,7 @@ class Drive:
                 raise
             if entry.name == "parameter_batch":
                 raise Refused(f"{culprit.label}, of all together", error.code, culprit.index, culprit.sub,
-                              f"nothing was changed: mend {culprit.name}, or those that it has to fit") from None
+                              _advice(culprit, changed)) from None
             raise Refused(f"{entry.label}, by {culprit.label}", error.code, entry.index, entry.sub) from None
 
     def get(self, name):
@@ -207,7 +220,7 @@ class Drive:
                     progress(n, len(changes))
         finally:
             if together:
-                self.write("parameter_batch", 0)
+                self._write(names.find("parameter_batch"), 0, together)
 
     def save(self, group="all"):
         self._store(0x1010, group, SAVE)
