@@ -7,6 +7,7 @@ import csv
 import io
 import json
 import os
+import socket
 import subprocess
 import sys
 import tempfile
@@ -20,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "pmdrive"
 import can  # noqa: E402
 import canopen  # noqa: E402
 import pmdrive  # noqa: E402
-from pmdrive import cli, dictionary, files, identify, motion, names  # noqa: E402
+from pmdrive import bus, cli, dictionary, files, identify, motion, names  # noqa: E402
 from simulated import SimulatedNode  # noqa: E402
 
 LIBRARY = None
@@ -159,10 +160,13 @@ class Values(Bench):
         self.assertEqual(len(out.splitlines()), len(members) + 1)
 
     def test_nothing_is_sent_when_one_is_wrong(self):
-        _, err = self.command("set", "R_s=6.2", "L_d=1kH", code=1)
+        _, err = self.command("set", "R_s=6.2", "L_d=1kH", code=2)
         self.assertIn("L_d (2100h:03): 1000 H is above the most, 1 H", err)
         self.assertEqual(self.node["R_s"], 6000000)
         self.assertIn("NAME=VALUE", self.command("set", "R_s", code=2)[1])
+        self.assertIn("is not a number", self.command("set", "R_s=abc", code=2)[1])
+        self.assertIn("R_s is set twice", self.command("set", "R_s=5", "2100:02=6", code=2)[1])
+        self.assertEqual(self.node["R_s"], 6000000)
 
     def test_the_parameter_in_the_way_is_named(self):
         _, err = self.command("set", "i_max=9.5", code=1)
@@ -229,7 +233,7 @@ class Values(Bench):
         self.command("bus", "--bit-rate", "250kbit/s", node=9)
         self.assertEqual(self.node.kept[(0x2080, 2)], 250)
         self.assertIn("neither", self.command("bus", code=2)[1])
-        self.assertIn("above the most", self.command("bus", "--node-id", "128", code=1)[1])
+        self.assertIn("above the most", self.command("bus", "--node-id", "128", code=2)[1])
 
     def test_a_node_that_nobody_knows(self):
         """By LSS, alone on the bus."""
@@ -244,6 +248,11 @@ class Values(Bench):
     def test_monitor(self):
         self.assertEqual(len(self.json("monitor", "velocity_actual", "--count", "3", "--interval", "0")), 3)
 
+        for words in (["monitor", "--interval", "-1"], ["watch", "--for", "nan"], ["watch", "--interval", "1e9"],
+                      ["trace", "i_d", "--wait", "-1"]):
+            with contextlib.redirect_stderr(io.StringIO()) as err, self.assertRaises(SystemExit):
+                cli.main(words)
+            self.assertIn(" s is not 0 to 1e+06 s", err.getvalue())
         out, _ = self.command("monitor", "velocity_actual", "i_q", "--count", "1")
         self.assertEqual(out.splitlines()[-1].split(), ["-", "0", "A"])  # the bridge is off: nothing is known of the speed
 
@@ -296,6 +305,8 @@ class Sets(Bench):
         self.assertEqual(len(files.read(path)), len(names.stored()))
         self.command("set", "R_s=6", "psi_m=0.236")
         self.assertEqual({x["name"] for x in self.json("diff", path)[0]}, {"R_s", "psi_m"})
+        self.assertEqual(self.json("dump", "R_s", "--out", self.path("one.yaml"))[0]["R_s"]["raw"], 6000000)
+        self.assertEqual(files.read(self.path("one.yaml")), {names.find("R_s"): 6000000})
         self.json("load", path, "--yes")
         self.assertEqual(self.json("diff", path), [[]])
         self.assertEqual((self.node["R_s"], self.node["psi_m"]), (6500000, 200000000))
@@ -322,9 +333,11 @@ class Sets(Bench):
     def test_refused_together_is_undone(self):
         _, err = self.command("load", self.write("R_s: 7 ohm\ni_max: 40 A\ni_trip: 30 A\n"), "--yes", code=1)
         self.assertIn("i_trip (2600h:01), of all together", err)
-        self.assertIn("nothing was changed", err)
+        self.assertIn("nothing was changed: mend i_trip, or what it has to fit among R_s, i_max", err)
         self.assertEqual((self.node["R_s"], self.node["i_max"], self.node["i_trip"]), (6000000, 5000, 9000))
         self.assertEqual(self.node["parameter_batch"], 0)
+        _, err = self.command("load", self.write("i_max: 40 A\n"), "--yes", code=1)
+        self.assertIn("nothing was changed: i_trip was not among the changes; it does not go with i_max", err)
 
     def test_read_back(self):
         """A drive that takes a value without keeping it does not go unnoticed."""
@@ -347,11 +360,17 @@ class Sets(Bench):
         self.command("reset")
         self.assertEqual([self.node[x] for x in ("R_s", "i_max")], [7000000, 6000])
         self.assertEqual(self.json("get", "heartbeat_time")[0]["heartbeat_time"]["raw"], 200)
-        self.command("restore", "machine")
+        with mock.patch.object(sys, "stdin", io.StringIO()):
+            self.assertIn("restore the defaults of `machine`?", self.command("restore", "machine", code=2)[1])
+        with mock.patch("pmdrive.attend.confirm", return_value=False):
+            self.command("restore", "machine", code=1)
+        self.command("reset")
+        self.assertEqual(self.node["R_s"], 7000000)
+        self.command("restore", "machine", "--yes")
         self.assertEqual(self.node["R_s"], 7000000)
         self.command("reset")
         self.assertEqual([self.node[x] for x in ("R_s", "i_max")], [6000000, 6000])
-        self.command("restore")
+        self.command("restore", "--yes")
         self.command("reset")
         self.assertEqual(self.node["i_max"], 5000)
 
@@ -389,7 +408,7 @@ class Motion(Bench):
         self.json("run", "duty", "30%", "--for", "0.3")
         with self.connect() as drive:
             self.assertEqual(drive.read("target_duty"), 3000)
-        _, err = self.command("run", "duty", "101%", "--for", "0.3", code=1)
+        _, err = self.command("run", "duty", "101%", "--for", "0.3", code=2)
         self.assertIn("above the most", err)
 
     def test_never_unattended(self):
@@ -636,6 +655,11 @@ class Identification(Bench):
         plate = ("--pole-pairs", "4", "--max-speed", "3000rpm", "--dc-link", "300V")
         _, err = self.command("identify", "--yes", "--rated-current", "40A", *plate, code=2)
         self.assertIn("cannot measure", err)
+        for words, reason in ((("4A", "--pole-pairs", "4", "--max-speed", "1400", "--dc-link", "300V"), "1400rpm or 1400rad/s"),
+                              (("-4A", *plate), "below the least"), (("4A", *plate, "--speed", "20"), "without a unit"),
+                              (("4A", *plate, "--speed", "1e9rpm"), "above the most")):
+            self.assertIn(reason, self.command("identify", "--yes", "--rated-current", *words, code=2)[1])
+        self.assertIsNone(self.node.enabled_at)
         self.command("identify", "--yes", "--rated-current", "4A", *plate)
         self.assertEqual((self.node["pole_pairs"], self.node["i_rated"], self.node["speed_max"]), (4, 4000, 314200))
         self.assertEqual(self.node["psi_m"], self.FOUND["psi_m"])  # a guess first, found then
@@ -685,6 +709,24 @@ class Trace(Bench):
         self.assertIn("not among the signals", self.command("trace", "i_d", "--trigger", "i_q", code=2)[1])
         self.assertIn("1 to 8", self.command("trace", *["i_d"] * 9, code=2)[1])
         self.assertIn("neither .csv, .png nor .mf4", self.command("trace", "i_d", "--out", "x.mat", code=2)[1])
+        self.assertIn("--trigger", self.command("trace", "i_d", "--level", "2A", code=2)[1])
+
+    def test_a_file_that_cannot_be_written(self):
+        """It is known before anything is recorded or read."""
+        self.node["trace.state"] = 1
+        for words, name in ((["trace", "i_d"], "no/x.csv"), (["watch", "--for", "9"], "no/x.png"), (["dump"], "no/x.yaml"),
+                            (["eds"], "no/x.eds")):
+            path = self.path(name)
+            with mock.patch("pmdrive.names.stored", side_effect=AssertionError):
+                self.assertEqual(self.command(*words, "--out", path, code=2)[1], f"pmdrive: {path}: No such file or directory\n")
+        self.assertEqual(self.node["trace.state"], 1)
+        self.assertIn("Is a directory", self.command("dump", "--out", self.folder.name, code=2)[1])
+        path = self.path("kept.yaml")
+        Path(path).write_text("kept", encoding="ascii")
+        self.command("dump", "R_x", "--out", path, code=2)
+        self.assertEqual(Path(path).read_text(encoding="ascii"), "kept")
+        self.command("dump", "R_x", "--out", self.path("none.yaml"), code=2)
+        self.assertFalse(Path(self.path("none.yaml")).exists())
 
     def test_never_triggered(self):
         self.node._trace = lambda command: None
@@ -793,6 +835,29 @@ class Shell(Bench):
     def test_interface(self):
         self.assertIn("is no CAN interface", str(self.error("socketcand:host")))
         self.assertIn("cannot open", str(self.error("nosuchcan0")))
+
+    def test_a_server_that_does_not_greet(self):
+        """It is stopped, or has another client."""
+        with socket.create_server(("localhost", 0)) as server:
+            began = time.monotonic()
+            error = str(self.error(f"socketcand:localhost:{server.getsockname()[1]}"))
+        self.assertLess(time.monotonic() - began, 2 * bus.CONNECT_S)
+        self.assertIn("timed out", error)
+        self.assertIn("It takes one client at a time", error)
+        self.assertIsNone(socket.getdefaulttimeout())
+
+    def test_a_bus_that_goes_while_a_thread_sends(self):
+        said = io.StringIO()
+        self.command("help")  # which has its own word for it
+        self.addCleanup(setattr, threading, "excepthook", threading.__excepthook__)
+        for error, silent in ((can.CanOperationError("gone"), True), (BrokenPipeError(), True), (ValueError("a defect"), False)):
+            def fails():
+                raise error
+            thread = threading.Thread(target=fails)
+            with contextlib.redirect_stderr(said):
+                thread.start()
+                thread.join()
+            self.assertEqual(said.getvalue() == "", silent, said.getvalue())
 
     def error(self, spec):
         with self.assertRaises(pmdrive.PmdriveError) as caught:

@@ -1,12 +1,13 @@
 """Values, names and files of the host tool: what people write and read against what is on the bus."""
 import sys
+import tempfile
 import unittest
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools" / "pmdrive"))
 from pmdrive import dictionary, files, names  # noqa: E402
-from pmdrive.errors import ABORTS, Refused, UsageError, ValueRefused  # noqa: E402
+from pmdrive.errors import ABORTS, NotDone, Refused, UsageError, ValueRefused  # noqa: E402
 from pmdrive.entry import NUMBERS  # noqa: E402
 
 
@@ -60,6 +61,14 @@ class Values(unittest.TestCase):
         self.refused("pole_pairs", "3.5", "is not an integer")
         self.refused("pole_pairs", "3 Hz", "it has no unit")
 
+    def test_shares_without_a_percent_sign(self):
+        for name, text in (("target_torque", "-50"), ("target_duty", "50"), ("target_duty", "-50")):
+            sign = "-" if text[0] == "-" else ""
+            self.refused(name, text, f"{sign}50 is {sign}5000 %; did you mean {sign}50%?")
+        with self.assertRaises(ValueRefused) as caught:
+            names.find("target_duty").check(10100)
+        self.assertNotIn("did you mean", str(caught.exception))
+
     def test_limits_and_presets_survive(self):
         for entry in dictionary.ENTRIES:
             if not entry.number or entry.exp2:
@@ -76,7 +85,7 @@ class Values(unittest.TestCase):
         self.assertEqual(entry.encode(-2), b"\xfe\xff\xff\xff")
         self.assertEqual(names.find("mode").decode(b"\xff"), -1)
         self.assertEqual(names.find("device_name").decode(b"pmdrive\0"), "pmdrive")
-        with self.assertRaises(ValueRefused):
+        with self.assertRaisesRegex(NotDone, "2 bytes came, 4 were expected"):
             entry.decode(b"\0\0")
         for kind, (_, _, least, most) in NUMBERS.items():
             entry = next(e for e in dictionary.ENTRIES if e.type == kind)
@@ -133,8 +142,18 @@ class Files(unittest.TestCase):
         self.refused("trace_data: 1\n", "cannot be set")
 
     def test_missing_file(self):
-        with self.assertRaisesRegex(UsageError, "/nowhere/x.yaml"):
+        with self.assertRaisesRegex(UsageError, "^/nowhere/x.yaml: No such file or directory$"):
             files.read("/nowhere/x.yaml")
+
+    def test_from_another_editor(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "a.yaml"
+            path.write_bytes(b"\xef\xbb\xbfR_s: 6 ohm\r\n")
+            self.assertEqual(files.read(path), {names.find("R_s"): 6000000})
+            for text in ("", "# R_s: 6 ohm\n", "drive:\n"):
+                path.write_text(text, encoding="utf-8")
+                with self.assertRaisesRegex(UsageError, "there is no value in it"):
+                    files.read(path)
 
 
 class Words(unittest.TestCase):

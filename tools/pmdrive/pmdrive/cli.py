@@ -5,10 +5,13 @@ import logging
 import os
 import re
 import sys
+import threading
+
+import can
 
 from . import VERSION as TOOL
 from . import bus, command_device, command_machine, command_motor, command_sets, command_values, dictionary
-from .errors import PmdriveError, UsageError
+from .errors import BusError, PmdriveError, UsageError
 from .output import Output
 
 EXAMPLES = """\
@@ -81,7 +84,15 @@ def parse(words):
 
 def run(arguments, drive=None, out=None):
     """Carries out parsed arguments; over a drive that is connected already, if one is given."""
-    out = out or Output(arguments.json)
+    try:
+        _run(arguments, drive, out or Output(arguments.json))
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise (UsageError(f"{error.filename}: {error.strerror}") if error.filename else BusError(str(error))) from None
+
+
+def _run(arguments, drive, out):
     needs = {"given": bool(arguments.can), None: not getattr(arguments, "names", None)}.get(
         arguments.connects, arguments.connects)
     arguments.can = arguments.can or "can0"
@@ -94,10 +105,17 @@ def run(arguments, drive=None, out=None):
         arguments.function(arguments, drive, out)
 
 
+def _thread_ended(what, usual=threading.excepthook):
+    """Of the bus that went while a thread of python-can was sending: the command's own error says it."""
+    if not issubclass(what.exc_type, (can.CanError, OSError)):
+        usual(what)
+
+
 def main(words=None):
     words = sys.argv[1:] if words is None else words
     for library in ("can", "canopen"):  # what they complain of, our own errors say
         logging.getLogger(library).setLevel(logging.CRITICAL)
+    threading.excepthook = _thread_ended
     try:
         arguments = parse(words or ["help"])
     except ValueError:

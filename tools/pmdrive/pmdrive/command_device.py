@@ -4,7 +4,7 @@ from pathlib import Path
 from . import bus, flash, names
 from . import trace as scope
 from .errors import NoAnswer, NotDone, NotInImage, UsageError
-from .output import show, write_text
+from .output import check_file, show, write_text
 
 
 def add(command):
@@ -98,6 +98,7 @@ def flash_board(arguments, drive, out):
 
 
 def eds(arguments, drive, out):
+    check_file(arguments.out)
     try:
         text = scope.data_sheet(drive)
     except NotInImage:

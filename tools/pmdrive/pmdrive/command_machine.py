@@ -1,5 +1,6 @@
 """From a motor that is not known to one that runs: identification and tuning."""
 from . import attend, identify, names, tune
+from .entry import QUANTITY
 from .errors import NotDone, UsageError
 from .output import show, show_changes
 
@@ -8,7 +9,8 @@ RESTART = 3  # parameters_ready
 
 def add(command):
     sub = command("identify", "measure the machine: the motor turns; shows what would change, asks, writes", identify_machine)
-    sub.add_argument("--only", help="some of resistance,inductance,flux,mechanics (all)")
+    sub.add_argument("--only", help="some of resistance,inductance,flux,mechanics (all); or alone: saliency (rotor locked), "
+                                      "neutral (star point led out)")
     sub.add_argument("--current", help="2A; the rated one unless given")
     sub.add_argument("--speed", help="20rad/s, 300rpm; 30%% of speed_max unless given; negative: the other way round")
     sub.add_argument("--rated-current", help="name plate: 4A, peak of a phase. With the next three: values to begin with")
@@ -36,15 +38,19 @@ def _take(arguments, drive, out, values, what):
     return True
 
 
-def _name_plate(arguments, drive, out):
+def _name_plate(arguments):
+    """(A, pole pairs, rad/s, V), or nothing."""
     given = (arguments.rated_current, arguments.pole_pairs, arguments.max_speed, arguments.dc_link)
     if all(value is None for value in given):
-        return
+        return ()
     if any(value is None for value in given):
         raise UsageError("a name plate has all four", "--rated-current --pole-pairs --max-speed --dc-link")
-    numbers = [float(names.find(name).physical(names.find(name).parse(text)))
-               for name, text in zip(("i_rated", "pole_pairs", "speed_max", "v_dc_nominal"), given)]
-    current, pole_pairs, speed, dc_link = numbers
+    return [float(names.find(name).physical(_understood(name, text)))
+            for name, text in zip(("i_rated", "pole_pairs", "speed_max", "v_dc_nominal"), given)]
+
+
+def _begin(arguments, drive, out, plate):
+    current, pole_pairs, speed, dc_link = plate
     out.line("to begin with, from the name plate; what is not written there is a guess:")
     values = identify.name_plate(drive, current, int(pole_pairs), speed, dc_link)
     if _take(arguments, drive, out, values, "name plate") and drive.read("parameters_ready") == RESTART:
@@ -56,19 +62,30 @@ def _name_plate(arguments, drive, out):
             drive.clear_fault()
 
 
-def _entry_or_zero(name, text):
-    return 0 if text is None else names.find(name).parse(text)
+def _understood(name, text):
+    """The integer; a speed has its unit, for name plates have another than the dictionary."""
+    if text is None:
+        return 0
+    entry = names.find(name)
+    raw = entry.parse(text)
+    entry.check(raw)
+    if entry.unit == "rad/s" and not QUANTITY.fullmatch(text)[2]:
+        number = text.strip()
+        raise UsageError(f"`{number}` is a speed without a unit", f"{number}rpm or {number}rad/s")
+    return raw
 
 
 def identify_machine(arguments, drive, out):
     wanted = identify.routines(arguments.only)
-    current = _entry_or_zero("target_current", arguments.current)
-    speed = _entry_or_zero("target_velocity", arguments.speed)
+    current = _understood("target_current", arguments.current)
+    speed = _understood("target_velocity", arguments.speed)
+    plate = _name_plate(arguments)
     turning = "turns" if {"flux", "mechanics"} & set(wanted) else "moves"
     if not arguments.yes and not attend.confirm(
             f"THE MOTOR {turning.upper()} for some 15 s, with its rated current. Is it free to?"):
         raise NotDone("nothing was done")
-    _name_plate(arguments, drive, out)
+    if plate:
+        _begin(arguments, drive, out, plate)
     found = identify.run(drive, wanted, current, speed, out.progress)
     for group in found.values():
         show(out, {names.find(f"identification.{name}"): raw for name, raw in group.items()})

@@ -1,4 +1,5 @@
 """The motor: running it, looking at it, what went wrong."""
+import argparse
 import sys
 import time
 
@@ -6,10 +7,18 @@ from . import attend, motion, names
 from . import trace as scope
 from . import watch as live
 from .drive import error_text
-from .output import as_json, show, shown
+from .output import as_json, check_file, show, shown
 
 
+MOST_S = 1e6  # to wait for something
 TARGETS = {"speed": "target_velocity", "torque": "target_torque", "current": "target_current", "duty": "target_duty"}
+
+
+def _seconds(text):
+    value = float(text)
+    if not 0 <= value <= MOST_S:
+        raise argparse.ArgumentTypeError(f"{text} s is not 0 to {MOST_S:g} s")
+    return value
 
 
 def add(command):
@@ -21,12 +30,12 @@ def add(command):
     command("stop", "switch the bridge off now", stop)
     sub = command("monitor", "live values", monitor)
     sub.add_argument("names", nargs="*", help="objects or records")
-    sub.add_argument("--interval", type=float, default=0.2, help="seconds (%(default)s)")
+    sub.add_argument("--interval", type=_seconds, default=0.2, help="seconds (%(default)s)")
     sub.add_argument("--count", type=int, default=0, help="end after so many (0: at Ctrl-C)")
     sub = command("watch", "live values, drawn in the terminal, and as a picture at the end", watch)
     sub.add_argument("names", nargs="*", help="objects or records (velocity_actual i_q dc_link_voltage)")
-    sub.add_argument("--interval", type=float, default=0.1, help="seconds (%(default)s)")
-    sub.add_argument("--for", dest="seconds", type=float, help="seconds (until Ctrl-C)")
+    sub.add_argument("--interval", type=_seconds, default=0.1, help="seconds (%(default)s)")
+    sub.add_argument("--for", dest="seconds", type=_seconds, help="seconds (until Ctrl-C)")
     sub.add_argument("--out", help="picture: .png, .svg or .pdf")
     sub = command("trace", "record signals as an oscilloscope does", trace)
     sub.add_argument("signals", nargs="+", help="objects marked t in docs/object-dictionary.md")
@@ -35,7 +44,7 @@ def add(command):
     sub.add_argument("--trigger", help="signal that triggers (at once)")
     sub.add_argument("--level", help="with a unit if you like")
     sub.add_argument("--edge", default="rising", choices=tuple(scope.EDGES), help="%(choices)s (%(default)s)")
-    sub.add_argument("--wait", type=float, default=10.0, help="seconds (%(default)s)")
+    sub.add_argument("--wait", type=_seconds, default=10.0, help="seconds (%(default)s)")
     sub.add_argument("--out", default="trace.csv", help=".csv, .png or .mf4 (%(default)s)")
     sub = command("faults", "the latched fault, its record, and the history", faults)
     sub.add_argument("--clear", action="store_true", help="clear the fault")
@@ -75,6 +84,7 @@ def stop(_, drive, out):
 def trace(arguments, drive, out):
     path = arguments.out
     scope.check_path(path)
+    check_file(path)
     entries = scope.set_up(drive, arguments.signals, arguments.divider, arguments.pre, arguments.trigger,
                            arguments.level, arguments.edge)
     scope.record(drive, arguments.wait, out.progress)
@@ -121,6 +131,7 @@ WATCHED = ("velocity_actual", "i_q", "dc_link_voltage")
 def watch(arguments, drive, out):
     """In a terminal as curves, else as lines."""
     live.check_path(arguments.out)
+    check_file(arguments.out)
     history = live.History(names.select(arguments.names or WATCHED))
     terminal = live.Terminal() if sys.stdout.isatty() and not out.as_json else None
     end = time.monotonic() + (arguments.seconds if arguments.seconds is not None else float("inf"))

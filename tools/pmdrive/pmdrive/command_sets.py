@@ -3,7 +3,7 @@ from . import attend, files, names
 from .command_values import hint
 from .drive import GROUPS
 from .errors import NotDone
-from .output import as_json, show_changes, write_text
+from .output import as_json, check_file, show_changes, write_text
 
 
 def add(command):
@@ -17,19 +17,21 @@ def add(command):
     sub = command("diff", "what differs from a file, or from the defaults", diff)
     sub.add_argument("file", nargs="?", help="file (the defaults)")
     for name, text, function in (("save", "keep the present values over a reset", save),
-                                 ("restore", "have the defaults after the next reset", restore)):
+                                 ("restore", "have the defaults after the next reset: asks", restore)):
         sub = command(name, text, function)
         sub.add_argument("group", nargs="?", default="all", choices=GROUPS, help="%(choices)s (%(default)s)")
+        if function is restore:
+            sub.add_argument("--yes", action="store_true", help="do not ask")
     sub = command("reset", "restart the drive", reset)
     sub.add_argument("--communication", action="store_true", help="its communication alone")
 
 
 def dump(arguments, drive, out):
+    check_file(arguments.out)
     entries = names.select(arguments.names) if arguments.names else names.stored()
     values = drive.dump([e for e in entries if e.number and e.writable], out.progress)
-    if out.as_json:
-        out.data(as_json(values))
-    else:
+    out.data(as_json(values))
+    if arguments.out or not out.as_json:
         write_text(arguments.out, files.render(values, f"pmdrive node {drive.node_id}"), out)
 
 
@@ -68,6 +70,8 @@ def save(arguments, drive, out):
 
 
 def restore(arguments, drive, out):
+    if not arguments.yes and not attend.confirm(f"restore the defaults of `{arguments.group}`? What is stored is lost."):
+        raise NotDone("nothing was restored")
     drive.restore(arguments.group)
     out.data({"restored": arguments.group})
     out.line(f"defaults of {arguments.group}, after `pmdrive reset`")

@@ -72,6 +72,8 @@ def set_values(arguments, drive, out):
         if not equals:
             raise UsageError(f"`{text}` is not NAME=VALUE")
         entry = names.find(name.strip())
+        if entry in wanted:
+            raise UsageError(f"{entry.name} is set twice")
         raw = entry.parse(value)
         entry.check(raw)
         wanted[entry] = raw

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from decimal import ROUND_HALF_EVEN, Decimal, InvalidOperation
 from typing import Optional
 
-from .errors import ValueRefused
+from .errors import NotDone, ValueRefused
 
 # type: (struct format, bits, least, most)
 LONGEST = 40  # decimal exponent of a number that is looked at
@@ -30,6 +30,7 @@ UNITS = {
     ("ohm", "Ω"): Decimal(1),
     ("degC", "°C"): Decimal(1),
 }
+SHARES = "rated torque", "rated current", "v_dc"  # of the units
 QUANTITY = re.compile(r"\s*([+-]?(?:0x[0-9A-Fa-f]+|\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?))\s*([^\d.\s].*?)?\s*")
 
 
@@ -88,22 +89,29 @@ class Entry:
             return bytes(data)
         code, bits, _, _ = NUMBERS[self.type]
         if len(data) < bits // 8:
-            raise ValueRefused(self, f"{len(data)} bytes came, {bits // 8} were expected")
+            raise NotDone(f"{self.label}: {len(data)} bytes came, {bits // 8} were expected",
+                          "the firmware is of another version than this tool")
         return struct.unpack(code, data[: bits // 8])[0]
 
     def encode(self, raw):
         code, _, least, most = NUMBERS[self.type]
         if not least <= raw <= most:
-            raise ValueRefused(self, f"{raw} does not fit into {self.type}")
+            raise ValueRefused(self, f"{self.text(raw)} does not fit into {self.type}{self._in_percent(raw)}")
         return struct.pack(code, raw)
 
     def check(self, raw):
         """The range, before anything is sent."""
         if self.least is not None and raw < self.least:
-            raise ValueRefused(self, f"{self.text(raw)} is below the least, {self.text(self.least)}")
+            raise ValueRefused(self, f"{self.text(raw)} is below the least, {self.text(self.least)}{self._in_percent(raw)}")
         if self.most is not None and raw > self.most:
-            raise ValueRefused(self, f"{self.text(raw)} is above the most, {self.text(self.most)}")
+            raise ValueRefused(self, f"{self.text(raw)} is above the most, {self.text(self.most)}{self._in_percent(raw)}")
         self.encode(raw)
+
+    def _in_percent(self, raw):
+        """Of a share that is too large: it was meant in percent."""
+        if self.unit not in SHARES or abs(self.physical(raw)) < 2:
+            return ""
+        return f": {self.plain(raw)} is {self.plain(100 * raw)} %; did you mean {self.plain(raw)}%?"
 
     def physical(self, raw):
         return Decimal(raw) * self.scale

@@ -54,7 +54,7 @@ class UsageError(PmdriveError):
     """The command line or a file makes no sense."""
 
 
-class ValueRefused(PmdriveError):
+class ValueRefused(UsageError):
     """A value that is not sent, because the device would refuse it."""
 
     def __init__(self, entry, reason):

@@ -40,9 +40,14 @@ def parse(text, shown):
 
 def read(path):
     try:
-        return parse(Path(path).read_text(encoding="utf-8"), path)
-    except (OSError, UnicodeDecodeError) as error:
+        values = parse(Path(path).read_text(encoding="utf-8-sig"), path)
+    except OSError as error:
+        raise UsageError(f"{path}: {error.strerror}") from None
+    except UnicodeDecodeError as error:
         raise UsageError(f"{path}: {error}") from None
+    if not values:
+        raise UsageError(f"{path}: there is no value in it")
+    return values
 
 
 def render(values, title=""):

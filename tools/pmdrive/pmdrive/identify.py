@@ -135,8 +135,8 @@ def name_plate(drive, current, pole_pairs, speed, dc_link):
     voltage of the link. The machine's own data are guesses that identification replaces."""
     plate = {"pole_pairs": pole_pairs, "i_rated": current, "speed_max": speed, "v_dc_nominal": dc_link}
     scales = {name: float(drive.get(name)) for name in ("i_full_scale", "v_full_scale")}
-    if speed <= 0 or pole_pairs < 1:
-        raise UsageError("no motor has such a name plate", "pole pairs from 1 on, a speed above 0")
+    if min(current, speed, dc_link) <= 0 or pole_pairs < 1:
+        raise UsageError("no motor has such a name plate", "pole pairs from 1 on; current, speed and voltage above 0")
     plate.update(tune.limits({**scales, **plate}))
     psi = 0.8 * dc_link / math.sqrt(3) / (pole_pairs * speed)
     L, torque = 0.2 * psi / current, 1.5 * pole_pairs * psi * current

@@ -70,6 +70,16 @@ def show_changes(changes, out, words=("here", "there")):
         out.line(f"{entry.name:26s} {entry.text(here):>20s} -> {entry.text(there)}")
 
 
+def check_file(path):
+    """Whether a file can be written, before something is recorded for it that would be lost; OSError if it cannot."""
+    if path:
+        new = not Path(path).exists()
+        with open(path, "ab"):
+            pass
+        if new:
+            Path(path).unlink()
+
+
 def write_text(path, text, out):
     if path:
         Path(path).write_text(text, encoding="utf-8")

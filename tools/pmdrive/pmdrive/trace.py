@@ -84,6 +84,8 @@ def set_up(drive: Drive, signals, divider=1, pre=0.1, trigger=None, level=None, 
     for entry in entries:
         if entry.map not in ("tx", "both"):
             raise UsageError(f"{entry.label} cannot be recorded", "choose objects marked t in docs/object-dictionary.md")
+    if trigger is None and level is not None:
+        raise UsageError("a level without a trigger", "--trigger SIGNAL")
     if edge not in EDGES:
         raise UsageError(f"`{edge}` is no edge", ", ".join(EDGES))
     drive.write("trace.command", OFF)
