@@ -65,6 +65,16 @@ class Mutation(unittest.TestCase):
     def names(self, function="f"):
         return sorted(name for site in self.found if site.function == function for name, _ in site.what)
 
+    def test_files_that_are_none_of_ours(self):
+        for word in ("nofile", "firmware/no*.c", "/nowhere/a.c", "/usr/include", str(self.path)):
+            done = subprocess.run([sys.executable, str(ROOT / "tools" / "mutation"), "--list", word], capture_output=True, text=True,
+                                  check=False)
+            self.assertEqual((done.returncode, done.stdout), (2, ""), done.stderr)
+            self.assertIn(f"no source of this project is {word}", done.stderr)
+        done = subprocess.run([sys.executable, str(ROOT / "tools" / "mutation"), "--list", "firmware/params/st*.c"],
+                              capture_output=True, text=True, check=True)
+        self.assertIn("mutants in 1 files", done.stdout)
+
     def test_finds_what_can_change(self):
         self.assertEqual(self.names("pm_min"), ["< -> <=", "< -> >="])
         names = self.names()

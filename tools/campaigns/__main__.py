@@ -1,7 +1,7 @@
-"""Driver of tools/campaign; its help text says what it does."""
+"""Driver of tools/campaign; the help text in options.py says what it does."""
 
-import argparse
 import json
+import os
 import shlex
 import sys
 from pathlib import Path
@@ -10,21 +10,12 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
 from campaigns import execute, judge, page, summary, worker  # noqa: E402
+from campaigns.options import arguments  # noqa: E402
 from campaigns.plan import Campaign, SourceError  # noqa: E402
-from campaigns.pool import Pool, cores  # noqa: E402
+from campaigns.pool import Pool  # noqa: E402
 from campaigns.store import DRAWN, Store, StoreError, record  # noqa: E402
 
-PMSIM = ROOT / "out/build/host-release/tools/pmsim/pmsim"
 OUT = ROOT / "out/campaign"
-HELP = """Many runs of pmsim with drawn machines, and what became of them.
-
-  tools/campaign run C.yaml                        all cores of this machine; results in out/campaign/C
-  tools/campaign run C.yaml --scheduler HOST:8786  the workers of a Dask cluster
-  tools/campaign show out/campaign/C               summary and picture again, of what is there so far
-  tools/campaign replay out/campaign/C 17 --out DIR    run 17 once more, with its trace
-
-A campaign that was stopped goes on when it is started again. docs/campaigns.md describes the files.
-Exit code: 0 done and within its bounds, 1 a bound fails, 2 bad input, 130 stopped."""
 SUMMARY, PICTURE, FIGURES = "summary.md", "page.png", "summary.json"
 
 
@@ -52,15 +43,29 @@ def write_summary(campaign, rows, folder, timing):
     return figures["pass"]
 
 
-def say(campaign, rows, folder):
-    print(campaign.title)
+def say(campaign, rows, folder, timing=None):
+    """A reader that has enough, as `head`, does not change the verdict."""
+    lines = [campaign.title]
     for name, n, share, low, high in summary.counted(campaign, rows):
-        print(
+        lines.append(
             f"  {name:20} {n:6} of {len(rows)}  {summary.percent(share):>7}   {summary.percent(low)} to {summary.percent(high)}"
         )
-    for _, line in summary.verdicts(campaign, rows):
-        print(line)
-    print(f"{folder / SUMMARY}, {folder / PICTURE}")
+    lines += [line for _, line in summary.verdicts(campaign, rows)]
+    lines.append(f"{folder / SUMMARY}, {folder / PICTURE}")
+    if timing:
+        lines.append(
+            f"{timing['simulated_per_wall_s']:.1f} simulated s per wall s on {timing['cores']} cores, of which pmsim had "
+            f"{100 * timing['at_work']:.0f} %"
+        )
+    try:
+        for line in lines:
+            print(line, flush=True)
+    except BrokenPipeError:
+        nobody_reads()
+
+
+def nobody_reads():
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def run(options):
@@ -84,12 +89,7 @@ def run(options):
         return 130
     good = write_summary(campaign, rows, folder, timing)
     if not options.quiet:
-        say(campaign, rows, folder)
-    if timing and not options.quiet:
-        print(
-            f"{timing['simulated_per_wall_s']:.1f} simulated s per wall s on {timing['cores']} cores, of which pmsim had "
-            f"{100 * timing['at_work']:.0f} %"
-        )
+        say(campaign, rows, folder, timing)
     return 0 if good else 1
 
 
@@ -136,53 +136,17 @@ def replay(options):
     if worker.digest(options.pmsim) != results.what["pmsim"]:
         print("note: pmsim is another build than that of the campaign; the run may differ")
     code, out, errors = worker.pmsim(options.pmsim, scenario, settings, *words)
-    print(out + errors, end="")
+    print(out + errors, end="", flush=True)
     return 2 if code > 1 and not judge.refused(errors) else 0
-
-
-def arguments():
-    parser = argparse.ArgumentParser(
-        prog="tools/campaign", description=HELP, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--pmsim", type=Path, default=PMSIM, help=argparse.SUPPRESS)
-    commands = parser.add_subparsers(dest="command", required=True, metavar="run | show | replay")
-    one = commands.add_parser("run", help="make the runs that are not there yet")
-    one.add_argument("campaign", type=Path, help="campaign file (YAML)")
-    one.add_argument("--runs", type=positive, help="so many in place of the file's `runs`")
-    one.add_argument("--out", type=Path, help="folder of the results (default: out/campaign/NAME)")
-    one.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, as tcp://host:8786")
-    one.add_argument(
-        "--jobs", type=positive, default=cores(), help="runs at a time on this machine (default: %(default)s)"
-    )
-    one.add_argument(
-        "--chunk", type=positive, help="runs handed over at a time (default: 1 to 16, as their number asks)"
-    )
-    one.add_argument("--fresh", action="store_true", help="drop results that are there")
-    one.add_argument("--quiet", action="store_true", help="no progress, no summary on the terminal")
-    one.set_defaults(do=run)
-    one = commands.add_parser("show", help="summary and picture of results")
-    one.add_argument("results", type=Path, help="folder of the results, or its runs.parquet")
-    one.set_defaults(do=show)
-    one = commands.add_parser("replay", help="one run again, with its trace")
-    one.add_argument("results", type=Path, help="folder of the results, or its runs.parquet")
-    one.add_argument("number", type=int, help="of the run")
-    one.add_argument("--out", type=Path, required=True, help="folder for machine, scenario, trace.csv and result.json")
-    one.add_argument("--decimate", type=positive, help="one trace row every N periods")
-    one.set_defaults(do=replay)
-    return parser.parse_args()
-
-
-def positive(text):
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError("1 or more")
-    return value
 
 
 def main():
     options = arguments()
     try:
-        return options.do(options)
+        return {"run": run, "show": show, "replay": replay}[options.command](options)
+    except BrokenPipeError:
+        nobody_reads()
+        return 0
     except (SourceError, StoreError, worker.Failed, OSError) as error:
         return fail(error)
 

@@ -28,7 +28,10 @@ class Pool:
         from distributed import Client
 
         cloudpickle.register_pickle_by_value(worker)  # scheduler and workers need not have this project
-        self.client = Client(scheduler, timeout=10)
+        try:
+            self.client = Client(scheduler, timeout=10)
+        except ValueError as error:
+            raise OSError(f"{scheduler}: {error}") from None
         try:
             self.client.wait_for_workers(1, timeout=WORKERS_WITHIN_S)
         except TimeoutError as none:

@@ -1,5 +1,6 @@
 """Driver of tools/mutate; its help text says what it does."""
 import argparse
+import glob
 import hashlib
 import json
 import random
@@ -44,9 +45,14 @@ def expand(words):
     for word in words or DEFAULT:
         path = ROOT / word
         if path.is_dir():
-            files |= {file for file in path.rglob("*") if file.suffix in (".c", ".h")}
+            found = {file for file in path.rglob("*") if file.suffix in (".c", ".h")}
         else:
-            files |= set(ROOT.glob(word))
+            found = {Path(name) for name in glob.glob(str(path), recursive=True)}
+        found = {file.resolve() for file in found if ROOT in file.resolve().parents}
+        if not found:
+            print(f"tools/mutate: no source of this project is {word}", file=sys.stderr)
+            sys.exit(2)
+        files |= found
     names = sorted(str(file.relative_to(ROOT)) for file in files)
     return [name for name in names if not NOT_OURS_TO_MUTATE.search(name)]
 

@@ -63,6 +63,13 @@ class Smoke(unittest.TestCase):
         self.assertGreater((self.whole / "page.png").stat().st_size, 20000)
         self.assertIn("PASS  ok ", self.first.stdout)
 
+    def test_a_reader_that_has_enough_does_not_change_the_verdict(self):
+        for words, code in ((("show", self.whole), 0), (("replay", self.whole, 0, "--out", self.folder / "read"), 0)):
+            process = subprocess.Popen(command(*words), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            process.stdout.close()
+            self.assertEqual((process.stderr.read(), process.wait()), ("", code))
+            process.stderr.close()
+
     def test_a_bound_that_fails_fails(self):
         text = (
             CAMPAIGN.read_text(encoding="utf-8")
@@ -212,6 +219,10 @@ class Smoke(unittest.TestCase):
         done = tool("run", CAMPAIGN, "--out", self.folder / "nowhere", "--scheduler", "tcp://127.0.0.1:9")
         self.assertEqual(done.returncode, 2, done.stderr)
         self.assertIn("127.0.0.1:9", done.stderr)
+        self.assertNotIn("Traceback", done.stderr)
+        done = tool("run", CAMPAIGN, "--out", self.folder / "nowhere", "--scheduler", "foo")
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertIn("foo: ", done.stderr)
         self.assertNotIn("Traceback", done.stderr)
 
     def test_a_tuned_machine_runs(self):
