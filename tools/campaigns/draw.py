@@ -20,6 +20,8 @@ def stream(*what):
 
 
 def uniform(random_, low, high):
+    if not low <= high:
+        raise FormulaError(f"uniform: [{low:g}, {high:g}] needs low <= high")
     return random_.uniform(low, high)
 
 

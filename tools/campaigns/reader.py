@@ -141,6 +141,8 @@ class CampaignFile:
         name, limits = entry.text("class"), []
         if name not in {OK, REFUSED, OTHER, *(rule.name for rule in self.rules)}:
             raise entry.error(f"there is no class `{name}`", "class")
+        if not {"min", "max"} & set(entry.nodes):
+            raise entry.error("`min` or `max`, a share, is needed")
         for key, default in (("min", "0"), ("max", "1")):
             try:
                 limits.append(float(entry.text(key, default)))

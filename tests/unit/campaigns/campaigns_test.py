@@ -171,6 +171,7 @@ class Files(unittest.TestCase):
         self.refused("title: Small\n", "", 1, "title")
         self.refused("scenario: s.yaml", "scenario: none.yaml", 2, "none.yaml")
         self.refused("{log: [1.0e-4, 1.0e-3]}", "{log: [1.0e-3, 1.0e-4]}", 5, "low")
+        self.refused("{uniform: [0.85, 1.15]}", "{uniform: [1.15, 0.85]}", 6, "low")
         self.refused("L_d0_H: L,", "L_d0_H: L_d,", 8, "L_d", "told_R")
         self.refused("J_kgm2: 0.01", "J_gcm2: 0.01", 9, "mechanics.J_kgm2")
         self.refused("rated: {i_rated_A: 20, ", "rated: {", 10, "rated.i_rated_A")
@@ -181,6 +182,7 @@ class Files(unittest.TestCase):
         self.refused("class: lost,", "class: ok,", 15, "ok")
         self.refused("{class: ok, min: 0.5}", "{class: good, min: 0.5}", 17, "good")
         self.refused("min: 0.5", "min: 50", 17, "share")
+        self.refused(", min: 0.5", "", 17, "`min` or `max`")
         self.refused("told:\n", "base: s.yaml\ntold:\n", 13, "told")
 
     def test_names_of_expectations_are_there_once(self):
