@@ -20,8 +20,13 @@ from matplotlib.patches import Patch  # noqa: E402
 BLUE, ORANGE, GREEN, RED, SKY, PURPLE, GREY = (
     "#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#666666",
 )
+DPI_MOST = 1200
 RAD_S_TO_RPM = 60.0 / (2.0 * 3.141592653589793)
 WORDS = ("state", "fault")
+NEEDED = (
+    "t_s", "state", "fault", "v_dc_V", "omega_ref_mech_rad_s", "omega_mech_rad_s", "omega_hat_mech_rad_s", "angle_error_deg",
+    "weight", "ia_A", "ib_A", "ic_A", "iq_A", "id_A", "torque_Nm",
+)
 WITH_POSITION = ("running", "stopping")
 STYLE = {
     "font.family": "DejaVu Sans",
@@ -41,16 +46,27 @@ STYLE = {
 }
 
 
+def fail(reason):
+    print(f"plot_run.py: {reason}", file=sys.stderr)
+    sys.exit(2)
+
+
 def read_trace(path):
     """Columns by name; numbers as floats."""
-    with open(path, newline="") as file:
-        reader = csv.DictReader(file)
-        columns = {name: [] for name in reader.fieldnames or []}
-        for row in reader:
-            for name, text in row.items():
-                columns[name].append(text if name in WORDS else float(text))
-    if not columns or not columns["t_s"]:
-        sys.exit(f"{path}: no data")
+    try:
+        with open(path, newline="", encoding="utf-8") as file:
+            reader = csv.DictReader(file)
+            columns = {name: [] for name in reader.fieldnames or []}
+            missing = [name for name in NEEDED if name not in columns]
+            if missing:
+                fail(f"{path} is no trace of pmsim: it has no {missing[0]}")
+            for row in reader:
+                for name, text in row.items():
+                    columns[name].append(text if name in WORDS else float(text))
+    except (KeyError, TypeError, ValueError, csv.Error):  # rows of another length, words in place of numbers
+        fail(f"{path}:{reader.line_num}: not a row of a trace of pmsim")
+    if not columns["t_s"]:
+        fail(f"{path}: no data")
     return columns
 
 
@@ -211,11 +227,20 @@ def main():
     parser.add_argument("--dpi", type=int, default=150)
     arguments = parser.parse_args()
     trace = arguments.trace / "trace.csv" if arguments.trace.is_dir() else arguments.trace
+    if not 1 <= arguments.dpi <= DPI_MOST:
+        parser.error(f"--dpi {arguments.dpi} is not 1 to {DPI_MOST}")
     if not trace.is_file():
         parser.error(f"{trace}: no such file")
     title = arguments.title if arguments.title is not None else title_beside(trace)
     out = arguments.out or trace.with_name("demo.png")
-    plot(read_trace(trace), title).savefig(out, dpi=arguments.dpi)
+    figure = plot(read_trace(trace), title)
+    kinds = figure.canvas.get_supported_filetypes()
+    if out.suffix[1:] not in kinds:
+        parser.error(f"{out} is no picture: its name ends with one of {', '.join(kinds)}")
+    try:
+        figure.savefig(out, dpi=arguments.dpi)
+    except OSError as error:
+        fail(f"{out}: {error.strerror}")
 
 
 if __name__ == "__main__":

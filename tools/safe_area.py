@@ -175,7 +175,10 @@ def main():
     parser.add_argument("--out", type=Path, default=ROOT / "docs/results")
     parser.add_argument("--check", action="store_true")
     arguments = parser.parse_args()
-    rows = pq.read_table(arguments.results / "runs.parquet").to_pylist()
+    path = arguments.results / "runs.parquet"
+    if not path.is_file():
+        parser.error(f"there is no {path}; first: tools/campaign run tests/campaign/safe_area.yaml")
+    rows = pq.read_table(path).to_pylist()
     found = judge(sorted((row for row in rows if row["class"] != "refused"), key=lambda row: row["run"]))
     most = 1.25 * max(r[1] for runs in found.values() for r in runs)
     wrong = verdict(found)

@@ -9,7 +9,8 @@ import unittest
 ROOT = None
 REFUSED = (
     ("coverage", "foo"), ("coverage", "--branch"), ("demo", "a", "b"), ("demo", "--what"), ("campaign",), ("campaign", "rum"),
-    ("campaign", "run", "nofile"), ("campaign", "show", "nofolder"), ("campaign", "run", "README.md", "--jobs", "0"), ("campaign", "run", "README.md", "--he"),
+    ("campaign", "run", "nofile"), ("campaign", "show", "nofolder"), ("campaign", "run", "README.md", "--jobs", "0"),
+    ("campaign", "run", "README.md", "--he"),
 )
 HELP = (("coverage", "--help"), ("demo", "-h"), ("campaign", "--help"), ("campaign", "run", "--help"))
 

@@ -27,6 +27,11 @@ def run(*arguments):
     return subprocess.run([sys.executable, SCRIPT, *map(str, arguments)], capture_output=True, text=True, check=False)
 
 
+def refused(reason, *arguments):
+    result = run(*arguments)
+    assert (result.returncode, reason in result.stderr, "Traceback" in result.stderr) == (2, True, False), result.stderr
+
+
 def check_marks(folder):
     """The open loop is shaded, a fault marked with its name, link and all loads drawn; an older trace has neither."""
     sys.path.insert(0, "tools")
@@ -60,8 +65,18 @@ def main():
             picture = (folder / "demo.png").read_bytes()
             assert picture.startswith(b"\x89PNG"), "not a picture"
             assert len(picture) > 20000, "nothing drawn"
-        write_trace(folder, 0)
-        assert run(folder / "trace.csv").returncode != 0, "an empty trace is not refused"
+        for words, reason in ((("-o", folder / "a.foo"), "a.foo is no picture"), (("-o", folder / "no" / "a.png"), "No such file"),
+                              (("--dpi", "0"), "--dpi 0 is not 1 to")):
+            refused(reason, folder, *words)
+        trace = folder / "trace.csv"
+        rows = trace.read_text().splitlines()
+        for wrong, reason in (("a,b\n1,2\n", "it has no t_s"), ("\n".join(rows[:2] + ["x" + rows[2]]), "trace.csv:3: "),
+                              ("\n".join(rows[:2] + [rows[2][:9]]), "trace.csv:3: "), ("\n".join(rows[:2]) + ",7\n", "trace.csv:2: "),
+                              (rows[0], "no data")):
+            trace.write_text(wrong)
+            refused(reason, trace)
+        trace.write_bytes(b"\x89PNG\r\n\xff\xfe")
+        refused("not a row of a trace", trace)
 
 
 if __name__ == "__main__":
