@@ -226,7 +226,7 @@ def page(results, area, runs):
         text += [f"### {name}\n", results_table(machine, results[machine])]
     text.append("""## Safe area
 
-Current of the two legs up to which half of the crossings have a sample ahead of them (METHODS.md 10.5.2, row 117),
+Current of the two legs up to which half of the crossings have a sample ahead of them (book 10.5.2),
 theta_f + w (t_blank + T / 2) = 30 degrees, and runs of the drive at an imposed speed without `freewheeling_limit`:
 
 ![predicted currents and runs](bldc.png)

@@ -98,7 +98,7 @@ def measured_table(path):
             rows.setdefault((what(name), bound, unit), Row()).add(name, float(value), section)
     if not rows:
         sys.exit("no test has written a figure")
-    lines = ["| Check | Worst | Bound | Unit | Figures | METHODS |", "|---|---|---|---|---|---|"]
+    lines = ["| Check | Worst | Bound | Unit | Figures | Effect or section |", "|---|---|---|---|---|---|"]
     for (text, bound, unit), row in sorted(rows.items(), key=lambda item: (order(item[0][0]), item[0])):
         verdict = "" if row.worst <= float(bound) else " **FAIL**"
         sections = ", ".join(sorted(row.sections))

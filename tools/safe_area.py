@@ -110,7 +110,7 @@ def plot(found, drawn, most, path):
 
 HEAD = f"""# Safe operation area of injection
 
-Where a low-speed source holds its load (METHODS.md 5.8.2 and 5.8.4): IPM-1000 at 5 % of speed, free rotor under speed control of
+Where a low-speed source holds its load (book 5.8.2 and 5.8.4): IPM-1000 at 5 % of speed, free rotor under speed control of
 2 Hz, switching plant with dead time, leg capacitance and converter. Made by `tools/safe_area` from the runs of
 `tools/campaign run tests/campaign/safe_area.yaml`; lines are predicted by `tools/pmdrive/pmdrive/carrier.py` from machine, carrier and
 bandwidths.

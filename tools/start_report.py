@@ -311,7 +311,7 @@ def page(found, told, noise, count, plot_name):
     for method, (number_of, _, _, files, _, knows, has, _) in METHODS.items():
         if method in found:
             rows.append([method, number_of, knows, has, str(sum(code.get(name, 0) for name in files)), " + ".join(state[method])])
-    text.append(table(["method", "rows of METHODS.md", "needs to know", "needs to have", "bytes of code", "state + configuration"], rows))
+    text.append(table(["method", "rows of [the book](../book.md)", "needs to know", "needs to have", "bytes of code", "state + configuration"], rows))
     text.append("Code: all that the method needs beside injection, also what it shares with others.\n")
     return "\n".join(text)
 

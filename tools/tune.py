@@ -18,7 +18,7 @@ chosen here. The rules are those of `pmdrive tune`. Saturation is taken from c_A
 L_q may be below L_d.
 
 `injection: 4` or `1` in `drive:` asks for a sine along d or a rotating one: its amplitude, frequency and loops are then chosen by the
-position error that is predicted for each of twelve carriers without load and at rated current (METHODS.md 5.8.3, row 67). It is
+position error that is predicted for each of twelve carriers without load and at rated current (section 5.8.3 of the book). It is
 not asked for where `drive:` tells all three, v_injection, f_injection and injection_bandwidth.
 
 `commutation: 1` in `drive:` asks for block commutation, `trapezoid_flat_deg` in `winding:` says that the EMF is a trapezoid.
