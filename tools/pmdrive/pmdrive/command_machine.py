@@ -82,7 +82,7 @@ def identify_machine(arguments, drive, out):
     plate = _name_plate(arguments)
     turning = "turns" if {"flux", "mechanics"} & set(wanted) else "moves"
     if not arguments.yes and not attend.confirm(
-            f"THE MOTOR {turning.upper()} for some 15 s, with its rated current. Is it free to?"):
+            f"THE MOTOR {turning.upper()} for some 13 s, with its rated current. Is it free to?"):
         raise NotDone("nothing was done")
     if plate:
         _begin(arguments, drive, out, plate)
