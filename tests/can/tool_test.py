@@ -497,6 +497,8 @@ class Motion(Bench):
         self.assertIn("velocity_actual", self.command("watch", "--for", "0.1")[0])
         _, err = self.command("watch", "--out", "x.txt", code=2)
         self.assertIn(".png", err)
+        with mock.patch.dict(sys.modules, matplotlib=None):
+            self.assertIn("matplotlib is not installed", self.command("watch", "--for", "9", "--out", "x.png", code=2)[1])
 
     def test_commands_cease(self):
         """The program is killed: the drive's own timer switches the torque off."""
@@ -717,7 +719,8 @@ class Trace(Bench):
         for words, name in ((["trace", "i_d"], "no/x.csv"), (["watch", "--for", "9"], "no/x.png"), (["dump"], "no/x.yaml"),
                             (["eds"], "no/x.eds")):
             path = self.path(name)
-            with mock.patch("pmdrive.names.stored", side_effect=AssertionError):
+            with mock.patch("pmdrive.names.stored", side_effect=AssertionError), \
+                 mock.patch("pmdrive.watch.check_path"), mock.patch("pmdrive.trace.check_path"):
                 self.assertEqual(self.command(*words, "--out", path, code=2)[1], f"pmdrive: {path}: No such file or directory\n")
         self.assertEqual(self.node["trace.state"], 1)
         self.assertIn("Is a directory", self.command("dump", "--out", self.folder.name, code=2)[1])

@@ -9,8 +9,12 @@ PICTURES = ".png", ".svg", ".pdf"
 
 
 def check_path(path):
-    if path is not None and Path(path).suffix not in PICTURES:
+    """That a picture can be made under this name: known before anything is read for it."""
+    if path is None:
+        return
+    if Path(path).suffix not in PICTURES:
         raise UsageError(f"{path} is no picture", f"its name ends with one of: {', '.join(PICTURES)}")
+    _library("matplotlib")
 
 
 def _library(name):
