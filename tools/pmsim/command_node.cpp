@@ -23,7 +23,7 @@ void add_node_command(Command &app, int &exit_code)
         "The load and the temperatures of the scenario's profile are played; commands come over the bus.\n\n"
         "Examples:\n"
         "  pmsim node tests/scenario/node.yaml --can vcan0\n"
-        "  pmsim node tests/scenario/node.yaml --can socketcand:localhost:29536 --set load=0.5");
+        "  pmsim node tests/scenario/node.yaml --can socketcand:localhost:29536 --set speed_bandwidth=6");
     command->callback([options, &exit_code] { exit_code = run_node(*options); });
 }
 

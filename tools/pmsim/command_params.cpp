@@ -39,6 +39,23 @@ struct PageOptions {
     std::vector<std::string> settings;
 };
 
+// The page goes to any port; the board that the images are for is the one whose limits are known.
+void warn_of_board(const Setup &setup)
+{
+    const char *refused = nullptr;
+    const char *reason = nullptr;
+    if (!parameter_page_suits_board(setup.params.get(), &refused, &reason)) {
+        std::fprintf(stderr, "warning: a B-G431B-ESC1 refuses parameter %s: %s\n", refused, reason);
+    }
+    if (setup.params->t_settle == 0) {
+        std::fprintf(
+            stderr,
+            "warning: t_settle is 0, for shunts in the lines; those of a B-G431B-ESC1 are below the lower "
+            "switches: give the machine file sensor: {i_full_scale_A: 60.16, v_full_scale_V: 34.28, "
+            "shunt: low_side, settle_s: 1.3e-6}\n");
+    }
+}
+
 // The page of the parameter store that a board finds at its next start.
 void write_page(const PageOptions &options)
 {
@@ -59,6 +76,7 @@ void write_page(const PageOptions &options)
     }
     std::printf("%s: %u bytes, %s\n", options.page.c_str(), unsigned(used * sizeof words[0]),
                 setup.name.c_str());
+    warn_of_board(setup);
 }
 
 } // namespace
@@ -83,7 +101,7 @@ void add_params_command(Command &app)
         ->needs(machine);
     command->footer("These names go into `drive:` of machine and scenario files and after --set, in SI.\n\n"
                     "Example:\n"
-                    "  pmsim params --machine my_motor.yaml --page my_motor.bin && tools/flash --parameters "
+                    "  pmsim params --machine tuned.yaml --page my_motor.bin && tools/flash --parameters "
                     "my_motor.bin");
     command->callback([options] {
         if (options->page.empty()) {

@@ -2,14 +2,29 @@
 
 #include <stddef.h>
 
-#include "firmware/app/app.h"
+#include "firmware/app/app_parts.h"
 
-uint32_t parameter_page(const drive_params_t *params, uint32_t words[STORE_WORDS], const char **refused,
-                        const char **reason)
+/* hal/stm32g431/board.c, whose name for it is another one here: the host's port has it too */
+const hal_board_t *stm32g431_board(const hal_t *hal);
+
+static bool takes(const drive_params_t *params, const char **refused, const char **reason)
 {
     drive_config_t config;
     const drive_result_t result = drive_configure(&config, params, PM_CHANNELS);
     *refused = result.ok ? NULL : drive_param_table[result.param].name;
     *reason = result.ok ? NULL : result.reason;
-    return result.ok ? app_page(params, 1, words) : 0;
+    return result.ok;
+}
+
+uint32_t parameter_page(const drive_params_t *params, uint32_t words[STORE_WORDS], const char **refused,
+                        const char **reason)
+{
+    return takes(params, refused, reason) ? app_page(params, 1, words) : 0;
+}
+
+bool parameter_page_suits_board(const drive_params_t *params, const char **refused, const char **reason)
+{
+    drive_params_t there = *params;
+    app_take_board(stm32g431_board(NULL), &there);
+    return takes(&there, refused, reason);
 }

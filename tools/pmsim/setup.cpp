@@ -39,20 +39,30 @@ bool replaced_by_map(const std::string &section, const std::string &key)
            (key == "L_d0_H" || key == "L_q0_H" || key == "c_A_Wb5" || key == "psi_m_Wb");
 }
 
+const char complete_first[] = "; complete it first: pmsim tune FILE -o tuned.yaml";
+
+// Of what the firmware needs, and `pmsim tune` gives.
+void require_for_drive(const Map &section, const std::string &key)
+{
+    if (!section.has(key)) {
+        section.value().fail("key \"" + key + "\" is missing" + complete_first);
+    }
+}
+
 // `rated` and `drive` may be left out, but not half of them.
 void require_all(const Setup &setup, const Map &map)
 {
     for (const Field &field : setup_fields()) {
-        const bool needed = field.need == Need::always || (field.need == Need::core && !setup.flux_map) ||
-                            (field.need == Need::drive && map.has(field.section));
-        if (needed) {
+        if (field.need == Need::always || (field.need == Need::core && !setup.flux_map)) {
             Map(map.at(field.section)).at(field.key);
+        } else if (field.need == Need::drive && map.has(field.section)) {
+            require_for_drive(Map(map.at(field.section)), field.key);
         }
     }
     if (const auto drive = map.find("drive")) {
         const Map keys(*drive);
         for (const drive_param_id_t id : required_parameters) {
-            keys.at(drive_param_table[id].name);
+            require_for_drive(keys, drive_param_table[id].name);
         }
     }
 }
@@ -215,7 +225,7 @@ void require_drive(const Setup &setup)
     }
     const auto need = [&](const std::string &key) {
         if (setup.given.count(key) == 0) {
-            refuse(key + " is missing: the drive cannot run this machine without it");
+            refuse(key + " is missing: the drive cannot run this machine without it" + complete_first);
         }
     };
     for (const Field &field : setup_fields()) {

@@ -120,6 +120,32 @@ def check_inputs_are_safe(folder, scenario):
     assert "would overwrite an input" in message, message
 
 
+def check_page(folder):
+    """For the board that its images are for: what that refuses is said, and shunts that it has not."""
+    whole = pathlib.Path("sim_plant/machines/teknic_m2310p.yaml").resolve()
+    page = folder / "page.bin"
+    board = [word for value in ("sensor.shunt=low_side", "sensor.settle_s=1.3e-6", "v_dc_derate=30") for word in ("--set", value)]
+    assert expect_exit(0, "params", "--machine", whole, *board, "--set", "v_dc_max=31.9", "--page", page).stderr == ""
+    message = expect_exit(0, "params", "--machine", whole, *board, "--set", "v_dc_max=32.1", "--page", page).stderr
+    assert "B-G431B-ESC1 refuses parameter v_dc_max: beyond what the board bears" in message, message
+    assert "t_settle" not in message, message
+    message = expect_exit(0, "params", "--machine", whole, *board[4:], "--set", "v_dc_max=31.9", "--page", page).stderr
+    assert "t_settle is 0" in message and "shunt: low_side" in message and "refuses" not in message, message
+    few = folder / "few.yaml"
+    few.write_text(whole.read_text().replace("torque_rated_Nm", "# torque_rated_Nm"))
+    message = expect_exit(2, "params", "--machine", few, "--page", page).stderr
+    assert "is missing; complete it first: pmsim tune FILE -o tuned.yaml" in message, message
+
+
+def check_node_examples():
+    """The examples of the help: their scenario takes what they set. A recording needs no bus."""
+    examples = [line.split() for line in expect_exit(0, "node", "--help").stdout.splitlines() if "pmsim node tests/" in line]
+    assert len(examples) == 2, examples
+    for words in examples:
+        given = [word for n, word in enumerate(words) if "--set" in words[n - 1:n + 1]]
+        expect_exit(0, "record", words[2], *given, "--periods", 1, "--out", "/dev/null")
+
+
 def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
@@ -130,6 +156,8 @@ def main():
         check_run(folder, scenario)
         check_refusals(folder, scenario)
         check_inputs_are_safe(folder, scenario)
+        check_page(folder)
+        check_node_examples()
         record = folder / "small.rec"
         expect_exit(0, "record", scenario, "--set", "angle=30", "--periods", 50, "--out", record)
         assert record.read_bytes().startswith(b"PMREC003")

@@ -246,7 +246,9 @@ TEST(MachineFile, ErrorsNameThePlace)
               "m.yaml:5:16: expected a whole number, found 12.5");
     EXPECT_EQ(machine_error("  pole_pairs: 4", "  pole_pair: 4"),
               "m.yaml:7:3: unknown key \"pole_pair\"; did you mean \"pole_pairs\"?");
-    EXPECT_EQ(machine_error("small", "small"), "m.yaml:7:3: key \"R_s\" is missing"); // of drive:
+    EXPECT_EQ(
+        machine_error("small", "small"),
+        "m.yaml:7:3: key \"R_s\" is missing; complete it first: pmsim tune FILE -o tuned.yaml"); // of drive:
 }
 
 // A machine of which each value is within its limits; `changes` are settings that together make it stiff.

@@ -183,7 +183,8 @@ TEST(ScenarioFile, MachinesThatTheDriveCannotRun)
               "sim_plant/machines/dtp_400.yaml: the drive cannot run two sets yet");
     const std::string path = machine_without_drive();
     EXPECT_EQ(error_with("sim_plant/machines/ipm_1000.yaml", path),
-              path + ": drive.pole_pairs is missing: the drive cannot run this machine without it");
+              path + ": drive.pole_pairs is missing: the drive cannot run this machine without it; complete "
+                     "it first: pmsim tune FILE -o tuned.yaml");
 }
 
 TEST(ScenarioFile, ErrorsOfTheExpectations)

@@ -263,18 +263,21 @@ TEST(FluxMapSection, RealMachinesLoad)
 
 TEST(WindingSection, TheDriveNeedsMore)
 {
-    EXPECT_EQ(drive_error(machine()),
-              "m.yaml: rated.i_rated_A is missing: the drive cannot run this machine without it");
+    EXPECT_EQ(drive_error(machine()), "m.yaml: rated.i_rated_A is missing: the drive cannot run this machine "
+                                      "without it; complete it first: pmsim tune FILE -o tuned.yaml");
     EXPECT_EQ(drive_error(machine("rated: {i_rated_A: 5, speed_rated_rad_s: 100, torque_rated_Nm: 0.3, "
                                   "v_dc_V: 24}\n")),
-              "m.yaml: drive.pole_pairs is missing: the drive cannot run this machine without it");
+              "m.yaml: drive.pole_pairs is missing: the drive cannot run this machine without it; complete "
+              "it first: pmsim tune FILE -o tuned.yaml");
     EXPECT_EQ(drive_error(machine("winding: {sets: 2}\n")), "m.yaml: the drive cannot run two sets yet");
     EXPECT_EQ(drive_error(machine("winding: {connection: open, L_0_H: 1.0e-4}\n")),
               "m.yaml: the drive cannot run an open winding yet");
     EXPECT_EQ(drive_error(machine("sensor: {shunt: single_shunt}\n")),
               "m.yaml: the drive cannot measure with a single shunt yet");
     EXPECT_EQ(drive_error(load_machine_file("sim_plant/machines/ipm_1000.yaml")), "no error");
-    EXPECT_EQ(error_with("rated: {i_rated_A: 5}\n"), "m.yaml:4:8: key \"speed_rated_rad_s\" is missing");
+    EXPECT_EQ(
+        error_with("rated: {i_rated_A: 5}\n"),
+        "m.yaml:4:8: key \"speed_rated_rad_s\" is missing; complete it first: pmsim tune FILE -o tuned.yaml");
 }
 
 // Messages of the plant in the words of the file, at the key if the file has it.
