@@ -22,7 +22,7 @@ TARGET = ROOT / "out/build/stm32g431"
 IMAGES = gen_images.images(ROOT)
 FOC, SMALL = (TARGET / f"{next(x.program for x in IMAGES if x.name == name)}.elf" for name in ("foc", "small"))
 SCENARIOS = ROOT / "tests/scenario"
-FAST = (SCENARIOS / "board/identity.yaml", "--set", "theta=0")  # at 20 kHz
+FAST = (SCENARIOS / "board/identity.yaml", "--set", "noise=5")  # at 20 kHz
 RUNS = 5
 
 

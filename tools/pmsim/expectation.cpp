@@ -12,6 +12,8 @@ namespace pmsim
 namespace
 {
 
+const double most_fraction = 3.0; // of rated speed; field weakening reaches less
+
 void read_bounds(Expectation &expectation, const Map &map, const MetricInfo &info)
 {
     const auto bound = [&map](const char *key) -> std::optional<double> {
@@ -30,6 +32,9 @@ void read_bounds(Expectation &expectation, const Map &map, const MetricInfo &inf
     }
     if (!info.is_word && (!has_number || expectation.equals)) {
         map.value().fail(info.name + " is a number: it needs `max`, `min` or `max_abs`");
+    }
+    if (expectation.max_abs && (expectation.min || expectation.max)) {
+        map.value().fail("`max_abs` stands for both ends: give it, or `min` and `max`");
     }
     if (expectation.min && expectation.max && *expectation.min > *expectation.max) {
         map.value().fail("min is above max: nothing can pass");
@@ -80,7 +85,7 @@ Expectation read_expectation(const Value &value)
     }
     expectation.unit = info->unit;
     if (info->has_fraction) {
-        expectation.fraction = map.at("fraction").number(0, 10);
+        expectation.fraction = map.at("fraction").number(0, most_fraction);
     } else if (map.has("fraction")) {
         throw InputError(map.key_place("fraction"), info->name + " takes no `fraction`");
     }

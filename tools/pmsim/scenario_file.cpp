@@ -33,6 +33,15 @@ void read_window(Scenario &scenario, Expectation &expectation, const Value &item
     }
 }
 
+// A variable may put an event behind the end, so that it does not happen.
+void check_time(const Scenario &scenario, const Value &item)
+{
+    const bool is_fixed = Map(item).at("t_s").node().Scalar().find('$') == std::string::npos;
+    if (is_fixed && scenario.profile.back().t_s > scenario.duration_s) {
+        item.fail("the event lies after the end of the run (duration_s " + format(scenario.duration_s) + ")");
+    }
+}
+
 void make_similar(Expectation &expectation, const Similarity &similarity)
 {
     const double factor = similarity.of_unit(find_metric(expectation.metric)->unit);
@@ -101,6 +110,7 @@ ScenarioFile::ScenarioFile(const Value &document, Settings settings)
         }
     }
     runs_ = expand_runs(map, fixed);
+    refuse_unused_variables(map);
     std::vector<std::string> known = variables;
     for (const char *key : {"seed", "duration_s", "start.theta_e_deg"}) {
         known.emplace_back(key);
@@ -190,8 +200,12 @@ Scenario ScenarioFile::scenario(const Run &run) const
     if (const auto after = map.find("after_fault_s")) {
         scenario.after_fault_s = after->number(0.0, scenario.duration_s);
     }
+    const bool is_cut = setting_value(settings_, "duration_s").has_value();
     for (const Value &item : map.at("profile").list()) {
         scenario.profile.push_back(read_event(item, scenario.setup));
+        if (!is_cut) {
+            check_time(scenario, item);
+        }
     }
     check_drift(scenario, map.at("profile"));
     if (const auto expect = map.find("expect")) {

@@ -44,6 +44,7 @@ Map open_scenario(const Value &document); // refuses unknown keys
 // All combinations of `cases` and `sweep`; a variable in `fixed` keeps that one value.
 std::vector<Run> expand_runs(const Map &document, const Variables &fixed);
 std::vector<std::string> variable_names(const Map &document);
+void refuse_unused_variables(const Map &document);
 
 Event read_event(const Value &value, const Setup &setup);
 Expectation read_expectation(const Value &value);

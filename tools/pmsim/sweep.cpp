@@ -1,4 +1,6 @@
 // `sweep:` and `cases:` of a scenario: which runs one file stands for.
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "tools/pmsim/scenario_file.h"
@@ -59,17 +61,21 @@ std::vector<Case> read_cases(const Value &value)
         for (const std::string &key : map.keys()) {
             (key == "name" ? one.name : one.variables[key]) = map.at(key).text();
         }
+        if (one.name.empty()) {
+            for (const auto &entry : one.variables) {
+                one.name += (one.name.empty() ? "" : " ") + entry.first + "=" + entry.second;
+            }
+        }
+        const auto has_its_name = [&one](const Case &other) { return other.name == one.name; };
+        if (std::any_of(cases.begin(), cases.end(), has_its_name)) {
+            item.fail("a second case of the name \"" + one.name + "\"");
+        }
         if (!cases.empty()) {
             for (const auto &entry : cases.front().variables) {
                 map.at(entry.first); // every case gives the same variables
             }
             if (one.variables.size() != cases.front().variables.size()) {
                 item.fail("gives a variable that the first case does not give");
-            }
-        }
-        if (one.name.empty()) {
-            for (const auto &entry : one.variables) {
-                one.name += (one.name.empty() ? "" : " ") + entry.first + "=" + entry.second;
             }
         }
         cases.push_back(one);
@@ -80,7 +86,51 @@ std::vector<Case> read_cases(const Value &value)
     return cases;
 }
 
+// Whether a value at or below this node contains $name.
+bool uses(const YAML::Node &node, const std::string &name)
+{
+    if (node.IsScalar()) {
+        const std::string &text = node.Scalar();
+        const std::string variable = "$" + name;
+        for (size_t at = text.find(variable); at != std::string::npos; at = text.find(variable, at + 1)) {
+            const size_t end = at + variable.size();
+            if (end == text.size() ||
+                (std::isalnum(static_cast<unsigned char>(text[end])) == 0 && text[end] != '_')) {
+                return true;
+            }
+        }
+        return false;
+    }
+    return std::any_of(node.begin(), node.end(), [&name](const auto &item) {
+        return uses(item.IsDefined() ? item : item.second, name);
+    });
+}
+
 } // namespace
+
+void refuse_unused_variables(const Map &document)
+{
+    const auto is_used = [&document](const std::string &name) {
+        const auto &keys = document.keys();
+        return std::any_of(keys.begin(), keys.end(), [&](const std::string &key) {
+            return key != "sweep" && key != "cases" && uses(document.at(key).node(), name);
+        });
+    };
+    const auto refuse = [&is_used](const Map &map) {
+        for (const std::string &key : map.keys()) {
+            if (key != "name" && !is_used(key)) {
+                throw InputError(map.key_place(key),
+                                 "variable \"" + key + "\" is used nowhere: each run is the same");
+            }
+        }
+    };
+    if (const auto cases = document.find("cases")) {
+        refuse(Map(cases->list().front()));
+    }
+    if (const auto sweep = document.find("sweep")) {
+        refuse(Map(*sweep));
+    }
+}
 
 std::vector<std::string> variable_names(const Map &document)
 {

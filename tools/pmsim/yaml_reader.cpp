@@ -1,8 +1,11 @@
 #include "tools/pmsim/yaml_reader.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
+#include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 
@@ -46,7 +49,12 @@ Value::Value(const YAML::Node &node, std::string file, const Variables *variable
 Value Value::from_text(const std::string &text, const std::string &name, const Variables *variables)
 {
     try {
-        return Value(YAML::Load(text), name, variables);
+        const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+        if (documents.size() > 1) {
+            throw InputError(place_of(documents[1].Mark(), name),
+                             "a second document begins here; one is read");
+        }
+        return Value(documents.empty() ? YAML::Node() : documents[0], name, variables);
     } catch (const YAML::Exception &error) {
         throw InputError(place_of(error.mark, name), error.msg);
     }
@@ -54,10 +62,17 @@ Value Value::from_text(const std::string &text, const std::string &name, const V
 
 Value Value::from_file(const std::string &path, const Variables *variables)
 {
+    if (std::filesystem::is_directory(path)) {
+        throw InputError(path + ": cannot be read: it is a folder");
+    }
+    errno = 0;
     std::ifstream in(path, std::ios::binary);
     std::ostringstream text;
-    if (!in || !(text << in.rdbuf())) {
-        throw InputError(path + ": cannot be read");
+    if (!in) {
+        throw InputError(path + ": cannot be read: " + std::strerror(errno));
+    }
+    if (!(text << in.rdbuf())) {
+        throw InputError(path + (in.bad() ? ": cannot be read" : ": is empty"));
     }
     note_input(path);
     return from_text(text.str(), path, variables);
@@ -277,7 +292,11 @@ std::optional<Value> Map::find(const std::string &key) const
     if (!has(key)) {
         return std::nullopt;
     }
-    return Value(value_.node()[key], value_.file(), value_.variables());
+    const YAML::Node node = value_.node()[key];
+    if (node.IsNull()) { // whose place is where the next one begins
+        throw InputError(key_place(key), "key \"" + key + "\": a value is missing");
+    }
+    return Value(node, value_.file(), value_.variables());
 }
 
 Value Map::at(const std::string &key) const

@@ -238,6 +238,43 @@ TEST(ScenarioFile, SettingsThatAreWrong)
               "--set flux_bandwidth:1:1: expected a number, found \"abc\"; a unit belongs in the key");
 }
 
+TEST(ScenarioFile, AnEventBehindTheEndIsRefused)
+{
+    EXPECT_EQ(event_error("{t_s: 0.31, enable: true}"),
+              "s.yaml:6:5: the event lies after the end of the run (duration_s 0.3)");
+    EXPECT_EQ(event_error("{t_s: 0.3, enable: true}"), "no error");
+    const std::string late = replaced(small_scenario(), "t_s: 0,", "t_s: 0.25,");
+    EXPECT_EQ(error_of([&] { load(late, {{"duration_s", "0.2"}}); }), "no error"); // cut short on purpose
+    const std::string never = replaced(small_scenario() + "sweep: {t: [100]}\n", "t_s: 0,", "t_s: $t,");
+    EXPECT_EQ(error_of([&] { load(never); }), "no error");
+}
+
+TEST(ScenarioFile, BothEndsOfABoundAreGivenOnce)
+{
+    for (const char *other : {"max: 2", "min: -2"}) {
+        EXPECT_EQ(expectation_error(std::string("{metric: quality_min, max_abs: 1, ") + other + ", book: x}"),
+                  "s.yaml:8:5: `max_abs` stands for both ends: give it, or `min` and `max`");
+    }
+}
+
+TEST(ScenarioFile, TheFractionIsOneOfRatedSpeed)
+{
+    EXPECT_THAT(expectation_error("{metric: time_to_speed_s, fraction: 7, max: 1, book: x}"),
+                HasSubstr("s.yaml:8:41: 7 is out of range 0 ... 3"));
+}
+
+TEST(ScenarioFile, ASettingNamesTheNearestKey)
+{
+    const auto error = [](const std::string &name) {
+        return error_of([&] { load(small_scenario(), {{name, "1"}}); });
+    };
+    EXPECT_THAT(error("R_s_ohm"), HasSubstr("did you mean \"electrical.R_s_ohm\"?"));
+    EXPECT_THAT(error("L_q0_mH"), HasSubstr("did you mean \"electrical.L_q0_H\"?"));
+    EXPECT_THAT(error("flux_bandwith"), HasSubstr("did you mean \"flux_bandwidth\"?"));
+    EXPECT_THAT(error("quux"),
+                HasSubstr("known: seed, duration_s, start.theta_e_deg, machine, what `pmsim params` lists"));
+}
+
 // Every run of every scenario of the project can be read.
 TEST(ScenarioFile, TheProjectsScenariosLoad)
 {

@@ -49,6 +49,27 @@ TEST(Sweep, StepsDoNotDrift)
     EXPECT_EQ(runs[10].variables.at("x"), "1");
 }
 
+TEST(Sweep, TwoCasesOfOneNameAreRefused)
+{
+    EXPECT_EQ(error_of([] { runs_of("cases:\n  - {name: a, R: 1}\n  - {name: a, R: 2}\n"); }),
+              "s.yaml:3:5: a second case of the name \"a\"");
+    EXPECT_EQ(error_of([] { runs_of("cases:\n  - {R: 1}\n  - {R: 1}\n"); }),
+              "s.yaml:3:5: a second case of the name \"R=1\"");
+}
+
+TEST(Sweep, AVariableThatIsUsedNowhereIsRefused)
+{
+    const auto error = [](const std::string &text) {
+        return error_of([&] { refuse_unused_variables(Map(Value::from_text(text, "s.yaml"))); });
+    };
+    EXPECT_EQ(error("sweep: {x: [1, 2]}\nprofile: [{t_s: 0, load_rel: 2*$x}]\n"), "no error");
+    EXPECT_EQ(error("cases: [{name: a, R: 1}]\ndrive: {R_s: $R}\n"), "no error");
+    EXPECT_EQ(error("sweep: {x: [1, 2]}\nprofile: [{t_s: 0, load_rel: 2*$xy}]\n"),
+              "s.yaml:1:9: variable \"x\" is used nowhere: each run is the same");
+    EXPECT_EQ(error("cases: [{name: a, R: 1}]\nsweep: {x: [$R]}\nprofile: [{load_rel: $x}]\n"),
+              "s.yaml:1:19: variable \"R\" is used nowhere: each run is the same");
+}
+
 TEST(Sweep, CasesAreCrossedWithTheGrid)
 {
     const std::vector<pmsim::Run> runs = runs_of("cases:\n"

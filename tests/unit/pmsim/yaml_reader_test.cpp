@@ -1,5 +1,7 @@
 #include "tools/pmsim/yaml_reader.h"
 
+#include <fstream>
+
 #include <gmock/gmock.h>
 
 #include "tests/unit/pmsim/support.h"
@@ -30,7 +32,19 @@ TEST(YamlReader, SyntaxErrorNamesThePlace)
 
 TEST(YamlReader, MissingFile)
 {
-    EXPECT_EQ(error_of([] { Value::from_file("no/such.yaml"); }), "no/such.yaml: cannot be read");
+    EXPECT_EQ(error_of([] { Value::from_file("no/such.yaml"); }),
+              "no/such.yaml: cannot be read: No such file or directory");
+    EXPECT_EQ(error_of([] { Value::from_file("tests"); }), "tests: cannot be read: it is a folder");
+    const std::string empty = testing::TempDir() + "empty.yaml";
+    std::ofstream(empty).close();
+    EXPECT_EQ(error_of([&] { Value::from_file(empty); }), empty + ": is empty");
+}
+
+TEST(YamlReader, ASecondDocumentIsNotPassedOver)
+{
+    EXPECT_EQ(error_of([] { parse("a: 1\n---\nb: 2\n"); }),
+              "f.yaml:3:1: a second document begins here; one is read");
+    EXPECT_EQ(error_of([] { parse("---\na: 1\n...\n"); }), "no error");
 }
 
 TEST(YamlReader, UnknownKeyNamesThePlaceAndTheNearest)
@@ -72,6 +86,8 @@ TEST(YamlReader, MissingKeyNamesTheMapping)
 TEST(YamlReader, MissingValue)
 {
     EXPECT_THAT(error_of([] { Map(parse("a:\n")).at("a").number(0, 1); }), HasSubstr("a value is missing"));
+    EXPECT_EQ(error_of([] { Map(parse("a: 1\nb:\nc: 2\n")).at("b"); }),
+              "f.yaml:2:1: key \"b\": a value is missing");
 }
 
 TEST(YamlReader, MappingExpected)
