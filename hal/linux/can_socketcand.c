@@ -32,6 +32,11 @@ static bool tcp_open(can_link_t *link, const char *address, char *error, size_t 
     }
     memcpy(host, address, (size_t)(colon - address));
     host[colon - address] = '\0';
+    char *end;
+    const unsigned long port = strtoul(colon + 1, &end, 10);
+    if (end == colon + 1 || *end != '\0' || port > 65535UL) {
+        return refuse(error, error_size, address, "a port is a number up to 65535");
+    }
     const struct addrinfo hints = {.ai_family = AF_INET, .ai_socktype = SOCK_STREAM};
     struct addrinfo *found = NULL;
     const int problem = getaddrinfo(host, colon + 1, &hints, &found);

@@ -1,5 +1,9 @@
 #include "tools/pmsim/command_line.h"
 
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+
 #include <CLI/CLI.hpp>
 
 namespace pmsim
@@ -25,7 +29,12 @@ Option *Option::show_default()
 
 Option *Option::positive()
 {
-    option->check(CLI::PositiveNumber);
+    option->check([](const std::string &text) {
+        double value = 0.0;
+        const bool is_number = CLI::detail::lexical_cast(text, value);
+        return !is_number || (value > 0.0 && std::isfinite(value)) ? std::string()
+                                                                   : text + " must be a number above 0";
+    });
     return this;
 }
 
@@ -151,6 +160,16 @@ std::optional<int> CommandLine::parse(int argc, char **argv)
         return app->exit(error) == 0 ? 0 : 2;
     }
     return std::nullopt;
+}
+
+int finish(int exit_code)
+{
+    std::cout.flush();
+    const bool is_complete = std::cout.good() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+    if (!is_complete) {
+        std::fprintf(stderr, "pmsim: standard output cannot be written\n");
+    }
+    return is_complete ? exit_code : 2;
 }
 
 } // namespace pmsim

@@ -95,6 +95,9 @@ class CommandLine : public Command
     std::optional<int> parse(int argc, char **argv);
 };
 
+// The exit code, or 2, which is then said, where standard output did not take all that was printed.
+int finish(int exit_code);
+
 } // namespace pmsim
 
 #endif

@@ -43,7 +43,7 @@ void add_record_command(Command &app)
     auto options = std::make_shared<Options>();
     command->add_option("scenario", options->scenario, "scenario file (YAML)")->required();
     command->add_option("--out", options->out, "file to write; format: tools/pmsim/record.h")->required();
-    command->add_option("--periods", options->periods, "stop after this many control periods");
+    command->add_option("--periods", options->periods, "stop after this many control periods")->positive();
     command->add_option("--set", options->settings, settings_help())->one_each();
     command->footer(
         "The record holds converter codes, commands and timer counts of every control period, so a\n"

@@ -24,11 +24,11 @@ int main(int argc, char **argv)
     pmsim::add_record_command(app);
     try {
         if (const std::optional<int> code = app.parse(argc, argv)) {
-            return *code;
+            return pmsim::finish(*code);
         }
     } catch (const std::exception &error) {
         std::cerr << "pmsim: " << error.what() << '\n';
         return 2;
     }
-    return exit_code;
+    return pmsim::finish(exit_code);
 }

@@ -15,6 +15,12 @@ static std::string value_text(const Outcome &outcome)
     return outcome.value.text.empty() ? format(outcome.value.number, 4) : outcome.value.text;
 }
 
+// For people: a metric that saw nothing has no number.
+static std::string shown(const Outcome &outcome)
+{
+    return outcome.value.text.empty() && std::isnan(outcome.value.number) ? "no sample" : value_text(outcome);
+}
+
 // Of the seeds' worst runs, by how far they are from the bound.
 static void rank_seeds(Verdict &verdict, const std::map<std::string, Outcome> &worst_of_seed)
 {
@@ -105,7 +111,7 @@ std::string verdict_lines(const ScenarioFile &file, const std::vector<Verdict> &
         char line[512];
         std::snprintf(line, sizeof line, "%s  %-*s  %9s  %s%s%s  (%s)",
                       verdict.passed == verdict.runs ? "PASS" : "FAIL", static_cast<int>(width),
-                      e.label.c_str(), value_text(verdict.worst).c_str(), bound_text(e).c_str(),
+                      e.label.c_str(), shown(verdict.worst).c_str(), bound_text(e).c_str(),
                       e.unit.empty() || e.unit == "1" ? "" : " ", e.unit == "1" ? "" : e.unit.c_str(),
                       e.book.c_str());
         text += line;
@@ -114,7 +120,7 @@ std::string verdict_lines(const ScenarioFile &file, const std::vector<Verdict> &
                     ", worst: " + file.runs()[verdict.worst_run].name;
         }
         if (verdict.seeds > 1) {
-            text += "; median of " + std::to_string(verdict.seeds) + " seeds " + value_text(verdict.median);
+            text += "; median of " + std::to_string(verdict.seeds) + " seeds " + shown(verdict.median);
         }
         text += '\n';
     }

@@ -72,9 +72,13 @@ void add_run_options(Command &command, RunOptions &options)
         "--out", options.out,
         "folder for trace.csv, summary.txt, result.json and, with a sweep, runs.csv; the trace "
         "shows the worst run");
-    command.add_option("--decimate", options.decimate,
-                       "one trace row every N periods (default: at most 20000 rows)");
-    command.add_option("--jobs", options.jobs, "runs of a sweep at the same time")->show_default();
+    command
+        .add_option("--decimate", options.decimate,
+                    "one trace row every N periods (default: at most 20000 rows)")
+        ->positive();
+    command.add_option("--jobs", options.jobs, "runs of a sweep at the same time")
+        ->positive()
+        ->show_default();
     command
         .add_option(
             "--seeds", options.seeds,

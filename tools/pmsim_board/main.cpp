@@ -165,7 +165,7 @@ int main(int argc, char **argv)
         "  pmsim board out/build/stm32g431/pmdrive.elf tests/scenario/node.yaml --can vcan0");
     try {
         const std::optional<int> code = app.parse(argc, argv);
-        return code ? *code : run(options, board, node);
+        return finish(code ? *code : run(options, board, node));
     } catch (const std::exception &error) {
         std::cerr << "pmsim board: " << error.what() << '\n';
         return 2;

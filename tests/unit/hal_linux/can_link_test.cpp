@@ -200,7 +200,9 @@ TEST(Socketcand, RubbishIsSkippedAndTheNextClientServed)
 
 TEST(Socketcand, NeedsHostAndPort)
 {
-    for (const char *name : {"socketcand:", "socketcand:localhost", "socketcand:localhost:notaport"}) {
+    for (const char *name :
+         {"socketcand:", "socketcand:localhost", "socketcand:localhost:notaport",
+          "socketcand:localhost:", "socketcand:localhost:65536", "socketcand:localhost:99999"}) {
         char error[200] = "";
         EXPECT_EQ(can_link_open(name, error, sizeof error), nullptr) << name;
         EXPECT_NE(std::string(error), "") << name;
