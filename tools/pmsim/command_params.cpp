@@ -19,14 +19,15 @@ extern "C" {
 namespace pmsim
 {
 
-static void print_parameters()
+// Between the limits the defaults, or the values of a machine.
+static void print_parameters(const char *title, const drive_params_t &params)
 {
-    std::printf("%-24s %-7s %12s %12s %12s  %s\n", "name", "unit", "min", "default", "max", "help");
+    std::printf("%-24s %-7s %12s %12s %12s  %s\n", "name", "unit", "min", title, "max", "help");
     for (int i = 0; i < DRIVE_PARAM_COUNT; ++i) {
         const auto id = static_cast<drive_param_id_t>(i);
         const drive_param_info_t &info = drive_param_table[id];
         std::printf("%-24s %-7s %12s %12s %12s  %s\n", info.name, drive_param_text[id].unit,
-                    format(parameter_si(id, info.min)).c_str(), format(parameter_si(id, info.def)).c_str(),
+                    format(parameter_si(id, info.min)).c_str(), format(parameter_si(params, id)).c_str(),
                     format(parameter_si(id, info.max)).c_str(), drive_param_text[id].help);
     }
 }
@@ -56,11 +57,17 @@ void warn_of_board(const Setup &setup)
     }
 }
 
+Setup read_setup(const PageOptions &options)
+{
+    Setup setup = load_plant_file(options.machine, parse_settings(options.settings)).setup;
+    require_drive(setup);
+    return setup;
+}
+
 // The page of the parameter store that a board finds at its next start.
 void write_page(const PageOptions &options)
 {
-    const Setup setup = load_plant_file(options.machine, parse_settings(options.settings)).setup;
-    require_drive(setup);
+    const Setup setup = read_setup(options);
     uint32_t words[STORE_WORDS];
     const char *refused = nullptr;
     const char *reason = nullptr;
@@ -90,9 +97,9 @@ static void print_metrics()
 
 void add_params_command(Command &app)
 {
-    Command *command =
-        app.add_subcommand("params", "Print the drive's parameters: name, unit, range, default, help; or "
-                                     "make the page of them that a board is given");
+    Command *command = app.add_subcommand(
+        "params", "Print the drive's parameters: name, unit, range, default or a machine's "
+                  "value, help; or make the page of them that a board is given");
     auto options = std::make_shared<PageOptions>();
     Option *machine =
         command->add_option("--machine", options->machine, "machine file whose parameters to take");
@@ -104,10 +111,12 @@ void add_params_command(Command &app)
                     "  pmsim params --machine tuned.yaml --page my_motor.bin && tools/flash --parameters "
                     "my_motor.bin");
     command->callback([options] {
-        if (options->page.empty()) {
-            print_parameters();
-        } else {
+        if (!options->page.empty()) {
             write_page(*options);
+        } else if (!options->machine.empty()) {
+            print_parameters("value", *read_setup(*options).params);
+        } else {
+            print_parameters("default", *Parameters());
         }
     });
 }

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -11,6 +12,7 @@
 #include "tools/pmsim/notes.h"
 #include "tools/pmsim/plant_run.h"
 #include "tools/pmsim/settings_option.h"
+#include "tools/pmsim/text.h"
 
 namespace pmsim
 {
@@ -81,9 +83,26 @@ void write_all(const std::string &path, const std::string &text)
     throw InputError(path + ": cannot be written");
 }
 
+// Without the drive its parameters do nothing.
+void refuse_parameters(const Settings &settings, const Value &document)
+{
+    const std::vector<std::string> variables = variable_names(Map(document));
+    for (const auto &[name, value] : settings) {
+        const std::string parameter = name.rfind("drive.", 0) == 0 ? name.substr(6) : name;
+        if (find_parameter(parameter) &&
+            std::find(variables.begin(), variables.end(), name) == variables.end()) {
+            throw InputError("--set " + name + ": a parameter of the drive has no effect on the plant alone" +
+                             did_you_mean(nearest_key(parameter)));
+        }
+    }
+}
+
 void run(const Options &options)
 {
-    const PlantFile file = load_plant_file(options.machine, parse_settings(options.settings));
+    const Settings settings = parse_settings(options.settings);
+    const Value document = Value::from_file(options.machine);
+    refuse_parameters(settings, document);
+    const PlantFile file = read_plant_file(document, settings);
     const unsigned floating = floating_legs(options.floating, file.setup);
     const Csv input = load_plant_input(options.input, file.setup, floating);
     check_out(options);

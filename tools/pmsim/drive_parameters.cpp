@@ -94,17 +94,18 @@ void read_parameter(drive_params_t &params, const std::string &name, const Value
                    (name == "f_pwm" ? "f_pwm_Hz" : "timer_counts"));
     }
     const drive_param_info_t &info = drive_param_table[*id];
-    const std::string unit = drive_param_text[*id].unit;
+    const std::string name_of_unit = drive_param_text[*id].unit;
+    const std::string unit = name_of_unit == "1" ? "" : " " + name_of_unit;
     const double si = value.number(std::numeric_limits<double>::lowest(), std::numeric_limits<double>::max());
     const double raw = std::round(in_steps(*id, si));
     if (raw < info.min || raw > info.max) {
-        value.fail(name + " = " + format(si) + " " + unit + " is out of range " +
-                   format(parameter_si(*id, info.min)) + " ... " + format(parameter_si(*id, info.max)) + " " +
+        value.fail(name + " = " + format(si) + unit + " is out of range " +
+                   format(parameter_si(*id, info.min)) + " ... " + format(parameter_si(*id, info.max)) +
                    unit);
     }
     if (std::fabs(raw - in_steps(*id, si)) > max_rounding * std::fabs(in_steps(*id, si))) {
-        value.fail(name + " = " + format(si) + " " + unit + " cannot be stored: the step is " +
-                   format(parameter_si(*id, 1)) + " " + unit);
+        value.fail(name + " = " + format(si) + unit + " cannot be stored: the step is " +
+                   format(parameter_si(*id, 1)) + unit);
     }
     drive_param_set(&params, *id, static_cast<int32_t>(raw));
 }

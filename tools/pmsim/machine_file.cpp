@@ -118,9 +118,21 @@ std::optional<Value> setting_value(const Settings &settings, const std::string &
     return std::nullopt;
 }
 
+std::optional<std::string> nearest_key(const std::string &name)
+{
+    for (const char *section :
+         {"electrical", "mechanics", "winding", "rated", "inverter", "sensor", "dclink", "solver"}) {
+        if (const auto key = nearest(name, section_keys(section))) {
+            return std::string(section) + "." + *key;
+        }
+    }
+    return std::nullopt;
+}
+
 void check_settings(const Settings &settings, std::vector<std::string> known)
 {
     known.emplace_back("machine");
+    const std::string own = join(known, ", ");
     const std::vector<std::string> &parameters = parameter_names();
     known.insert(known.end(), parameters.begin(), parameters.end());
     for (const std::string &section : setup_sections()) {
@@ -131,9 +143,12 @@ void check_settings(const Settings &settings, std::vector<std::string> known)
     }
     for (const auto &setting : settings) {
         if (std::find(known.begin(), known.end(), setting.first) == known.end()) {
-            const auto near = nearest(setting.first, known);
-            throw InputError("--set " + setting.first + ": no such variable, drive parameter or section.key" +
-                             did_you_mean(near));
+            auto near = nearest(setting.first, known);
+            near = near ? near : nearest_key(setting.first);
+            throw InputError(
+                "--set " + setting.first + ": no such variable, drive parameter or section.key" +
+                (near ? did_you_mean(near)
+                      : "; known: " + own + ", what `pmsim params` lists, and keys by their section"));
         }
     }
 }

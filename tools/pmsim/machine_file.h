@@ -33,6 +33,9 @@ std::optional<Value> setting_value(const Settings &settings, const std::string &
 // Refuses a name that is none of `known`, no drive parameter and no section.key.
 void check_settings(const Settings &settings, std::vector<std::string> known);
 
+// "section.key" of the key that is called so, but for its unit, or nearly so; nothing where there is none.
+std::optional<std::string> nearest_key(const std::string &name);
+
 // A number in degrees, or the word random.
 double read_angle(const Value &value, uint64_t seed);
 

@@ -3,6 +3,7 @@
 import csv
 import json
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -70,7 +71,6 @@ def check_run(folder, scenario):
     rows = list(csv.DictReader((folder / "seeds" / "runs.csv").open()))
     assert [row["seed"] for row in rows] == ["1", "2"] and rows[0]["angle_error_max_deg"] != rows[1]["angle_error_max_deg"], rows
     assert json.loads((folder / "seeds" / "result.json").read_text())["runs"] == 2
-    expect_exit(2, "run", scenario, "--seeds", 0)
     failed = expect_exit(1, "run", scenario, "--set", "sensor.offset_A=[1, 0, 0]")
     assert "FAIL  " in failed.stdout, failed.stdout
 
@@ -84,6 +84,26 @@ def check_refusals(folder, scenario):
     expect_exit(2, "run", scenario, "--set", "no_such=1")
     expect_exit(2, "run", scenario, "--set", "flux_bandwidth")
     expect_exit(2, "record", scenario, "--out", folder / "x.rec")
+    for command, option, value in (("run", "--seeds", 0), ("run", "--jobs", -3), ("run", "--decimate", 0), ("bench", "--repeat", 0),
+                                   ("record", "--periods", 0), ("record", "--periods", -1), ("node", "--duration", 0),
+                                   ("node", "--duration", "nan")):
+        message = expect_exit(2, command, scenario, option, value).stderr
+        assert message.startswith(f"{option}: {value} must be a number above 0\n"), message
+
+
+def check_full_output(scenario):
+    """What was printed did not arrive: not the exit code of success."""
+    for arguments in (("params",), ("--help",), ("run", scenario, "--set", "angle=30"), ("run", scenario, "--set", "angle=30", "--json")):
+        with open("/dev/full", "w", encoding="utf-8") as full:
+            result = subprocess.run([PMSIM, *map(str, arguments)], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        assert result.returncode == 2 and "standard output cannot be written" in result.stderr, (arguments, result)
+
+
+def check_no_sample(folder, scenario):
+    few = folder / "no_sample.yaml"
+    few.write_text(scenario.read_text() + "  - {metric: angle_error_mean_deg, window_s: [0, 0.001], max: 30, book: \"5.9\"}\n")
+    result = expect_exit(1, "run", few, "--set", "angle=30")
+    assert re.search(r"FAIL  angle_error_mean_deg\S* +no sample  <= 30", result.stdout), result.stdout
 
 
 def check_inputs_are_safe(folder, scenario):
@@ -131,6 +151,9 @@ def check_page(folder):
     assert "t_settle" not in message, message
     message = expect_exit(0, "params", "--machine", whole, *board[4:], "--set", "v_dc_max=31.9", "--page", page).stderr
     assert "t_settle is 0" in message and "shunt: low_side" in message and "refuses" not in message, message
+    shown = expect_exit(0, "params", "--machine", whole, "--set", "R_s=0.4").stdout.splitlines()
+    values = {line.split()[0]: line.split()[3] for line in shown if line.split()[1] in ("ohm", "Wb")}
+    assert values["R_s"] == "0.4" and values["psi_m"] == "0.006395", values
     few = folder / "few.yaml"
     few.write_text(whole.read_text().replace("torque_rated_Nm", "# torque_rated_Nm"))
     message = expect_exit(2, "params", "--machine", few, "--page", page).stderr
@@ -156,6 +179,8 @@ def main():
         check_run(folder, scenario)
         check_refusals(folder, scenario)
         check_inputs_are_safe(folder, scenario)
+        check_full_output(scenario)
+        check_no_sample(folder, scenario)
         check_page(folder)
         check_node_examples()
         record = folder / "small.rec"

@@ -82,6 +82,9 @@ def check_table_errors(folder):
 def check_other_errors(folder):
     folder.refused(ROWS, "none.yaml: cannot be read", "none.yaml")
     folder.refused(ROWS, "--set electrical.R_s_mohm", MACHINE, "--set", "electrical.R_s_mohm=1")
+    for parameter in ("R_s", "drive.R_s"):
+        folder.refused(ROWS, f"--set {parameter}: a parameter of the drive has no effect on the plant alone; did you mean "
+                       "\"electrical.R_s_ohm\"?", MACHINE, "--set", f"{parameter}=50")
     folder.refused(ROWS, "vx_V\" is missing", "sim_plant/machines/dtp_400.yaml")
     folder.input.unlink()
     result = expect_exit(2, "plant", MACHINE, "--input", folder.input, "--out", folder.out)
