@@ -38,6 +38,8 @@ def _c_files(render, dictionary, sheet):
     groups = [(obj.name, emit_c.runs([e for e in obj.entries if e.lives == "parameter"], of_image)) for obj in dictionary.objects
              if obj.entries[-1].lives == "parameter" and not obj.entries[-1].alias]
     render("firmware/params/parameters.def", "parameters.def.j2", parts=groups)
+    render("tools/pmsim/parameter_values.def", "parameter_values.def.j2",
+           entries=[e for e in dictionary.of("parameter") if e.values and not e.alias])
     render("firmware/app/error_codes.def", "error_codes.def.j2", faults=dictionary.faults)
     node = dictionary.of("node")
     render("firmware/can/dictionary_slots.h", "dictionary_slots.h.j2", words=[e for e in node if not model.is_mapping(e)],

@@ -83,6 +83,26 @@ bool belongs_to_inverter(const std::string &name)
     return name == "f_pwm" || name == "timer_counts";
 }
 
+// ": 0 fields; 1 blocks" of a parameter that is a choice.
+static std::string choices(drive_param_id_t id)
+{
+    static const struct {
+        drive_param_id_t id;
+        const char *text;
+    } values[] = {
+#define PM_VALUE(name, value, meaning) {DRIVE_PARAM_##name, #value " " meaning},
+#include "tools/pmsim/parameter_values.def"
+#undef PM_VALUE
+    };
+    std::vector<std::string> found;
+    for (const auto &value : values) {
+        if (value.id == id) {
+            found.emplace_back(value.text);
+        }
+    }
+    return found.empty() ? "" : ": " + join(found, "; ");
+}
+
 void read_parameter(drive_params_t &params, const std::string &name, const Value &value)
 {
     const auto id = find_parameter(name);
@@ -101,7 +121,7 @@ void read_parameter(drive_params_t &params, const std::string &name, const Value
     if (raw < info.min || raw > info.max) {
         value.fail(name + " = " + format(si) + unit + " is out of range " +
                    format(parameter_si(*id, info.min)) + " ... " + format(parameter_si(*id, info.max)) +
-                   unit);
+                   unit + choices(*id));
     }
     if (std::fabs(raw - in_steps(*id, si)) > max_rounding * std::fabs(in_steps(*id, si))) {
         value.fail(name + " = " + format(si) + unit + " cannot be stored: the step is " +

@@ -11,6 +11,7 @@ namespace
 {
 
 using testing::HasSubstr;
+using testing::MatchesRegex;
 
 drive_params_t defaults()
 {
@@ -61,6 +62,8 @@ TEST(DriveParameters, OutOfRange)
     EXPECT_THAT(error_for("pole_pairs", "0"),
                 HasSubstr("f.yaml:1:1: pole_pairs = 0 is out of range 1 ... 50"));
     EXPECT_THAT(error_for("R_s", "1e9"), HasSubstr("R_s = 1e+09 ohm is out of range"));
+    EXPECT_THAT(error_for("commutation", "9"),
+                MatchesRegex("f.yaml:1:1: commutation = 9 is out of range 0 ... 1: 0 [^;]+; 1 [^;]+"));
     EXPECT_THAT(error_for("R_s", "nan"), HasSubstr("finite"));
 }
 
