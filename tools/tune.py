@@ -24,8 +24,11 @@ not asked for where `drive:` tells all three, v_injection, f_injection and injec
 `commutation: 1` in `drive:` asks for block commutation, `trapezoid_flat_deg` in `winding:` says that the EMF is a trapezoid.
 """
 import argparse
+import difflib
 import importlib
 import math
+import os
+import re
 import sys
 import types
 from decimal import Decimal
@@ -55,39 +58,128 @@ LEAST_PER_TURN = 13  # the drive refuses less than 12.6
 PER_RISE = 3  # periods of L / R
 RIPPLE = 6  # of the phase current, peak to peak: v_dc / (6 L f_pwm) at its most
 BELOW = "the motor's; below L_d: i_d = 0 and no injection, which costs less than (L_d - L_q) i / psi_m squared, half"
-OTHERS = "name", "path", "electrical", "winding", "mechanics", "rated", "inverter", "sensor", "dclink", "drive"
+OTHERS = "name", "electrical", "winding", "mechanics", "rated", "inverter", "sensor", "dclink", "drive"
+
+
+def fields():
+    """{(section, key): (least, most)} of a machine file, as pmsim has them; None of what is no number."""
+    text = (Path(__file__).parent / "pmsim" / "setup_fields.cpp").read_text(encoding="utf-8")
+    found = {}
+    for kind, section, key, least, most in re.findall(r'PM_(\w+)\("(\w+)",\s*"(\w+)",\s*([^,]+),\s*([^,]+),', text):
+        is_number = kind == "FIELD" and (least, most) != ("0", "0") and key not in FLAGS
+        found[section, key] = (float(least), math.inf if most == "PLANT_SETS" else float(most)) if is_number else None
+    return found
+
+
+FLAGS = "locked", "source_blocks"
+WHOLE = "pole_pairs", "sets", "bits", "timer_counts"
+FIELDS = fields()
+SECTIONS = {section for section, _ in FIELDS} | {"drive", "flux_map"}
+PARAMETERS = {entry.name: entry for entry in names.dictionary.ENTRIES if entry.record in names.DRIVE_RECORDS}
+OF_INVERTER = {"f_pwm": "f_pwm_Hz", "timer_counts": "timer_counts"}
+NUMBER = re.compile(r"-?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+
+
+def refuse(path, node, what):
+    raise UsageError(f"{path}:{node.start_mark.line + 1}:{node.start_mark.column + 1}: {what}")
+
+
+def entries(path, node, section=""):
+    """{key: node of its value}, and of all below; each key once, each with a value."""
+    out, lines = {}, {}
+    for key, value in node.value:
+        if not isinstance(key, yaml.ScalarNode):
+            refuse(path, key, "a key must be a word")
+        if key.value in out:
+            refuse(path, key, f"key `{key.value}` stands here a second time; first at line {lines[key.value]}")
+        if value.tag == "tag:yaml.org,2002:null":
+            refuse(path, key, f"{section}{key.value}: a value is missing")
+        out[key.value], lines[key.value] = value, key.start_mark.line + 1
+        for item in value.value if isinstance(value, yaml.SequenceNode) else []:
+            if isinstance(item, yaml.MappingNode):
+                entries(path, item)
+    return out
+
+
+def did_you_mean(word, known):
+    near = difflib.get_close_matches(word, known, 1, 0.6)
+    return f"; did you mean `{near[0]}`?" if near else ""
+
+
+def number(path, node, what):
+    """As pmsim takes it: YAML itself would take 1e3 for a word, true for 1 and 010 for 8."""
+    if not isinstance(node, yaml.ScalarNode) or not NUMBER.fullmatch(node.value):
+        refuse(path, node, f"{what}: expected a number" + (f", found \"{node.value}\"" if isinstance(node, yaml.ScalarNode) else ""))
+    return float(node.value)
+
+
+def field(path, section, key, node):
+    """The value of a key that pmsim takes for a number within limits; None of others, which pmsim reads."""
+    what = f"{section}.{key}"
+    if (section, key) not in FIELDS:
+        refuse(path, node, f"unknown key {what}{did_you_mean(what, [f'{s}.{k}' for s, k in FIELDS if s == section])}")
+    if FIELDS[section, key] is None:
+        return None
+    value, (least, most) = number(path, node, what), FIELDS[section, key]
+    if not least <= value <= most:
+        refuse(path, node, f"{what} = {node.value} is out of range {least:g} ... {most:g}")
+    if key in WHOLE and value != int(value):
+        refuse(path, node, f"{what} = {node.value} is no whole number")
+    return value
+
+
+def parameter(path, key, node):
+    """The value of one in `drive:`, that the drive can store."""
+    what = f"drive.{key}"
+    if key not in PARAMETERS:
+        refuse(path, node, f"unknown parameter {what}{did_you_mean(key, list(PARAMETERS))}")
+    if key in OF_INVERTER:
+        refuse(path, node, f"{what} follows from the inverter: inverter.{OF_INVERTER[key]}")
+    value, entry = number(path, node, what), PARAMETERS[key]
+    raw = entry.raw(Decimal(node.value))
+    if not entry.least <= raw <= entry.most:
+        refuse(path, node, f"{what} = {node.value} is out of range {float(entry.least * entry.scale):g} ... {float(entry.most * entry.scale):g}")
+    if abs(float(raw * entry.scale) - value) > 0.01 * abs(value):
+        refuse(path, node, f"{what} = {node.value} cannot be stored: the step is {float(entry.scale):g}")
+    return value
 
 
 def read(path):
-    """The file's sections; an error names what is wrong with it."""
+    """The file's sections, checked as pmsim does (docs/pmsim.md); an error names the place and what is wrong there."""
     try:
-        with open(path, encoding="utf-8") as file:
-            x = yaml.safe_load(file)
-    except (OSError, yaml.YAMLError) as error:
-        raise UsageError(f"{path}: {' '.join(str(error).split())}") from None
-    if not isinstance(x, dict) or "name" not in x:
+        text = Path(path).read_text(encoding="utf-8")
+        root, x = yaml.compose(text, yaml.SafeLoader), yaml.safe_load(text)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        raise UsageError(f"{path}:{mark.line + 1}:{mark.column + 1}: {error.context or 'wrong here'}, {error.problem}") from None
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        reason = error.strerror if isinstance(error, OSError) else " ".join(str(error).split())
+        raise UsageError(f"{path}: {reason}") from None
+    if not isinstance(root, yaml.MappingNode):
         raise UsageError(f"{path}: no machine file: it needs `name`")
+    sections = entries(path, root)
+    if "name" not in sections:
+        raise UsageError(f"{path}: no machine file: it needs `name`")
+    for section, node in sections.items():
+        if section == "name":
+            continue
+        if section not in SECTIONS:
+            refuse(path, node, f"unknown section `{section}`{did_you_mean(section, list(SECTIONS))}")
+        if not isinstance(node, yaml.MappingNode):
+            refuse(path, node, f"`{section}` is no section")
+        for key, value in entries(path, node, section + ".").items():
+            found = parameter(path, key, value) if section == "drive" else None if section == "flux_map" else field(path, section, key, value)
+            if found is not None:
+                x[section][key] = found
     for section, keys in NEEDED.items():
-        values = x.get(section)
-        if not isinstance(values, dict):
+        if section not in sections:
             raise UsageError(f"{path}: it needs the section `{section}`")
         for key in keys:
-            number(path, section, key, values.get(key))
+            if key not in x[section]:
+                refuse(path, sections[section], f"{section}.{key} is needed, a number")
     for section in ("inverter", "sensor", "dclink", "drive"):
-        if not isinstance(x.setdefault(section, {}), dict):
-            raise UsageError(f"{path}: `{section}` is no section")
+        x.setdefault(section, {})
     return x
-
-
-def number(path, section, key, value):
-    """Of YAML, which takes 1e3 for a word; above 0."""
-    try:
-        value = float(value)
-    except (TypeError, ValueError):
-        raise UsageError(f"{path}: {section}.{key} is needed, a number") from None
-    if not 0 < value < math.inf:
-        raise UsageError(f"{path}: {section}.{key} = {value:g} is not above 0")
-    return value
 
 
 def above(value, steps):
@@ -146,7 +238,7 @@ def pwm_in_blocks(told, L, C):
 
 def complete(x):
     """What is not told of torque, inverter, sensors and link: {section: {key: (value, why)}}."""
-    told = {(section, key): number("", section, key, x[section][key]) for section, keys in NEEDED.items() for key in keys}
+    told = {(section, key): float(x[section][key]) for section, keys in NEEDED.items() for key in keys}
     v, i = told["rated", "v_dc_V"], told["rated", "i_rated_A"]
     poles = told["electrical", "pole_pairs"]
     low = v <= LOW_V
@@ -375,19 +467,22 @@ def main():
         if not 0 <= arguments.tolerance <= 0.5:
             raise UsageError(f"--tolerance {arguments.tolerance:g}: a share from 0 to 0.5")
         text = text_of(read(arguments.machine), arguments.tolerance)
-        if arguments.out is None:
-            sys.stdout.write(text)
-            return 0
-        with open(arguments.out, "x", encoding="utf-8") as file:
-            file.write(text)
+        if arguments.out is not None:
+            with open(arguments.out, "x", encoding="utf-8") as file:
+                file.write(text)
+            text = f"{arguments.out}: run it with\n  pmsim run tests/unit/tune/start.yaml --set machine={arguments.out}\n"
+        sys.stdout.write(text)
+        sys.stdout.flush()
     except UsageError as error:
         print(f"tools/tune.py: {error}", file=sys.stderr)
         return 2
     except FileExistsError:
         print(f"tools/tune.py: {arguments.out} is there already; nothing was written", file=sys.stderr)
         return 2
-    print(f"{arguments.out}: run it with\n"
-          f"  pmsim run tests/unit/tune/start.yaml --set machine={arguments.out}")
+    except OSError as error:
+        print(f"tools/tune.py: {error.filename or 'standard output'}: {error.strerror}", file=sys.stderr)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left there is not tried again at the end
+        return 2
     return 0
 
 

@@ -1,5 +1,6 @@
 """A campaign file, and what its runs are made of: run n depends on the file and n alone."""
 
+import re
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -141,13 +142,15 @@ class Campaign(CampaignFile):
 
     def _completed(self, told):
         with tempfile.NamedTemporaryFile("w", suffix=".yaml", encoding="utf-8") as file:
-            file.write(machine_text(told))
+            text = machine_text(told)
+            file.write(text)
             file.flush()
             try:
                 read = tune.read(file.name)
             except tune.UsageError as error:
-                reason = str(error).removeprefix(file.name + ": ")
-                raise SourceError(f"{self._section_place(reason)}: {reason}") from None
+                line, reason = re.match(r"(?::(\d+):\d+)?: (.*)", str(error).removeprefix(file.name), re.DOTALL).groups()
+                place = self.place_of(text, int(line)) if line else None
+                raise SourceError(f"{place or self._section_place(reason)}: {reason}") from None
         return yaml.load(tune.text_of(read), Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
 
     def _section_place(self, reason):

@@ -4,6 +4,7 @@ usage: tune_test.py PMSIM
 """
 import math
 import random
+import re
 import subprocess
 import sys
 import tempfile
@@ -17,6 +18,8 @@ TOOL = ROOT / "tools" / "tune.py"
 SCENARIO = Path(__file__).with_name("start.yaml")
 SATURATED = Path(__file__).with_name("saturated.yaml")
 PMSIM = None
+sys.path.insert(0, str(ROOT / "tools"))
+import tune  # noqa: E402
 
 # Name: R_s, L_d, L_q, psi_m, pole pairs, J, rated current, speed, link
 MOTORS = {
@@ -67,7 +70,8 @@ class Tune(unittest.TestCase):
         self.told = Path(self.folder.name) / "motor.yaml"
 
     def tune(self, told, *words):
-        self.told.write_text(told if isinstance(told, str) else yaml.safe_dump(told), encoding="utf-8")
+        if told is not None:  # else what stands there
+            self.told.write_text(told if isinstance(told, str) else yaml.safe_dump(told), encoding="utf-8")
         return subprocess.run([sys.executable, str(TOOL), str(self.told), *words], capture_output=True, text=True, check=False)
 
     def run_seeds(self, machine, scenario):
@@ -107,6 +111,51 @@ class Tune(unittest.TestCase):
         self.refused(told, "name")
         self.refused("a: [", "motor.yaml")
         self.refused({**motor("servo"), "drive": 3}, "drive")
+
+    def test_a_mistake_is_named_with_its_place(self):
+        """Each is the fifth line of a file that is right without it, or stands in its second."""
+        right = ("name: servo\nelectrical: {R_s_ohm: 1.2, L_d0_H: 4e-3, L_q0_H: 4.4e-3, psi_m_Wb: 0.06, pole_pairs: 4}\n"
+                 "mechanics: {J_kgm2: 1e-4}\nrated: {i_rated_A: 4, speed_rated_rad_s: 314, v_dc_V: 160}\n")
+        self.assertEqual(self.tune(right).returncode, 0)
+        for line, what in (("rated: {}", "5:1: key `rated` stands here a second time; first at line 4"),
+                           ("drive: {R_s: 1, R_s: 1}", "5:17: key `R_s` stands here a second time; first at line 5"),
+                           ("drive: {foo: 1}", "5:14: unknown parameter drive.foo"),
+                           ("drive: {flux_bandwith: 1}", "5:24: unknown parameter drive.flux_bandwith; did you mean `flux_bandwidth`?"),
+                           ("drive: {R_s: abc}", "5:14: drive.R_s: expected a number, found \"abc\""),
+                           ("drive: {commutation: true}", "5:22: drive.commutation: expected a number, found \"true\""),
+                           ("drive: {R_s: 1e9}", "5:14: drive.R_s = 1e9 is out of range 0.0001 ... 100"),
+                           ("drive: {pole_pairs: 4.5}", "5:21: drive.pole_pairs = 4.5 cannot be stored: the step is 1"),
+                           ("drive: {f_pwm: 20000}", "5:16: drive.f_pwm follows from the inverter: inverter.f_pwm_Hz"),
+                           ("drive:", "5:1: drive: a value is missing"),
+                           ("sensors: {bits: 12}", "5:10: unknown section `sensors`; did you mean `sensor`?"),
+                           ("sensor: {bits: 12.5}", "5:16: sensor.bits = 12.5 is no whole number"),
+                           ("---\nname: x", "5:1: expected a single document in the stream")):
+            self.refused(right + line + "\n", "motor.yaml:" + what)
+        for found, wrong, what in (("pairs: 4}", "pairs: 1.5}", "electrical.pole_pairs = 1.5 is no whole number"),
+                                   ("pairs: 4}", "pairs: true}", "electrical.pole_pairs: expected a number, found \"true\""),
+                                   ("pairs: 4}", "pairs: 4, c_A_Wb: 3}", "unknown key electrical.c_A_Wb; did you mean `electrical.c_A_Wb5`?"),
+                                   ("1.2,", "2e3,", "electrical.R_s_ohm = 2e3 is out of range 0.0001 ... 1000")):
+            self.refused(right.replace(found, wrong), "motor.yaml:2:", what)
+        self.told.write_bytes(b"name: \xff")
+        self.refused(None, "motor.yaml: ", "utf-8")
+
+    def test_kinds_of_numbers_are_those_of_pmsim(self):
+        """Each key that is a number here is one there, with the same limits, and all others are refused alike."""
+        self.assertEqual(tune.FIELDS["electrical", "pole_pairs"], (1, 50))
+        self.assertEqual(tune.FIELDS["winding", "sets"], (1, math.inf))
+        self.assertIsNone(tune.FIELDS["sensor", "shunt"])
+        self.assertIsNone(tune.FIELDS["mechanics", "locked"])
+        table = (ROOT / "tools/pmsim/setup_fields.cpp").read_text(encoding="utf-8")
+        self.assertEqual(len(tune.FIELDS), len(re.findall(r"^        PM_[A-Z]+\(", table, re.M)))
+
+    def test_output_that_is_lost_is_no_success(self):
+        self.told.write_text(yaml.safe_dump(motor("servo")), encoding="utf-8")
+        with open("/dev/full", "w", encoding="utf-8") as full:
+            result = subprocess.run([sys.executable, str(TOOL), str(self.told)], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        self.assertEqual((result.returncode, result.stderr), (2, "tools/tune.py: standard output: No space left on device\n"))
+        nowhere = Path(self.folder.name) / "none" / "out.yaml"
+        result = self.tune(motor("servo"), "-o", str(nowhere))
+        self.assertEqual((result.returncode, result.stderr), (2, f"tools/tune.py: {nowhere}: No such file or directory\n"))
 
     def test_what_cannot_be_is_said(self):
         told = motor("servo")
