@@ -85,7 +85,7 @@ drive_result_t app_configure(app_t *app, hal_t *hal, const drive_params_t *param
     app->hal = hal;
     app->slow_divider = 1;
     app->params = *params;
-    app_take_board(hal_board(hal), &app->params);
+    app_take_board(hal, &app->params);
     app->f_pwm = params->f_pwm;
     app->stored = stored;
     const drive_result_t result = drive_init(&app->drive, &app->params, hal_channels(hal));

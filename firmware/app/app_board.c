@@ -9,8 +9,9 @@ static void take(int32_t *parameter, int32_t value)
     }
 }
 
-void app_take_board(const hal_board_t *board, drive_params_t *params)
+void app_take_board(const hal_t *hal, drive_params_t *params)
 {
+    const hal_board_t *board = hal_board(hal);
     take(&params->i_full_scale, board->i_full_scale_mA);
     take(&params->v_full_scale, board->v_full_scale_mV);
     take(&params->shunt, board->shunt_uohm);
@@ -91,7 +92,7 @@ void app_preset(const hal_t *hal, drive_params_t *params)
     drive_params_default(params);
     const int32_t v = params->v_full_scale;
     const int32_t i = params->i_full_scale;
-    app_take_board(hal_board(hal), params);
+    app_take_board(hal, params);
     for (uint32_t n = 0; n < sizeof wound / sizeof wound[0]; n++) {
         const int32_t of_voltage =
             scaled(drive_param_get(params, wound[n].id), wound[n].of.v, params->v_full_scale, v);

@@ -32,7 +32,7 @@ bool app_identify_put(app_t *app, uint16_t slot, int32_t value);
 void app_identify_command(const app_t *app, drive_command_t *command); /* with what was left open */
 
 /* app_board.c: what the board's schematic says, in 2001h and 2700h; presets: their motor, wound for this board */
-void app_take_board(const hal_board_t *board, drive_params_t *params);
+void app_take_board(const hal_t *hal, drive_params_t *params);
 void app_preset(const hal_t *hal, drive_params_t *params);
 
 /* app_parameters.c: abort codes */

@@ -3,8 +3,9 @@
 #include <stddef.h>
 
 #include "firmware/app/app_parts.h"
+#include "hal/sim/port.h"
 
-/* hal/stm32g431/board.c, whose name for it is another one here: the host's port has it too */
+/* hal/stm32g431/board.c, under another name: the port of the host has one of its own */
 const hal_board_t *stm32g431_board(const hal_t *hal);
 
 static bool takes(const drive_params_t *params, const char **refused, const char **reason)
@@ -24,7 +25,9 @@ uint32_t parameter_page(const drive_params_t *params, uint32_t words[STORE_WORDS
 
 bool parameter_page_suits_board(const drive_params_t *params, const char **refused, const char **reason)
 {
+    static hal_t hal;
+    hal.board = *stm32g431_board(NULL);
     drive_params_t there = *params;
-    app_take_board(stm32g431_board(NULL), &there);
+    app_take_board(&hal, &there);
     return takes(&there, refused, reason);
 }

@@ -57,7 +57,7 @@ static const char *configure(const uint32_t page[], twin_scale_t *scale, const c
             drive_param_set(&params, (drive_param_id_t)entry->slot, pair.value);
         }
     }
-    app_take_board(hal_board(NULL), &params);
+    app_take_board(NULL, &params);
     const drive_result_t result = drive_init(&drive, &params, PM_CHANNELS);
     const rig_scale_t made = rig_scale(&drive.config.base, params.pole_pairs, drive.config.slow_divider);
     *scale = outside(&made);

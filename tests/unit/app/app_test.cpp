@@ -148,7 +148,7 @@ TEST(App, WhatTheBoardSaysIsInItsParameters)
     drive_params_t p;
     drive_params_default(&p);
     const int32_t R_s = p.R_s;
-    app_take_board(&x.loop.hal.board, &p);
+    app_take_board(&x.loop.hal, &p);
     EXPECT_EQ(p.i_full_scale, 60150);
     EXPECT_EQ(p.v_full_scale, 45000);
     EXPECT_EQ(p.shunt, 3000);
@@ -165,7 +165,7 @@ TEST(App, WhatTheBoardSaysIsInItsParameters)
     x.loop.hal.board = {};
     drive_params_default(&p);
     drive_params_t q = p;
-    app_take_board(&x.loop.hal.board, &q);
+    app_take_board(&x.loop.hal, &q);
     EXPECT_EQ(std::memcmp(&p, &q, sizeof p), 0);
 }
 

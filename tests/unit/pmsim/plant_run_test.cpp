@@ -201,7 +201,8 @@ TEST(PlantRun, ErrorsOfTheFile)
               "m.yaml:2:1: unknown key \"strat\"; did you mean \"start\"?");
     EXPECT_THAT(error("nam: x\n"), StartsWith("m.yaml:1:1: unknown key \"nam\""));
     EXPECT_THAT(error(linear, {{"mechanics.lokced", "true"}}), StartsWith("--set mechanics.lokced: no such"));
-    EXPECT_EQ(error_of([] { load_plant_file("none.yaml"); }), "none.yaml: cannot be read");
+    EXPECT_EQ(error_of([] { load_plant_file("none.yaml"); }),
+              "none.yaml: cannot be read: No such file or directory");
 }
 
 TEST(PlantRun, ErrorsOfTheInput)

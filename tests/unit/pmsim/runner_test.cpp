@@ -56,10 +56,10 @@ std::string trace_of(const std::string &text, const std::string &name)
 
 TEST(Runner, EachSeedHasItsWorstRunAndTheyAreRanked)
 {
-    ScenarioFile file = file_of(small_scenario() + "sweep: {unused: [0, 1]}\n");
+    ScenarioFile file = file_of(replaced(small_scenario(), ": 30", ": $angle") + "sweep: {angle: [0, 1]}\n");
     file.repeat(3);
     ASSERT_EQ(file.runs().size(), 6U);
-    EXPECT_EQ(file.runs()[1].name, "unused=0 seed=2");
+    EXPECT_EQ(file.runs()[1].name, "angle=0 seed=2");
     EXPECT_EQ(file.scenario(file.runs()[1]).seed, 2U);
     Expectation expectation;
     expectation.max = 10;
@@ -78,14 +78,14 @@ TEST(Runner, EachSeedHasItsWorstRunAndTheyAreRanked)
 
 TEST(Runner, RunsAreKeptByTheirNames)
 {
-    ScenarioFile file = file_of(small_scenario() + "sweep: {unused: [0, 1]}\n");
+    ScenarioFile file = file_of(replaced(small_scenario(), ": 30", ": $angle") + "sweep: {angle: [0, 1]}\n");
     file.repeat(2);
-    file.keep({"unused=1 seed=2", "unused=0 seed=1", "unused=1 seed=2"});
+    file.keep({"angle=1 seed=2", "angle=0 seed=1", "angle=1 seed=2"});
     ASSERT_EQ(file.runs().size(), 2U);
-    EXPECT_EQ(file.runs()[0].name, "unused=0 seed=1");
+    EXPECT_EQ(file.runs()[0].name, "angle=0 seed=1");
     EXPECT_EQ(file.scenario(file.runs()[1]).seed, 2U);
-    EXPECT_EQ(error_of([&file] { file.keep({"unused=0"}); }),
-              "no run is called 'unused=0'; the first of 2 is 'unused=0 seed=1'");
+    EXPECT_EQ(error_of([&file] { file.keep({"angle=0"}); }),
+              "no run is called 'angle=0'; the first of 2 is 'angle=0 seed=1'");
     EXPECT_EQ(file.runs().size(), 2U);
 }
 
