@@ -3,12 +3,11 @@
 #include "firmware/drive/block.h"
 
 #include "firmware/drive/drive_parts.h"
+#include "firmware/math/filter.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
 
 #if PM_HAS(six_step)
-
-#define V_DC_LEAST PM_Q(0.15)
 
 pm_q_t block_emf(const drive_t *drive)
 {
@@ -22,7 +21,7 @@ void block_prepare(drive_t *drive, pm_q_t i_q)
     const pm_q_t emf = block_emf(drive);
     const pm_q_t i = pm_mul(i_q, LINE_OF_Q);
     line_current_prepare(&self->current, self->six_step.reverse ? -i : i, emf,
-                         pm_max(drive->status.v_dc, V_DC_LEAST));
+                         pm_max(drive->status.v_dc, DRIVE_V_DC_LEAST));
 }
 
 void block_take_duty(drive_t *drive)
@@ -84,7 +83,7 @@ static void follow_duty(drive_t *drive, pm_q_t i_min, pm_q_t i_max)
     block_t *self = &drive->block;
     const bool reverse = self->six_step.reverse;
     const pm_q_t step = drive->config.block.duty_step;
-    self->duty += pm_clamp(drive->duty_target - self->duty, -step, step);
+    self->duty = pm_approach(self->duty, drive->duty_target, step);
     block_prepare(drive, reverse ? i_min : i_max);
     line_current_give(&self->current, pm_max(reverse ? -self->duty : self->duty, 0),
                       pm_mul(reverse ? -i_max : i_min, LINE_OF_Q));

@@ -1,5 +1,7 @@
 #include "firmware/math/filter.h"
 
+#include "firmware/math/compiler.h"
+
 enum { COEFFICIENT_BITS = 29, LIMIT_BITS = 30 /* +-4 in Q28 */ };
 
 /* With |x|, |y| <= 4 and the documented coefficients |s2| <= 20, |s1| <= 44 and the sum <= 60 of the 64 that
@@ -19,4 +21,9 @@ pm_q_t pm_biquad_step(pm_biquad_t *self, const pm_biquad_config_t *config, pm_q_
     self->s1 = self->s2 + cut + (int64_t)config->b1 * in + (int64_t)config->a1 * back;
     self->s2 = (int64_t)config->b2 * in + (int64_t)config->a2 * back;
     return out;
+}
+
+PM_APART pm_q_t pm_approach(pm_q_t y, pm_q_t x, pm_q_t step)
+{
+    return y + pm_clamp(x - y, -step, step);
 }

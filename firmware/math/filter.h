@@ -1,4 +1,4 @@
-/* First- and second-order filters.
+/* First- and second-order filters, and a limit of the slope.
  *
  * pm_lp1, first-order low-pass:
  *   y += k (x - y),   k = 1 - exp(-T_s w_c) in Q32 (w_c T_s < 0.69)
@@ -37,6 +37,9 @@ typedef struct {
 } pm_biquad_t;
 
 pm_q_t pm_biquad_step(pm_biquad_t *self, const pm_biquad_config_t *config, pm_q_t x);
+
+/* y, nearer to x by no more than `step`. */
+pm_q_t pm_approach(pm_q_t y, pm_q_t x, pm_q_t step);
 
 #ifdef __cplusplus
 }

@@ -2,6 +2,7 @@
 #include "firmware/drive/commissioning/commissioning.h"
 
 #include "firmware/drive/commissioning/commissioning_parts.h"
+#include "firmware/math/filter.h"
 #include "firmware/math/root.h"
 
 #define HOLD_MS 500U
@@ -124,7 +125,7 @@ static phase_result_t hold(drive_t *drive, bool full)
     const int32_t most = (int32_t)(PM_TURN(0.5) / HOLD_MS);
     drive->theta_open += (pm_angle_t)pm_clamp(left, -most, most);
     self->ms = left == 0 ? self->ms : 0U;
-    drive->i_ref.d = commissioning_approach(drive->i_ref.d, i, i / 64 + 1);
+    drive->i_ref.d = pm_approach(drive->i_ref.d, i, i / 64 + 1);
     return (phase_result_t){.done = self->ms > HOLD_MS};
 }
 

@@ -61,11 +61,6 @@ void commissioning_hold(drive_t *drive, commissioning_hold_t *self, pm_ab_t ref,
 pm_q_t commissioning_current(const drive_t *drive);
 pm_q_t commissioning_period(const drive_t *drive);
 
-static inline pm_q_t commissioning_approach(pm_q_t x, pm_q_t target, pm_q_t step)
-{
-    return x + pm_clamp(target - x, -step, step);
-}
-
 #ifdef __cplusplus
 }
 #endif

@@ -9,6 +9,7 @@
  * the same rate over the same speeds; R and friction cancel. Friction at two speeds gives the viscous
  * part. */
 #include "firmware/drive/commissioning/commissioning_parts.h"
+#include "firmware/math/filter.h"
 #include "firmware/math/num.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
@@ -72,16 +73,16 @@ static pm_q_t mean_torque(const identify_t *self)
 static void turn_on(drive_t *drive, pm_q_t target)
 {
     identify_t *self = &drive->procedure.identify;
-    const pm_q_t ref = commissioning_approach(self->of.rotation.omega_ref, target, ramp_step(self));
+    const pm_q_t ref = pm_approach(self->of.rotation.omega_ref, target, ramp_step(self));
     const pm_q_t off = drive->voltage.v.d - self->of.rotation.u_d;
     self->of.rotation.u_d += off / 256;
     self->of.rotation.omega_ref = ref;
     drive->omega_open = ref;
     if (pm_abs(ref) > pm_abs(self->of.rotation.omega) / 4) {
         const pm_q_t behind = pm_clamp(pm_div(off, pm_abs(drive->voltage.v.q)), -PM_Q(0.3), PM_Q(0.3));
-        /* per-unit: 0.03 over the radians of a millisecond at base speed */
-        const pm_q_t per_ms = commissioning_period(drive) * (int32_t)drive->config.slow_divider;
-        const pm_q_t back = pm_mul(behind, pm_div(PM_Q(0.03), per_ms));
+        /* per-unit: 0.03 over the radians of a millisecond at base speed, which are up to half of one in a period */
+        const pm_q_t per_ms_8 = commissioning_period(drive) / 8 * (int32_t)drive->config.slow_divider;
+        const pm_q_t back = pm_mul(behind, pm_div(PM_Q(0.03 / 8), per_ms_8));
         drive->omega_open -= ref < 0 ? -back : back;
     }
 }
@@ -145,7 +146,7 @@ phase_result_t rotation_less(drive_t *drive)
     identify_t *self = &drive->procedure.identify;
     commissioning_result_t *r = &drive->commissioning_report.result;
     const pm_q_t half = commissioning_current(drive) / 4;
-    drive->i_ref.d = commissioning_approach(drive->i_ref.d, half, half / 64 + 1);
+    drive->i_ref.d = pm_approach(drive->i_ref.d, half, half / 64 + 1);
     turn_on(drive, self->of.rotation.omega);
     if (!is_measured(self)) {
         return running;
@@ -180,7 +181,7 @@ phase_result_t rotation_down(drive_t *drive)
     identify_t *self = &drive->procedure.identify;
     const pm_q_t full = commissioning_current(drive) / 2;
     if (self->ms < SETTLE_MS) {
-        drive->i_ref.d = commissioning_approach(drive->i_ref.d, full, full / 64 + 1);
+        drive->i_ref.d = pm_approach(drive->i_ref.d, full, full / 64 + 1);
         turn_on(drive, self->of.rotation.omega);
         commissioning_clear_sums(self);
         self->of.rotation.count = 0;

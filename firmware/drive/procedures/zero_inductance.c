@@ -3,21 +3,23 @@
 #include "firmware/drive/commissioning/commissioning_parts.h"
 #include "firmware/drive/drive_parts.h"
 #include "firmware/math/compiler.h"
+#include "firmware/math/filter.h"
 #include "firmware/math/image.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
 
 #if PM_HAS(zero_inductance)
 
-#define VALUES    32U
-#define RISE_MS   256
-#define ACROSS    PM_TURN(0.25)
-#define ACROSS_MS 512U /* slowly, or the rotor swings for longer than the next turn takes */
-#define TURN_MS   800U /* with the current: the rotor comes to rest */
-#define FREE_MS   200U /* without */
-#define LATEST_MS 5000U
-#define SHARE     64   /* of S: a difference that is none */
-#define LEAST     4000 /* of the machine's inductance */
+#define VALUES      32U
+#define RISE_MS     256
+#define ACROSS      PM_TURN(0.25)
+#define ACROSS_MS   512U /* slowly, or the rotor swings for longer than the next turn takes */
+#define TURN_MS     800U /* with the current: the rotor comes to rest */
+#define FREE_MS     200U /* without */
+#define LATEST_MS   5000U
+#define SHARE       64   /* of S: a difference that is none */
+#define LEAST       4000 /* of the machine's inductance */
+#define LEAST_SHARE 256  /* of i_max: an answer in the currents */
 
 /* Along phase A, and across it. */
 enum { TURN, WITH, FREE, WITHOUT, TURN_ON, FREE_ON, WITHOUT_ON, PARTS };
@@ -79,7 +81,7 @@ static bool holds(drive_t *drive)
     const bool with = self->part <= (uint8_t)WITH || self->part == (uint8_t)TURN_ON;
     const pm_q_t i = current(drive);
     const pm_q_t wanted = with ? i : 0;
-    self->i = commissioning_approach(self->i, wanted, i / RISE_MS + 1);
+    self->i = pm_approach(self->i, wanted, i / RISE_MS + 1);
     const bool turns = self->part == (uint8_t)TURN_ON && self->along != ACROSS;
     if (turns && self->i == wanted) {
         self->along += ACROSS / ACROSS_MS;
@@ -93,10 +95,10 @@ static bool holds(drive_t *drive)
     return self->hold.still >= (with ? TURN_MS : FREE_MS);
 }
 
-static void add(pm_dq_t *sum, pm_q_t cosine, pm_q_t sine)
+static void add(pm_dq_t *mean, pm_q_t cosine, pm_q_t sine)
 {
-    sum->d += cosine;
-    sum->q -= sine;
+    mean->d += cosine / (int32_t)VALUES;
+    mean->q -= sine / (int32_t)VALUES;
 }
 
 /* S: |Y| of as much current as there would be without resistance and dead time. */
@@ -187,7 +189,7 @@ static void find_star(drive_t *drive)
     zero_inductance_result_t *r = &drive->zero_inductance;
     const pm_machine_t *m = &drive->config.machine;
     const pm_q_t rho = pm_mul(m->R_s, drive->config.zero_inductance.rho);
-    const zero_sums_t *x = self->at;
+    const zero_means_t *x = self->at;
     const pm_dq_t a = difference_of(x[0].a, x[1].a);
     const pm_dq_t b = difference_of(x[0].b, x[1].b);
     const pm_dq_t both = linkage(drive, sum_of(x[0].y, x[1].y));
@@ -207,7 +209,7 @@ static pm_procedure_t conclude(drive_t *drive)
     const pm_dq_t b = sum_of(self->at[0].b, self->at[1].b);
     const pm_dq_t w = linkage(drive, difference_of(self->at[0].y, self->at[1].y));
     const int64_t both = cross(a, b);
-    if (pm_abs(a.d) + pm_abs(a.q) < drive->config.i_max / 8) { /* of 64 halves */
+    if (pm_abs(a.d) + pm_abs(a.q) < drive->config.i_max / LEAST_SHARE) {
         return PM_FAILED_NO_CURRENT;
     }
     r->dL_0 = share(cross(w, b), both);

@@ -75,8 +75,8 @@ typedef struct {
 } zero_inductance_result_t;
 
 typedef struct {
-    pm_dq_t a, b, y; /* of I_a, I_b, Y */
-} zero_sums_t;
+    pm_dq_t a, b, y; /* I_a, I_b, Y */
+} zero_means_t;
 
 typedef struct {
     sine_t sine;
@@ -85,7 +85,7 @@ typedef struct {
     commissioning_hold_t hold;
     pm_q_t i;                /* that is held, */
     pm_angle_t along;        /* along phase A and then across it */
-    zero_sums_t at[2];       /* theta = 0, 90 degrees */
+    zero_means_t at[2];      /* theta = 0, 90 degrees */
     polarity_mean_t size[2]; /* S, with I and without; beside `first` */
     pm_q_t first;
     uint16_t ms; /* of this part */

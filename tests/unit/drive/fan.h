@@ -103,6 +103,14 @@ class Fan
         drive_command(&drive(), &command_);
     }
 
+    void identify(uint32_t routines, double omega_rad_s)
+    {
+        command_.routines = static_cast<uint8_t>(routines);
+        command_.speed_mrad_s = static_cast<int32_t>(std::lround(1000 * omega_rad_s));
+        command_.current_mA = 4000;
+        drive_command(&drive(), &command_);
+    }
+
     // Periods, of which the worst angle is kept while block commutation has the rotor.
     void run_s(double time_s)
     {

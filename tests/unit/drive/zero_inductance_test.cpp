@@ -205,6 +205,20 @@ TEST_P(ZeroInductance, IsMeasuredWithAndWithoutTheCurrent)
     EXPECT_NEAR(x.mean_A(1), 0, kHeld * test_A);
 }
 
+// Currents up to a fifth of the channels' full scale.
+TEST(ZeroInductanceCarrier, MayBeLargeAndSmall)
+{
+    const Motor m = {"spm", true, 0.3e-3, 0, 100};
+    for (const int32_t v_mV : {4000, 10000, 14000, 20000}) {
+        drive_params_t p = parameters(m);
+        p.v_injection = v_mV;
+        Bench x(plant_of(m), p, m.theta_deg);
+        x.run_s(kLongest_s);
+        ASSERT_EQ(x.report().state, COMMISSIONING_DONE) << v_mV << int(x.report().reason);
+        EXPECT_NEAR(x.henry() * real(x.result().dL_0), m.dL_0_H, 2 * kWithin * m.dL_0_H) << v_mV;
+    }
+}
+
 // Dead time takes most where the carrier passes zero, which is without the current; that is no fall.
 TEST(ZeroInductanceFalls, IsNotSaidOfALinearMachine)
 {
