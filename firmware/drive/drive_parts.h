@@ -76,6 +76,7 @@ bool start_passes_over(const drive_t *drive, uint8_t procedure);
 void protection_step(drive_t *drive);   /* names the fault of a period that has not passed */
 void protection_slow(drive_t *drive);   /* 1 kHz: temperature, speed, position, stall, sum */
 void protection_heat(drive_t *drive);   /* 1 kHz, in every state: what windings and bridge bear */
+void protection_link(drive_t *drive);   /* 1 kHz, in every state: where the DC link will be in 2 ms */
 void protection_phases(drive_t *drive); /* 1 kHz, while the references are those of the currents */
 
 drive_fault_t protection_fault_of_lost(const drive_t *drive); /* POSITION_LOST, or what it was lost for */

@@ -273,6 +273,7 @@ void drive_slow(drive_t *drive, const drive_slow_in_t *in)
     drive->voltage.limited = false;
     drive->modulator.limited = 0;
     protection_heat(drive);
+    protection_link(drive);
     protection_phases(drive);
     if (drive->fault == DRIVE_FAULT_NONE) {
         if (!is_alone(drive)) {

@@ -78,7 +78,8 @@ struct drive {
     pm_q_t torque_target;
     pm_q_t i_target;
 
-    uint16_t state_ms; /* since the state or stage was entered */
+    pm_q_t v_dc_before, v_dc_ahead; /* a millisecond ago, and in two */
+    uint16_t state_ms;              /* since the state or stage was entered */
     uint16_t stall_ms, sum_ms;
     uint16_t lost;     /* eighths of a ms without a position */
     uint16_t still_ms; /* standstill while stopping */

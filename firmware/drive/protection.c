@@ -183,6 +183,8 @@ void protection_phases(drive_t *drive)
 }
 
 /* 1 below `from`, 0 above `to`. */
+#define FEEDS_SHARE 32 /* of i_max: ten degrees of an i_d of a tenth of rated current, and more */
+
 static pm_unit_t derate(int32_t x, int32_t from, int32_t to)
 {
     if (x <= from) {
@@ -191,13 +193,24 @@ static pm_unit_t derate(int32_t x, int32_t from, int32_t to)
     return x >= to ? 0 : pm_ratio(to - x, to - from);
 }
 
+/* Braking takes a small capacitor through the whole range within a millisecond. What was seen is given up with 16 ms. */
+void protection_link(drive_t *drive)
+{
+    const pm_q_t v_dc = drive->status.v_dc;
+    const pm_q_t rise = drive->v_dc_before > 0 ? pm_max(v_dc - drive->v_dc_before, 0) : 0;
+    const pm_q_t kept = drive->v_dc_ahead - (drive->v_dc_ahead - v_dc) / 16;
+    drive->v_dc_ahead = pm_max(v_dc + 2 * rise, kept);
+    drive->v_dc_before = v_dc;
+}
+
 void protection_current_limits(drive_t *drive, pm_q_t *i_min, pm_q_t *i_max)
 {
     const protection_config_t *c = &drive->config.protection;
     const pm_unit_t by_temperature = derate(drive->temperature_dC, c->temp_derate_dC, c->temp_trip_dC);
-    /* nothing is regenerated in the last quarter: noise of the current must not carry the link to v_dc_max */
+    /* In the last quarter nothing is regenerated, and the link feeds a rotor that turns: noise of the current, and what an error of
+     * the angle makes of i_d, must not carry it to v_dc_max. */
     const pm_q_t v_dc_none = c->v_dc_max - (c->v_dc_max - c->v_dc_derate) / 4;
-    const pm_unit_t by_voltage = derate(drive->status.v_dc, c->v_dc_derate, v_dc_none);
+    const pm_unit_t by_voltage = derate(drive->v_dc_ahead, c->v_dc_derate, v_dc_none);
     const pm_q_t i = pm_unit(drive->config.i_max, by_temperature);
     if (by_temperature < PM_UNIT_MAX) {
         drive->status.limits |= DRIVE_LIMIT_TEMPERATURE;
@@ -206,10 +219,13 @@ void protection_current_limits(drive_t *drive, pm_q_t *i_min, pm_q_t *i_max)
     *i_min = -i;
     if (by_voltage < PM_UNIT_MAX) {
         drive->status.limits |= DRIVE_LIMIT_DC_VOLTAGE;
-        if (drive->position.pll.omega > 0) {
-            *i_min = -pm_unit(i, by_voltage);
+        const pm_q_t omega = drive->position.pll.omega;
+        const bool feeds = drive->status.v_dc > v_dc_none && pm_abs(omega) > c->omega_stall;
+        const pm_q_t brakes = feeds ? -i / FEEDS_SHARE : pm_unit(i, by_voltage);
+        if (omega > 0) {
+            *i_min = -brakes;
         } else {
-            *i_max = pm_unit(i, by_voltage);
+            *i_max = brakes;
         }
     }
 }

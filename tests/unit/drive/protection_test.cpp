@@ -270,13 +270,14 @@ TEST(Protection, CurrentIsDeratedByTemperatureAndVoltage)
         for (const double v : {300.0, 380.0, 390.0, 399.0}) {
             for (const double omega : {0.2, -0.2}) {
                 x.d.temperature_dC = dC;
-                x.d.status.v_dc = bench::fixed(v / 450, 28);
+                x.d.status.v_dc = x.d.v_dc_ahead = bench::fixed(v / 450, 28);
                 x.d.position.pll.omega = bench::fixed(omega, 28);
                 x.d.status.limits = DRIVE_LIMIT_SPEED; // of the same millisecond: stays
                 pm_q_t i_min, i_most;
                 protection_current_limits(&x.d, &i_min, &i_most);
                 const double hot = std::clamp((1100.0 - dC) / 200, 0.0, 1.0);
-                const double high = std::clamp((395.0 - v) / 15, 0.0, 1.0); // a quarter is left
+                const double high =
+                    v > 395 ? -1.0 / 32 : std::min((395.0 - v) / 15, 1.0); // a quarter is left
                 const double drives = i_max * hot, brakes = i_max * hot * high;
                 // a turn of the sign brakes
                 EXPECT_NEAR(real(i_most), omega > 0 ? drives : brakes, 1e-4) << dC << ' ' << v;
@@ -286,6 +287,49 @@ TEST(Protection, CurrentIsDeratedByTemperatureAndVoltage)
                 EXPECT_NE(x.d.status.limits & DRIVE_LIMIT_SPEED, 0U);
             }
         }
+    }
+}
+
+// A link that rises is met where it will be in 2 ms, and that is given up within 16 ms; one that falls as it is.
+TEST(Protection, BrakingGivesWayToALinkThatRises)
+{
+    Drive x;
+    x.run_ms(1);
+    const auto brakes = [&x](double v) {
+        x.d.status.v_dc = bench::fixed(v / 450, 28);
+        pm_q_t i_min, i_max;
+        protection_link(&x.d);
+        protection_current_limits(&x.d, &i_min, &i_max);
+        return -real(i_min);
+    };
+    x.d.position.pll.omega = PM_Q(0.2);
+    for (int ms = 0; ms < 200; ++ms) {
+        brakes(360);
+    }
+    const double most = brakes(360);
+    EXPECT_EQ(most, 0.5);
+    EXPECT_NEAR(brakes(368), most * (395 - 384) / 15, 1e-3);
+    const double held = brakes(368);
+    EXPECT_NEAR(held, most * (395 - (368 + 16 * 15.0 / 16)) / 15, 1e-3); // a 16th less
+    for (int ms = 0; ms < 60; ++ms) {
+        brakes(368);
+    }
+    EXPECT_NEAR(brakes(368), most, 1e-6);
+    EXPECT_NEAR(brakes(340), most, 1e-6);
+}
+
+// In the last quarter a rotor that turns takes a 32nd from the link, one that stands nothing.
+TEST(Protection, TheLinkFeedsARotorThatTurnsAlone)
+{
+    Drive x;
+    x.run_ms(1);
+    for (const double omega : {0.2, -0.2, 0.0}) {
+        x.d.status.v_dc = x.d.v_dc_ahead = bench::fixed(397.0 / 450, 28);
+        x.d.position.pll.omega = bench::fixed(omega, 28);
+        pm_q_t i_min, i_max;
+        protection_current_limits(&x.d, &i_min, &i_max);
+        const double least = omega > 0 ? real(i_min) : -real(i_max);
+        EXPECT_NEAR(least, omega != 0 ? 0.5 / 32 : 0, 1e-6) << omega;
     }
 }
 

@@ -358,8 +358,9 @@ ENTRIES = (
     Entry(0x2600, 1, "i_trip", "protections", "i32", "locked", "A", -3, 0, 100, 4000000, 9000, False, True, "application", "none", {}, 'over-current fault, instantaneous, any phase', ""),
     Entry(0x2600, 2, "v_dc_max", "protections", "i32", "locked", "V", -3, 0, 5000, 1200000, 400000, False, True, "application", "none", {}, 'DC over-voltage fault', ""),
     Entry(0x2600, 3, "v_dc_min", "protections", "i32", "locked", "V", -3, 0, 2000, 1200000, 60000, False, True, "application", "none", {}, 'DC under-voltage fault', ""),
-    Entry(0x2600, 4, "v_dc_derate", "protections", "i32", "locked", "V", -3, 0, 5000, 1200000, 380000, False, True, "application", "none", {}, ('regenerated torque is reduced above, to zero at three quarters of the way to '
- 'v_dc_max'), ""),
+    Entry(0x2600, 4, "v_dc_derate", "protections", "i32", "locked", "V", -3, 0, 5000, 1200000, 380000, False, True, "application", "none", {}, ('regenerated torque is reduced above, by v_dc as it will be in 2 ms, to zero '
+ 'at three quarters of the way to v_dc_max; a rotor that turns then takes '
+ 'i_max / 32'), ""),
     Entry(0x2600, 5, "temp_derate", "protections", "i32", "locked", "degC", -1, 0, 0, 2000, 900, False, True, "application", "none", {}, 'current is reduced above, to zero at temp_trip', ""),
     Entry(0x2600, 6, "temp_trip", "protections", "i32", "locked", "degC", -1, 0, 0, 2000, 1100, False, True, "application", "none", {}, 'over-temperature fault', ""),
     Entry(0x2600, 7, "offset_max", "protections", "i32", "locked", "A", -3, 0, 1, 400000, 300, False, True, "application", "none", {}, 'largest accepted offset of a current sensor', ""),
