@@ -12,7 +12,7 @@ void line_current_prepare(line_current_t *self, pm_q_t i_ref, pm_q_t emf, pm_q_t
 {
     self->i_ref = i_ref;
     self->emf = emf;
-    self->per_v = pm_div(PM_ONE, v_dc);
+    self->per_v = pm_div(PM_ONE / 4, v_dc);
     self->given = false;
 }
 
@@ -36,7 +36,7 @@ void line_current_step(line_current_t *self, const line_current_config_t *config
     const pm_wide_t given = pm_clamp(wanted, 0, pm_widen(pm_mul(v_dc, config->most)));
     self->limited = self->limited || given != wanted;
     pm_pi_update(&self->pi, &config->pi, e, given - v);
-    self->u = pm_min(pm_mul_sat(pm_narrow(given), self->per_v), config->most);
+    self->u = pm_min(pm_narrow_sat(pm_gain(pm_narrow(given), self->per_v)), config->most);
     if (pm_rarely(self->given) && given == duty) {
         self->u = self->duty; /* of the link as it is, not as it was at 1 kHz */
     }

@@ -40,7 +40,7 @@ typedef struct {
 typedef struct {
     pm_pi_t pi;
     pm_q_t i_ref, emf; /* of 1 kHz; i_ref: with a duty i_max */
-    pm_q_t per_v;      /* 1 / v_dc */
+    pm_gain_t per_v;   /* 1 / v_dc */
     pm_q_t u;          /* 0 ... most */
     bool limited;      /* v has been at an end since it was last cleared */
     bool given;        /* by a duty, */
@@ -52,7 +52,7 @@ typedef struct {
 /* i flows already, and is wanted. */
 void line_current_reset(line_current_t *self, const line_current_config_t *config, pm_q_t i);
 
-/* 1 kHz; v_dc > 1/8. */
+/* 1 kHz; v_dc >= 1/16. */
 void line_current_prepare(line_current_t *self, pm_q_t i_ref, pm_q_t emf, pm_q_t v_dc);
 
 /* 1 kHz, behind line_current_prepare() with i_max as i_ref: the voltage is `duty` v_dc, 0 ... 1, as long as the current is not

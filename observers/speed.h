@@ -58,10 +58,11 @@ typedef struct {
     pm_dq_t i;
 } speed_in_t;
 
-/* Every control period: v_q, mean of the period, in the present frame. */
+/* Every control period: v_q, mean of the period, in the present frame. In open loop no step follows, and the sum wraps: the
+ * first step does without. */
 static inline void speed_collect(speed_t *self, pm_q_t v_q)
 {
-    self->v_sum += v_q / 16;
+    self->v_sum = (pm_q_t)((uint32_t)self->v_sum + (uint32_t)(v_q / 16));
 }
 
 /* The first step gives the loop's speed. */

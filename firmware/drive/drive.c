@@ -6,9 +6,6 @@
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
 
-/* The modulator's smallest link voltage; below v_dc_min, which is larger, the bridge is off. */
-#define V_DC_LEAST PM_Q(0.0625)
-
 PM_RARE drive_result_t drive_init(drive_t *drive, const drive_params_t *params, uint32_t channels)
 {
     *drive = (drive_t){.state = DRIVE_OFF, .stage = STAGE_OFF};
@@ -43,6 +40,7 @@ PM_RARE void drive_reconfigure(drive_t *drive, const drive_config_t *config)
         position_change_observer(&drive->position, position, drive->i_ab, drive->status.i);
     }
     if (drive->fault == DRIVE_FAULT_PARAMETERS) {
+        drive->command.enable = false;
         drive->fault = DRIVE_FAULT_NONE;
         drive->state = DRIVE_OFF;
         drive->stage = STAGE_OFF;
@@ -141,7 +139,7 @@ PM_RARE void drive_prepare(drive_t *drive)
     }
     prepare_current_control(drive);
     drive->modulator.carrier = drive->carrier;
-    modulator_slow(&drive->modulator, &c->modulator, pm_max(v_dc, V_DC_LEAST));
+    modulator_slow(&drive->modulator, &c->modulator, pm_max(v_dc, DRIVE_V_DC_LEAST));
 #if SEQUENCE_HAS_POLARITY
     if (procedure_without_current(drive)) {
         drive->modulator.near = 0;

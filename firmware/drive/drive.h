@@ -132,8 +132,8 @@ typedef struct drive drive_t; /* caller-owned: the struct stands in drive_state.
 /* On refusal the drive is in DRIVE_FAULT with DRIVE_FAULT_PARAMETERS and stays off. */
 drive_result_t drive_init(drive_t *drive, const drive_params_t *params, uint32_t channels);
 
-/* Takes a new configuration, whole; ends the fault PARAMETERS. Between two steps: in the slow interrupt.
- * While the drive is not off, nothing that drive_same_frame() compares may differ; the observer may. */
+/* Takes a new configuration, whole; ends the fault PARAMETERS, after which the drive waits for a command. Between two steps: in the
+ * slow interrupt. While the drive is not off, nothing that drive_same_frame() compares may differ; the observer may. */
 void drive_reconfigure(drive_t *drive, const drive_config_t *config);
 
 /* Bases, timing and start are the same, so that the present state keeps its meaning. */

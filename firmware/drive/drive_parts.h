@@ -38,6 +38,9 @@ static inline bool protection_passed(const drive_t *drive, int32_t top)
     return above <= (uint32_t)v_dc.second && protection_currents_passed(drive, top);
 }
 
+/* The smallest link voltage that is divided by; below v_dc_min, which is more, the bridge is off. */
+#define DRIVE_V_DC_LEAST PM_Q(1.0 / 16)
+
 /* Injection leads at low speed: as configured, unless the start has found the machine round. */
 static inline bool drive_injects(const drive_t *drive)
 {
@@ -68,6 +71,8 @@ void start_slow(drive_t *drive);
 void start_step(
     drive_t *drive); /* begins the next procedure; from drive_slow() itself: the deepest stack of all */
 void start_again(drive_t *drive); /* behind the calibration, which looks for a rotor that turns first */
+/* The rotor stands at theta, and injection takes over. */
+void start_injection(drive_t *drive, pm_angle_t theta);
 /* A step that this start or this board does without. */
 bool start_passes_over(const drive_t *drive, uint8_t procedure);
 

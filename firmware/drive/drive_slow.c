@@ -38,7 +38,8 @@ PM_RARE void drive_turn_frame(drive_t *drive, pm_angle_t turn, pm_dq_t v)
 PM_RARE void drive_take_over(drive_t *drive, const pm_pll_t *known, pm_q_t i_q)
 {
     const drive_config_t *c = &drive->config;
-    position_take(&drive->position, &c->position, known);
+    const pm_ab_t i = pm_park_inverse((pm_dq_t){0, i_q}, pm_dir(known->theta));
+    position_reset(&drive->position, &c->position, known, i, drive_injects(drive));
     const pm_q_t v_top = pm_unit(drive->status.v_dc, c->v_share);
     const pm_q_t emf = pm_mul(known->omega, c->machine.psi_m);
     const pm_dq_t v = {.d = 0, .q = pm_clamp(emf, -v_top, v_top)};
@@ -106,7 +107,7 @@ static void run_block(drive_t *drive)
         }
         break;
     case BLOCK_LOST:
-        if (may_look(drive)) {
+        if (may_look(drive) || drive->state == DRIVE_STOPPING) {
             try_again(drive, block_fault(drive, DRIVE_FAULT_POSITION_LOST));
         } else {
             drive_trip(drive, block_fault(drive, DRIVE_FAULT_POSITION_LOST));

@@ -36,8 +36,9 @@ void open_loop_start(drive_t *drive)
     drive->omega_ramp = 0;
     drive->omega_open = 0;
     drive->i_open = 0;
+    drive->i_ref = (pm_dq_t){0, 0};
     drive->i_vector = drive->config.open_loop.i;
-    position_reset(&drive->position, &drive->config.position, 0, drive->i_ab, false);
+    position_reset(&drive->position, &drive->config.position, &(pm_pll_t){0}, drive->i_ab, false);
     regulator_reset(&drive->regulator, &drive->config.regulator, (pm_dq_t){0, 0}, (pm_dq_t){0, 0}, 0);
 }
 
@@ -109,18 +110,14 @@ void open_loop_release(drive_t *drive)
     }
 }
 
-static pm_q_t approach(pm_q_t x, pm_q_t target, pm_q_t step)
-{
-    return x + pm_clamp(target - x, -step, step);
-}
-
 static pm_q_t wanted_speed(const drive_t *drive)
 {
     if (drive->state == DRIVE_STOPPING) {
         return 0;
     }
     if (drive->command.mode == DRIVE_MODE_TORQUE) {
-        const pm_q_t fast = drive->config.position.omega_high + drive->config.position.omega_high / 4;
+        const pm_q_t high = drive->config.position.omega_high;
+        const pm_q_t fast = pm_min(high + high / 4, drive->config.omega_max);
         return drive->torque_target < 0 ? -fast : fast;
     }
     return pm_clamp(drive->omega_target, -drive->config.omega_max, drive->config.omega_max);
@@ -186,7 +183,7 @@ void open_loop_hold(drive_t *drive)
     const drive_config_t *c = &drive->config;
     const bool current_mode = drive->command.mode == DRIVE_MODE_CURRENT;
     const pm_q_t i_wanted = current_mode ? pm_min(pm_abs(drive->i_target), c->i_max) : drive->i_vector;
-    drive->i_open = approach(drive->i_open, i_wanted, c->open_loop.i_slope);
+    drive->i_open = pm_approach(drive->i_open, i_wanted, c->open_loop.i_slope);
     drive->i_ref = (pm_dq_t){.d = drive->i_open, .q = 0};
     damp(drive);
 }
@@ -286,7 +283,8 @@ void open_loop_slow(drive_t *drive)
     if (PM_HAS(load_current) && drive->rest_ms > 0U) {
         drive->rest_ms--;
     } else {
-        drive->omega_ramp = approach(drive->omega_ramp, wanted_speed(drive), drive->config.open_loop.slope);
+        drive->omega_ramp =
+            pm_approach(drive->omega_ramp, wanted_speed(drive), drive->config.open_loop.slope);
     }
     watch(drive);
     if (drive->command.mode != DRIVE_MODE_CURRENT && drive->stage == STAGE_OPEN_LOOP) {

@@ -85,13 +85,10 @@ typedef struct {
 #endif
 } position_t;
 
-/* Starts at standstill with the rotor at theta; `carrier`: one will be injected, if the configuration says
- * so. */
-void position_reset(position_t *self, const position_config_t *config, pm_angle_t theta, pm_ab_t i,
+/* Starts where the rotor is known to be, at its speed, with the current i; `carrier`: one is injected at low speed, if the
+ * configuration says so. */
+void position_reset(position_t *self, const position_config_t *config, const pm_pll_t *known, pm_ab_t i,
                     bool carrier);
-
-/* Takes over a rotor that was caught: at theta and omega, per-unit, without current. */
-void position_take(position_t *self, const position_config_t *config, const pm_pll_t *caught);
 
 typedef struct {
     pm_half_dir_t ahead; /* half of the direction of the estimated frame where the next voltage acts */

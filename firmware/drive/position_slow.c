@@ -16,39 +16,30 @@
 /* The weight follows the speed through 5 ms, so that noise of the speed does not move it. */
 #define K_SPEED PM_FRAC(0.2)
 
-void position_reset(position_t *self, const position_config_t *config, pm_angle_t theta, pm_ab_t i,
-                    bool carrier)
+/* What is at work, where the rotor is known to be. */
+static void seed(position_t *self, const position_config_t *config, pm_ab_t i)
 {
-    const bool inject = carrier && config->injects;
-    *self = (position_t){.pll.theta = theta,
-                         .weight = inject ? 0 : PM_ONE,
-                         .carrier = inject,
-                         .inject = inject,
-                         .gains = inject ? config->pll_low : config->pll_high,
-                         .quality = PM_ONE};
-    const pm_dir_t dir = pm_dir(theta);
-    const obs_in_t in = {.i = i, .dir = dir, .i_dq = pm_park(i, dir)};
+    const pm_dir_t dir = pm_dir(self->pll.theta);
+    const obs_in_t in = {.dir = dir, .omega = self->pll.omega, .i = i, .i_dq = pm_park(i, dir)};
     observer_reset(&self->observer, &config->observer, &in);
     if (self->inject) {
         injection_reset(&self->injection, &config->injection, &in);
     }
 }
 
-PM_RARE void position_take(position_t *self, const position_config_t *config, const pm_pll_t *caught)
+PM_RARE void position_reset(position_t *self, const position_config_t *config, const pm_pll_t *known,
+                            pm_ab_t i, bool carrier)
 {
-    position_reset(self, config, caught->theta, (pm_ab_t){0, 0}, true);
-    self->pll.omega = caught->omega;
-    self->omega_mean = caught->omega;
-    if (pm_abs(caught->omega) > config->omega_high) {
-        self->inject = false;
-        self->weight = PM_ONE;
-        self->gains = config->pll_high;
-    }
-    const obs_in_t in = {.dir = pm_dir(caught->theta), .omega = caught->omega};
-    observer_reset(&self->observer, &config->observer, &in);
-    if (self->inject) {
-        injection_reset(&self->injection, &config->injection, &in);
-    }
+    const bool may = carrier && config->injects;
+    const bool inject = may && pm_abs(known->omega) <= config->omega_high;
+    *self = (position_t){.pll = *known,
+                         .omega_mean = known->omega,
+                         .weight = inject ? 0 : PM_ONE,
+                         .carrier = may,
+                         .inject = inject,
+                         .gains = inject ? config->pll_low : config->pll_high,
+                         .quality = PM_ONE};
+    seed(self, config, i);
 }
 
 void position_change_observer(position_t *self, const position_config_t *config, pm_ab_t i, pm_dq_t i_dq)
@@ -152,10 +143,7 @@ pm_unit_t position_current_share(const position_t *self, const position_config_t
 PM_RARE void position_turn(position_t *self, const position_config_t *config, pm_angle_t turn, pm_ab_t i)
 {
     self->pll.theta += turn;
-    const pm_dir_t dir = pm_dir(self->pll.theta);
-    const obs_in_t in = {.dir = dir, .omega = self->pll.omega, .i = i, .i_dq = pm_park(i, dir)};
-    observer_reset(&self->observer, &config->observer, &in);
-    injection_reset(&self->injection, &config->injection, &in);
+    seed(self, config, i);
     self->eps_mean = 0;
     self->misfit_mean = 0;
 }
@@ -212,7 +200,7 @@ static void set_quality(position_t *self, const position_config_t *config, const
         misfit = pm_max(misfit, pm_abs(low.misfit));
     }
     (void)pm_lp1(&self->eps_mean, eps, K_MEAN);
-    (void)pm_lp1(&self->misfit_mean, misfit, K_MEAN);
+    (void)pm_lp1(&self->misfit_mean, pm_sat(misfit, PM_Q_BITS), K_MEAN);
     const pm_q_t worst = pm_max(pm_mul(self->eps_mean, PER_EPS_LOST), PER_MISFIT_LOST * self->misfit_mean);
     self->quality = pm_max(0, PM_ONE - worst);
 }

@@ -50,14 +50,13 @@ void start_begin(drive_t *drive)
     follow_reset(&drive->follow, &drive->config.machine);
 }
 
-/* The rotor stands at theta: injection takes over. */
-static void begin_injection(drive_t *drive, pm_angle_t theta)
+void start_injection(drive_t *drive, pm_angle_t theta)
 {
-    position_reset(&drive->position, &drive->config.position, theta, drive->i_ab, true);
+    const pm_pll_t rests = {.theta = theta};
+    position_reset(&drive->position, &drive->config.position, &rests, drive->i_ab, true);
     regulator_reset(&drive->regulator, &drive->config.regulator, (pm_dq_t){0, 0}, (pm_dq_t){0, 0}, 0);
     reference_reset(drive, 0);
     drive->stage = STAGE_VECTOR;
-    drive->state_ms = 0;
 }
 
 #if SEQUENCE_HAS_POLARITY
@@ -119,7 +118,8 @@ static void begin_running(drive_t *drive)
     }
 #endif
     if (drive_injects(drive) && drive->command.mode != DRIVE_MODE_CURRENT) {
-        begin_injection(drive, drive->sequence.theta);
+        start_injection(drive, drive->sequence.theta);
+        drive->state_ms = 0;
     } else {
         drive->state = DRIVE_RUNNING;
     }

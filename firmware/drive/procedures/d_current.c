@@ -1,5 +1,6 @@
 #include "firmware/drive/procedures/injected.h"
 #include "firmware/math/compiler.h"
+#include "firmware/math/filter.h"
 #include "firmware/math/root.h"
 
 #if PM_HAS(d_current)
@@ -16,7 +17,7 @@ void procedure_d_current_begin(drive_t *drive)
     const bool goes_on = drive->stage == STAGE_VECTOR;
     drive->beside.d_current = (d_current_t){.part = goes_on ? PART_NORTH : PART_LOCK, .result = PM_RUNNING};
     if (!goes_on) {
-        inject_at(drive, drive->sequence.theta);
+        start_injection(drive, drive->sequence.theta);
     }
     drive->beside.d_current.theta = drive->position.pll.theta;
 }
@@ -60,7 +61,7 @@ static bool measure_at(drive_t *drive, uint32_t part)
     const polarity_config_t *c = &drive->config.polarity;
     const pm_q_t wanted = part == (uint32_t)PART_NORTH ? c->i_d : -c->i_d;
     const pm_q_t step = (c->i_d / (int32_t)RAMP_MS) + 1;
-    drive->i_ref.d += pm_clamp(wanted - drive->i_ref.d, -step, step);
+    drive->i_ref.d = pm_approach(drive->i_ref.d, wanted, step);
     const uint32_t settled = (part == (uint32_t)PART_NORTH ? RAMP_MS : 2U * RAMP_MS) + DWELL_MS;
     if (self->ms < settled || (self->ms - settled) % c->block_ms != 0U) {
         return false;

@@ -6,17 +6,6 @@
 
 #define INJECT_STAYS PM_TURN(1.0 / 12)
 
-/* Position control begins at theta, at rest and without current. */
-static inline void inject_at(drive_t *drive, pm_angle_t theta)
-{
-    const pm_dq_t none = {0, 0};
-    position_reset(&drive->position, &drive->config.position, theta, drive->i_ab, true);
-    regulator_reset(&drive->regulator, &drive->config.regulator, none, none, 0);
-    reference_reset(drive, 0);
-    drive->i_ref = none;
-    drive->stage = STAGE_VECTOR;
-}
-
 /* The frame is where it was: a rotor at rest has not turned, and injection has not left it for another axis. */
 static inline bool inject_stays(const drive_t *drive, pm_angle_t theta)
 {

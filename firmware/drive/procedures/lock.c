@@ -15,7 +15,7 @@
 void procedure_lock_begin(drive_t *drive)
 {
     drive->beside.lock = (lock_t){.misfit = -PM_ONE};
-    inject_at(drive, 0);
+    start_injection(drive, 0);
 }
 
 /* The loop is open: the frame stays where it is. */

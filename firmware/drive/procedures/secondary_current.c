@@ -16,7 +16,7 @@ void procedure_secondary_current_begin(drive_t *drive)
     drive->beside.secondary_current = (secondary_current_t){.ms = goes_on ? (uint16_t)LOCK_MS : 0U,
                                                             .wanted = drive->config.polarity.values};
     if (!goes_on) {
-        inject_at(drive, drive->sequence.theta);
+        start_injection(drive, drive->sequence.theta);
     }
     drive->beside.secondary_current.theta = drive->position.pll.theta;
 }

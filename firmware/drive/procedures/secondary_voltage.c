@@ -13,7 +13,7 @@ void procedure_secondary_voltage_begin(drive_t *drive)
     const bool goes_on = drive->stage == STAGE_VECTOR;
     drive->beside.secondary_voltage = (secondary_voltage_t){.ms = goes_on ? (uint16_t)LOCK_MS : 0U};
     if (!goes_on) {
-        inject_at(drive, drive->sequence.theta);
+        start_injection(drive, drive->sequence.theta);
     }
     drive->beside.secondary_voltage.theta = drive->position.pll.theta;
 }

@@ -17,7 +17,7 @@ enum { PART_LOCK, PART_FORTH, PART_BACK, PART_TOLD };
 void procedure_torque_polarity_begin(drive_t *drive)
 {
     drive->beside.torque_polarity = (torque_polarity_t){.part = PART_LOCK};
-    inject_at(drive, drive->sequence.theta);
+    start_injection(drive, drive->sequence.theta);
 }
 
 /* A direction begins from where the rotor is. */

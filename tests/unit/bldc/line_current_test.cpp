@@ -79,6 +79,23 @@ TEST(LineCurrent, KeepsTheVoltageAtWhatTheShuntsShow)
     EXPECT_EQ(line.self.u, fixed(0.8, 28));
 }
 
+// Down to a sixteenth of full scale, also one that falls between two milliseconds.
+TEST(LineCurrent, ASmallLinkIsUsedWhole)
+{
+    const line_current_config_t c = config();
+    for (const double v_dc : {0.0625, 0.1, 0.13, 0.6, 1.0}) {
+        line_current_t self = {};
+        line_current_reset(&self, &c, 0);
+        line_current_prepare(&self, fixed(0.3, 28), fixed(v_dc / 2, 28), fixed(v_dc, 28));
+        line_current_step(&self, &c, fixed(0.3, 28), fixed(v_dc, 28));
+        EXPECT_NEAR(real(self.u), 0.5, 1e-5) << v_dc;
+        line_current_step(&self, &c, fixed(-2, 28), fixed(v_dc, 28));
+        EXPECT_NEAR(real(self.u), 1, 1e-5) << v_dc;
+        line_current_step(&self, &c, fixed(-2, 28), fixed(2 * v_dc, 28));
+        EXPECT_EQ(self.u, PM_ONE) << v_dc;
+    }
+}
+
 TEST(LineCurrent, ReachesItsReferenceWithTheBandwidth)
 {
     Line x(8);

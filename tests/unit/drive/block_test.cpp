@@ -86,11 +86,13 @@ TEST(Block, AReversalEndsItAndBeginsAnew)
 }
 
 // Braked slowly enough that crossings tell the speed, it ends at three quarters of six_step_speed; braked fast it is lost below
-// that, which ends it as well.
+// that, which ends it as well, also where no rotor that turns is looked for.
 TEST(Block, AStopSwitchesOffAtTheLowerLimit)
 {
-    for (const int32_t acceleration : {60000, 300000}) {
+    for (const auto &[acceleration, flying_start] :
+         {std::pair{60000, 1}, std::pair{300000, 1}, std::pair{60000, 0}, std::pair{300000, 0}}) {
         Fan x;
+        x.params().flying_start = flying_start;
         x.turn(acceleration);
         x.stop();
         for (int ms = 0; ms < 1500 && drive_status(&x.drive())->state != DRIVE_OFF; ++ms) {

@@ -10,6 +10,8 @@
 namespace direct
 {
 
+constexpr pm_pll_t kAtRest = {0, 0};
+
 inline uint16_t current_code(double i_pu)
 {
     return static_cast<uint16_t>(std::lround(32768 * (1 + i_pu)));

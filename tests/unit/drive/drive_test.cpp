@@ -262,8 +262,9 @@ TEST(Drive, StateIsSmall)
     // third harmonic has shown, to both kinds of commutation, 12 the duty of block commutation: command, reference, ramp, 8 the
     // steps of the current that tells the pole by its torque, 28 what unlike resistors of the star make, 4 how far the current
     // of an imposed vector may rise, 48 what the EMF within the zero vectors keeps from one sample to the next, 8 what low-side
-    // shunts show in block commutation, and 8 what makes the active flux stiff against the speed control
-    EXPECT_LE(sizeof(drive_t), 2448U + sizeof(injection_t) + sizeof(saliency_map_result_t));
+    // shunts show in block commutation, 8 what makes the active flux stiff against the speed control, and 8 where the DC link was and
+    // will be
+    EXPECT_LE(sizeof(drive_t), 2456U + sizeof(injection_t) + sizeof(saliency_map_result_t));
 }
 
 TEST(Drive, StaysOffWithoutACommand)
@@ -509,7 +510,7 @@ TEST(Drive, InjectionSettlesForThirtyMilliseconds)
     x.d.sequence.procedure = PROCEDURE_NONE;
     x.d.i_abc = {0, 0, 0};
     x.d.i_ref = {PM_Q(0.1), PM_Q(0.1)};
-    position_reset(&x.d.position, &x.d.config.position, 0, {0, 0}, true);
+    position_reset(&x.d.position, &x.d.config.position, &direct::kAtRest, {0, 0}, true);
     x.d.position.pll.omega = PM_Q(0.05);
     for (int ms = 1; ms < 30; ++ms) {
         drive_slow(&x.d, &x.slow);
@@ -650,11 +651,16 @@ TEST(Drive, GoodParametersEndTheirFault)
     ASSERT_TRUE(drive_configure(&config, &good, PM_CHANNELS).ok);
     x.run_ms(1);
     ASSERT_EQ(x.d.state, DRIVE_FAULT);
+    x.enable(true, DRIVE_MODE_SPEED); // of before
     drive_reconfigure(&x.d, &config);
     EXPECT_EQ(x.d.state, DRIVE_OFF); // at once
-    x.run_ms(1);
+    x.run_ms(3);
     EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
     EXPECT_EQ(x.state(), DRIVE_OFF);
+    x.enable(true, DRIVE_MODE_SPEED);
+    x.run_ms(1);
+    EXPECT_EQ(x.state(), DRIVE_CALIBRATING);
+    x.enable(false, DRIVE_MODE_SPEED);
     // another fault stays
     x.in.hw_fault = true;
     x.run_ms(1);

@@ -56,7 +56,7 @@ struct Fast : direct::Drive {
         d.state = DRIVE_RUNNING;
         d.stage = STAGE_VECTOR;
         d.sequence.procedure = PROCEDURE_NONE;
-        position_reset(&d.position, &d.config.position, 0, {0, 0}, false);
+        position_reset(&d.position, &d.config.position, &direct::kAtRest, {0, 0}, false);
         d.position.quality = PM_ONE;
         d.pll.omega = d.status.omega_ref = bench::fixed(omega / kTrip, 28);
         d.status.v_dc = bench::fixed(v_V / 450, 28);

@@ -90,13 +90,15 @@ TEST(OpenLoop, BeginsWithNothing)
     Drive x(direct::params(2));
     x.d.omega_ramp = x.d.omega_open = x.d.emf_open = x.d.i_open = PM_Q(0.3);
     x.d.agree_ms = 7;
+    x.d.i_ref = {PM_Q(0.1), PM_Q(-0.2)};
     x.d.position.quality = 0;
     regulator_reset(&x.d.regulator, &x.d.config.regulator, {PM_Q(0.2), PM_Q(-0.3)}, {PM_Q(0.1), 0},
                     PM_Q(0.5));
     open_loop_start(&x.d);
     EXPECT_EQ(x.d.stage, STAGE_OPEN_LOOP);
     EXPECT_EQ(x.d.theta_open, PM_TURN(0.75));
-    for (const pm_q_t begins : {x.d.omega_ramp, x.d.omega_open, x.d.emf_open, x.d.i_open}) {
+    for (const pm_q_t begins :
+         {x.d.omega_ramp, x.d.omega_open, x.d.emf_open, x.d.i_open, x.d.i_ref.d, x.d.i_ref.q}) {
         EXPECT_EQ(begins, 0);
     }
     EXPECT_EQ(x.d.agree_ms, 0);
@@ -128,17 +130,21 @@ TEST(OpenLoop, SpeedRampsAfterTheAlign)
     }
 }
 
-// In torque mode the open loop only serves to reach the speed at which the observer takes over, a quarter above speed_high
-// (40 rad/s), in the direction of the torque.
+// In torque mode the open loop only serves to reach the speed at which the observer takes over, a quarter above speed_high, in the
+// direction of the torque; at most speed_max (150 rad/s).
 TEST(OpenLoop, TorqueModeGoesBeyondSpeedHigh)
 {
     for (const double torque : {0.1, -0.1}) {
-        Drive x = started();
-        x.d.command.mode = DRIVE_MODE_TORQUE;
-        x.d.torque_target = bench::fixed(torque, 28);
-        x.d.config.position.omega_high = PM_Q(40.0 * 3 / 540);
-        slow_with(x, kAlign_ms + 1200);
-        EXPECT_NEAR(real(x.d.omega_ramp), std::copysign(1.25 * 40 * 3 / 540, torque), 1e-5);
+        for (const double high : {40.0, 130.0}) {
+            Drive x = started();
+            x.d.command.mode = DRIVE_MODE_TORQUE;
+            x.d.torque_target = bench::fixed(torque, 28);
+            x.d.config.position.omega_high = bench::fixed(high * 3 / 540, 28);
+            x.d.config.position.omega_low = x.d.config.position.omega_high - 1; // no hand-over before
+            slow_with(x, kAlign_ms + 8000);
+            EXPECT_NEAR(real(x.d.omega_ramp), std::copysign(std::min(1.25 * high, 150.0) * 3 / 540, torque),
+                        1e-5);
+        }
     }
 }
 
@@ -445,7 +451,7 @@ TEST(OpenLoop, FallsBackWhenReferenceAndEstimateAreSlow)
         x.d.state = DRIVE_RUNNING;
         x.d.stage = STAGE_VECTOR;
         x.d.sequence.procedure = PROCEDURE_NONE;
-        position_reset(&x.d.position, &x.d.config.position, 0, {0, 0}, true);
+        position_reset(&x.d.position, &x.d.config.position, &direct::kAtRest, {0, 0}, true);
         x.d.position.pll.omega = bench::fixed(at.estimate, 28);
         x.d.speed.reference = bench::fixed(at.reference, 28);
         drive_slow(&x.d, &x.slow);

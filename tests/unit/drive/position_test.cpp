@@ -27,6 +27,7 @@ constexpr double kLow = 0.12, kHigh = 0.24;
 
 // Where the voltage acts does not matter here.
 constexpr pm_dir_t kNoTurn = {PM_UNIT_MAX, 0};
+constexpr pm_pll_t kAtRest = {0, 0};
 constexpr pm_ab_t kNoVoltage = {0, 0};
 constexpr position_in_t kStill = {&kNoVoltage, {0, 0}, &kNoTurn, nullptr};
 
@@ -63,7 +64,7 @@ position_config_t config(bool injection = true)
 position_t started(const position_config_t &c)
 {
     position_t self;
-    position_reset(&self, &c, 0, {0, 0}, true);
+    position_reset(&self, &c, &kAtRest, {0, 0}, true);
     return self;
 }
 
@@ -161,12 +162,32 @@ TEST(Position, ResetStartsAtTheGivenAngle)
 {
     const position_config_t c = config();
     position_t self;
-    position_reset(&self, &c, PM_TURN(0.3), {0, 0}, true);
+    const pm_pll_t rests = {PM_TURN(0.3), 0};
+    position_reset(&self, &c, &rests, {0, 0}, true);
     EXPECT_EQ(self.pll.theta, PM_TURN(0.3));
     EXPECT_EQ(self.pll.omega, 0);
     EXPECT_EQ(self.weight, 0);
     EXPECT_EQ(self.quality, PM_ONE);
     EXPECT_TRUE(self.inject);
+    position_reset(&self, &c, &rests, {0, 0}, false);
+    EXPECT_FALSE(self.inject);
+    EXPECT_FALSE(self.carrier);
+}
+
+TEST(Position, ResetAtSpeedInjectsLaterIfAtAll)
+{
+    const position_config_t c = config();
+    position_t self;
+    const pm_pll_t turns = {PM_TURN(0.3), -c.omega_high - 1};
+    for (const bool carrier : {true, false}) {
+        position_reset(&self, &c, &turns, {0, 0}, carrier);
+        EXPECT_EQ(self.pll.omega, turns.omega);
+        EXPECT_EQ(self.omega_mean, turns.omega);
+        EXPECT_EQ(self.weight, PM_ONE);
+        EXPECT_EQ(self.gains.ki, c.pll_high.ki);
+        EXPECT_FALSE(self.inject);
+        EXPECT_EQ(self.carrier, carrier);
+    }
 }
 
 // A machine at a speed where the flux leads.
@@ -175,7 +196,7 @@ class Running
   public:
     explicit Running(double omega) : rotation(bench::kIpmLinear, bench::kIpmBase, omega, {0, 3})
     {
-        position_reset(&self, &c_, 0, {0, 0}, true);
+        position_reset(&self, &c_, &kAtRest, {0, 0}, true);
         self.pll.omega = fixed(omega, 28);
         self.omega_mean = self.pll.omega;
         self.inject = false;
@@ -271,6 +292,22 @@ TEST(Position, QualityFallsWithoutTheCarrier)
         position_slow(&self, &c, {0, 0}, {0, 0});
     }
     EXPECT_LE(ms, kLost_ms);
+}
+
+// A carrier's answer that is far from what was told: up to eight times, sine.h.
+TEST(Position, NoMisfitIsTooLargeForTheQuality)
+{
+    position_config_t c = config();
+    c.injection.id = INJECTION_pulsating_sine;
+    for (const double misfit : {0.6, 3.9, 4.1, 7.9, -7.9}) {
+        position_t self = started(c);
+        for (int ms = 0; ms < 300; ++ms) {
+            self.injection.pulsating_sine.misfit = fixed(misfit, 28);
+            self.injection.pulsating_sine.sine.warm = 100; // nothing of its own yet
+            position_slow(&self, &c, {0, 0}, {0, 0});
+        }
+        EXPECT_EQ(self.quality, 0) << misfit;
+    }
 }
 
 // The resistance that an open loop has seen is taken within half of what the drive is told.

@@ -22,7 +22,7 @@ struct Resting : direct::Drive {
         d.state = DRIVE_RUNNING;
         d.stage = STAGE_VECTOR;
         d.i_abc = {0, 0, 0};
-        position_reset(&d.position, &d.config.position, 0, {0, 0}, true);
+        position_reset(&d.position, &d.config.position, &direct::kAtRest, {0, 0}, true);
     }
 
     static drive_params_t params(int32_t rest_ms)

@@ -139,7 +139,7 @@ TEST(Slip, ThreeArePutRightTheFourthIsAFault)
     d.state = DRIVE_RUNNING;
     d.command.enable = true;
     d.config.protection.lost_ms = UINT16_MAX; // the quality, which such a position has lost, is not asked
-    position_reset(&d.position, &d.config.position, 0, {0, 0}, true);
+    position_reset(&d.position, &d.config.position, &direct::kAtRest, {0, 0}, true);
     d.stage = STAGE_VECTOR;
     const pm_q_t omega = d.config.position.omega_low + d.config.position.omega_low / 8;
     const pm_q_t emf = pm_mul(omega, d.config.machine.psi_m);
