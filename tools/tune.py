@@ -246,6 +246,10 @@ def complete(x):
     C = float(x["inverter"].get("c_leg_F", C))
     f_pwm, why = pwm_in_blocks(told, L, C) if in_blocks(x) else pwm(told, L)
     f_pwm = float(x["inverter"].get("f_pwm_Hz", f_pwm))
+    turn_rad = 1.5 * poles * told["rated", "speed_rated_rad_s"] / f_pwm
+    if turn_rad > 0.5:
+        raise UsageError(f"at {f_pwm / 1e3:g} kHz the field turns by {turn_rad:.2g} rad a period at speed_trip, 1.5 times rated speed",
+                         "the drive needs two periods a radian, and has 60 kHz at most")
     scale = above(1.5 * v, (1, 1.2, 1.5, 2, 2.5, 3, 4, 4.5, 5, 6, 8))
     chosen = {
         "rated": {"torque_rated_Nm": (1.5 * poles * told["electrical", "psi_m_Wb"] * i, "1.5 pole_pairs psi_m i_rated")},
@@ -269,7 +273,9 @@ def complete(x):
             "c_F": (above(20 * i / (v * f_pwm), (1, 2.2, 4.7)), "rated current for a period is 5 % of the link"),
         },
     }
-    return {section: {key: (x[section].get(key, value), "told" if key in x[section] else why)
+    if in_blocks(x) and C > 0:
+        chosen["winding"] = {"r_winding_ohm": (tune.damping(L, C), f"core loss: an open terminal rings with Q = {tune.QUALITY:g}")}
+    return {section: {key: (x.get(section, {}).get(key, value), "told" if key in x.get(section, {}) else why)
                       for key, (value, why) in keys.items()} for section, keys in chosen.items()}
 
 

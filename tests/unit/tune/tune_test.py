@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[3]
 TOOL = ROOT / "tools" / "tune.py"
 SCENARIO = Path(__file__).with_name("start.yaml")
 SATURATED = Path(__file__).with_name("saturated.yaml")
+BRAKE = Path(__file__).with_name("brake.yaml")
 PMSIM = None
 sys.path.insert(0, str(ROOT / "tools"))
 import tune  # noqa: E402
@@ -386,6 +387,57 @@ class Tune(unittest.TestCase):
         self.assertEqual(again.returncode, 2)
         self.assertIn("already", again.stderr)
         self.assertEqual(out.read_text(encoding="utf-8"), text)
+
+    def test_a_position_is_not_lost_for_braking(self):
+        """E-bike: 0.8 of rated torque over J is followed 0.25 rad behind, of which 0.3 counts as lost. Twin: 0.5 rad."""
+        tuned = yaml.safe_load(self.tune(motor("e-bike, mid drive")).stdout)
+        d = tuned["drive"]
+        slope = 0.8 * 1.5 * d["pole_pairs"] ** 2 * d["psi_m"] * d["i_rated"] / d["J"]
+        self.assertAlmostEqual(slope / (2 * math.pi * d["flux_bandwidth"]) ** 2, 0.25, delta=0.001)
+        code, text = self.run_seeds(tuned, BRAKE)
+        self.assertEqual(code, 0, text)
+        twin = {**tuned, "drive": {**d, "flux_bandwidth": d["flux_bandwidth"] / math.sqrt(2)}}
+        code, text = self.run_seeds(twin, BRAKE)
+        self.assertRegex(text, "FAIL +angle_error_max_deg.* 0 of 3")
+
+    def test_a_wire_that_is_off_shows_at_light_load(self):
+        """Within twice the zone in which a leg's capacitance turns the edges, 1.7 C v / t, no wire is looked for."""
+        told = motor("servo")
+        for C, i in ((0.5e-9, 0.4), (2e-9, 1.1 * 2 * 1.7 * 2e-9 * 160 / 2e-6), (5e-9, 0.8)):  # a tenth and a fifth of 4 A
+            told["inverter"] = {"dead_time_s": 2e-6, "c_leg_F": C}
+            self.assertAlmostEqual(self.drive(told)["i_d_light"], i, delta=0.001)
+
+    def test_what_turns_slowly_is_given_time_and_a_gain_that_fits(self):
+        told = motor("scooter")
+        self.assertEqual(self.drive(told)["t_align"], 0.5)
+        told["mechanics"]["J_kgm2"] = 6.0  # with its rider
+        d = self.drive(told)
+        swing = math.sqrt(1.5 * 15 ** 2 * 0.02 * d["i_open_loop"] / 6.0)
+        self.assertAlmostEqual(d["t_align"], 3 * 2 * math.pi / swing, delta=0.01)
+        gain = 2 * math.pi * d["speed_bandwidth"] * 6.0 / (1.5 * 15 ** 2 * 0.02) * 15 * d["speed_trip"] / 100
+        self.assertLess(gain, 32)  # the drive's format, in bases of 100 A and speed_trip
+        told["drive"] = {**d}
+        self.told.write_text(yaml.safe_dump(yaml.safe_load(self.tune(told).stdout)), encoding="utf-8")
+        result = subprocess.run([PMSIM, "params", "--machine", str(self.told), "--page", str(self.told.with_suffix(".bin"))],
+                                capture_output=True, text=True, check=False)
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+    def test_more_than_the_drive_can_turn_is_said(self):
+        told = motor("2212 drone motor")
+        told["rated"]["speed_rated_rad_s"] = 3000
+        self.refused(told, "60 kHz")
+
+    def test_blocks_start_on_terminals_that_ring_as_told(self):
+        """Q = 3. Twin: terminals without a loss, which ring on."""
+        told = {"name": "EC 45", "electrical": {"R_s_ohm": 0.515, "L_d0_H": 0.28e-3, "L_q0_H": 0.29e-3, "psi_m_Wb": 2.42e-3, "pole_pairs": 8},
+                "mechanics": {"J_kgm2": 1.35e-5}, "rated": {"i_rated_A": 2.6, "speed_rated_rad_s": 550, "v_dc_V": 24},
+                "drive": {"commutation": 1}}
+        tuned = yaml.safe_load(self.tune(told).stdout)
+        self.assertAlmostEqual(tuned["winding"]["r_winding_ohm"], 2 * math.sqrt(1.5 * 0.28e-3 / 2e-9), delta=1)
+        self.runs_into(tuned, "NONE")
+        twin = {key: value for key, value in tuned.items() if key != "winding"}
+        code, text = self.run_seeds(twin, SCENARIO)
+        self.assertEqual(code, 1, text)
 
     def test_a_tuned_file_is_tuned_to_itself(self):
         once = yaml.safe_load(self.tune(motor("compressor")).stdout)

@@ -31,20 +31,21 @@ WHY = {
     "speed_max": "1.25 times rated",
     "speed_trip": "1.2 times speed_max",
     "v_dc_min": "30 % of the link, and 7 % of the converter's range; more where R or L is far above what the board is made for",
-    "v_dc_derate": "127 % of the link",
+    "v_dc_derate": "120 % of the link, a battery that is full",
     "v_dc_max": "133 % of the link, at most 96 % of the converter's range",
     "current_bandwidth": "a twentieth of f_pwm, a tenth with what saturation leaves of L_q; at most 1500 Hz, and what the link "
                          "drives a tenth of rated current with",
     "injection_bandwidth": "slow enough for the noise of the smallest answer that leads",
     "speed_bandwidth": "six times rated torque over the inertia at rated speed; below the position's loop, also with what "
-                       "saliency adds to the torque",
+                       "saliency adds to the torque; a gain that the drive's format has",
     "acceleration": "0.3 of rated torque, over what saliency adds to it; at most what the slower position loop "
                     "follows 0.12 rad behind",
-    "flux_bandwidth": "follows 0.8 of rated torque within half a radian",
+    "flux_bandwidth": "follows 0.8 of rated torque within a quarter of a radian, short of the 0.3 that count as lost; 25 to 120 Hz",
     "flux_gain": "half where the machine saturates or is salient; damping costs nothing elsewhere",
     "speed_low": "with injection 15 % of rated speed; without 4 %, and half of speed_high",
     "speed_high": "with injection 27 % of rated speed; without 8 %, and an EMF above what a leg loses and R i is off by",
-    "i_d_light": "a tenth of rated: light load stays out of what dead time does to small currents",
+    "i_d_light": "a tenth of rated, a fifth at most: light load stays out of what dead time does to small currents, where a wire that "
+                 "is off is not seen",
     "i_fw_max": "half of rated",
     "comp_zone": "a dozen steps of the converter",
     "v_injection": "seven steps of the converter as an answer, 14 times what a leg loses; as the link and i_trip leave room",
@@ -53,7 +54,7 @@ WHY = {
     "i_open_loop": "0.8 of rated, bears half the rated torque 39 degrees behind; at most psi_m/(2 (L_q - L_d)), or saliency "
                    "turns the rotor away",
     "open_loop_damping": "0.7; less where dead time and drops take more of a leg than 2.5 times the EMF of a rotor that swings",
-    "t_align": "half a second",
+    "t_align": "half a second, three swings of the rotor on the vector at least",
     "t_stall": "a fault well within a second of a rotor that does not turn",
     "six_step_speed": "10 % of rated, where an open terminal shows its EMF",
     "pattern": "both legs chopped: the open terminal shows its EMF for half a period and more, and never beyond the rails",
@@ -103,8 +104,24 @@ def _open_loop(x):
 def _damping(x, i_open):
     """Of the rotor on the vector. It sees the swing by its EMF, psi_m times the swing's frequency at an amplitude of a radian; what
     dead time and drops leave beside that is noise, which damping would turn into motion."""
-    swing = x["psi_m"] * math.sqrt(1.5 * x["pole_pairs"] ** 2 * x["psi_m"] * i_open / x["J"])
+    swing = x["psi_m"] * _swing(x, i_open)
     return 0.7 * min(1.0, swing / (0.4 * _lost(x))) if _lost(x) > 0 else 0.7
+
+
+def _judged(x):
+    """Current from which on the drive looks whether all legs conduct: twice the zone in which a leg's capacitance turns the edges
+    (firmware/drive/open_phase.h), with a margin of a tenth."""
+    return 1.1 * 2 * 1.7 * x.get("leg_capacitance", 0.0) * x["v_dc_nominal"] / x["dead_time"] if x["dead_time"] > 0 else 0.0
+
+
+def _swing(x, i_open):
+    """Of the rotor on the vector, rad/s."""
+    return math.sqrt(1.5 * x["pole_pairs"] ** 2 * x["psi_m"] * i_open / x["J"])
+
+
+def _stiffest(x):
+    """Bandwidth of speed control whose gain, w J / (1.5 p^2 psi_m) of its bases, the drive's format has, Hz."""
+    return 30 * 1.5 * x["pole_pairs"] * x["psi_m"] * x["i_full_scale"] / (2 * math.pi * x["J"] * 1.2 * x["speed_max"])
 
 
 def _reach(x):
@@ -164,6 +181,11 @@ def ringing(L, C):
     return DECAY * 2 * QUALITY * math.sqrt(1.5 * L * C)
 
 
+def damping(L, C):
+    """Resistor across each winding with which an open terminal rings with QUALITY, ohm (docs/plant.md)."""
+    return QUALITY / 1.5 * math.sqrt(1.5 * L / C)
+
+
 def _in_blocks(x, speed_bandwidth):
     """What block commutation has beside the rest. six_step_start 1 goes from the align. Speed is known once in a sector, as the mean
     of a turn."""
@@ -187,7 +209,7 @@ def limits(x):
                          f"its channels reach {i_scale:g} A and {v_scale:g} V")
     return {
         "i_max": 1.25 * current, "i_trip": min(2.25 * current, 0.9 * i_scale), "speed_trip": 1.2 * speed,
-        "v_dc_min": _v_dc_min(x), "v_dc_derate": min(1.27 * link, 0.93 * v_scale),
+        "v_dc_min": _v_dc_min(x), "v_dc_derate": min(1.2 * link, 0.88 * v_scale),
         "v_dc_max": min(1.33 * link, 0.96 * v_scale),
     }
 
@@ -202,7 +224,7 @@ def values(x, bandwidth=None, tolerance=MEASURED):
     torque = 1.5 * x["pole_pairs"] * x["psi_m"] * x["i_rated"]
     jerk = torque / x["J"]  # rad/s2 at rated torque
     v_injection, leads = _injection(x, tolerance)
-    position_Hz = min(max(math.sqrt(1.6 * jerk * x["pole_pairs"]) / (2 * math.pi), 25.0), 60.0)
+    position_Hz = min(max(math.sqrt(3.2 * jerk * x["pole_pairs"]) / (2 * math.pi), 25.0), 120.0)
     slower = min(position_Hz, INJECTION_HZ) if leads else position_Hz
     behind = LAG * (2 * math.pi * slower) ** 2 / x["pole_pairs"]
     ripple = x["v_dc_nominal"] / (x["L_d"] * x["f_pwm"])  # of the current by the pulses: light load must be beyond it
@@ -212,13 +234,13 @@ def values(x, bandwidth=None, tolerance=MEASURED):
         "current_bandwidth": bandwidth or min(x["f_pwm"] / 20, highest * x["L_qh_rated"] / x["L_q"], 1500.0, _reach(x)),
         "injection_bandwidth": INJECTION_HZ,
         "speed_bandwidth": min(max(6 * jerk / rated_speed / (2 * math.pi), 2.0),
-                               INJECTION_HZ / 3.5 / _reluctance(x) if leads else 10.0),
+                               INJECTION_HZ / 3.5 / _reluctance(x) if leads else 10.0, _stiffest(x)),
         "acceleration": min(0.3 * jerk / _reluctance(x), behind),
         "flux_bandwidth": position_Hz,
         "flux_gain": _flux_gain(x),
         "speed_low": low,
         "speed_high": high,
-        "i_d_light": min(max(0.1 * x["i_rated"], 0.05 * ripple), 0.2 * x["i_rated"]),
+        "i_d_light": min(max(0.1 * x["i_rated"], 0.05 * ripple, _judged(x)), 0.2 * x["i_rated"]),
         "i_fw_max": 0.5 * x["i_rated"],
         "comp_zone": 12 * 2 * x["i_full_scale"] / STEPS,
         "v_injection": v_injection,
@@ -226,7 +248,7 @@ def values(x, bandwidth=None, tolerance=MEASURED):
         "start_method": 0 if leads else 2,
         "i_open_loop": i_open,
         "open_loop_damping": _damping(x, i_open),
-        "t_align": 0.5,
+        "t_align": min(max(0.5, 3 * 2 * math.pi / _swing(x, i_open)), 10.0),
         "open_loop_acceleration": min(0.1 * jerk, high / 0.6),
         "t_stall": STALL_S,
     }
