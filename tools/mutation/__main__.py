@@ -18,7 +18,7 @@ import tree  # noqa: E402
 import trials  # noqa: E402
 from tree import OUT, ROOT  # noqa: E402
 
-DEFAULT = ["firmware", "observers", "injection", "tools/pmsim/metrics*.cpp", "tools/pmsim/runner.cpp"]
+DEFAULT = ["firmware", "observers", "injection", "bldc", "tools/pmsim/metrics*.cpp", "tools/pmsim/runner.cpp"]
 NOT_OURS_TO_MUTATE = re.compile(r"dictionary_(table|slots)|trig_table|allocations|/images/|main\.c$")
 # Tests that cannot see these sources, or that measure time.
 LEFT_OUT = (r"^(board_|sim_plant_|stm32g431|hal_linux|contract_hal_linux|build\.|pmsim\.plot|"
