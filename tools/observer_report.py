@@ -99,16 +99,16 @@ class Study:
     def __init__(self, machine, profile, cases, start_s, end_s, drive="", sections=""):
         self.names = [name for name, _ in cases]
         self.window_s = end_s - start_s
-        keys = cases[0][1].keys()
         self.head = [f"title: comparison\nmachine: {ROOT}/sim_plant/machines/{MACHINES[machine]}"]
         self.head += [sections] if sections else []
         self.head += [f"drive: {{{self.parameter}: 0, {drive}{START[machine]}}}", f"duration_s: {end_s}",
                       f"start: {{theta_e_deg: {self.theta_e_deg}}}", "cases:"]
-        self.cases = [f"  - {{name: {json.dumps(name)}, " + ", ".join(f"{k}: {values[k]:.7g}" for k in keys) + "}"
-                      for name, values in cases]
         self.tail = ["profile:", profile, "expect:", "  - {metric: fault, equals: NONE, book: \"2.3.3\"}"]
         for metric in SEEN[1:]:
             self.tail.append(f"  - {{metric: {metric}, window_s: [{start_s}, {end_s}], max: 1000, book: \"2.3.3\"}}")
+        used = set(re.findall(r"\$(\w+)", "\n".join(self.head + self.tail)))
+        self.cases = [f"  - {{name: {json.dumps(name)}, " + ", ".join(f"{k}: {x:.7g}" for k, x in values.items() if k in used) + "}"
+                      for name, values in cases]
 
     def text(self, cases=None):
         return "\n".join([*self.head, *(cases or self.cases), *self.tail]) + "\n"
