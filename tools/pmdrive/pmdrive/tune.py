@@ -40,7 +40,7 @@ WHY = {
                        "saliency adds to the torque; a gain that the drive's format has",
     "acceleration": "0.3 of rated torque, over what saliency adds to it; at most what the slower position loop "
                     "follows 0.12 rad behind",
-    "flux_bandwidth": "follows 0.8 of rated torque within a quarter of a radian, short of the 0.3 that count as lost; 25 to 120 Hz",
+    "flux_bandwidth": "follows 0.8 of rated torque within 0.18 rad, well short of the 0.3 that count as lost; 25 to 120 Hz",
     "flux_gain": "half where the machine saturates or is salient; damping costs nothing elsewhere",
     "speed_low": "with injection 15 % of rated speed; without 4 %, and half of speed_high",
     "speed_high": "with injection 27 % of rated speed; without 8 %, and an EMF above what a leg loses and R i is off by",
@@ -224,7 +224,7 @@ def values(x, bandwidth=None, tolerance=MEASURED):
     torque = 1.5 * x["pole_pairs"] * x["psi_m"] * x["i_rated"]
     jerk = torque / x["J"]  # rad/s2 at rated torque
     v_injection, leads = _injection(x, tolerance)
-    position_Hz = min(max(math.sqrt(3.2 * jerk * x["pole_pairs"]) / (2 * math.pi), 25.0), 120.0)
+    position_Hz = min(max(math.sqrt(0.8 / 0.18 * jerk * x["pole_pairs"]) / (2 * math.pi), 25.0), 120.0)
     slower = min(position_Hz, INJECTION_HZ) if leads else position_Hz
     behind = LAG * (2 * math.pi * slower) ** 2 / x["pole_pairs"]
     ripple = x["v_dc_nominal"] / (x["L_d"] * x["f_pwm"])  # of the current by the pulses: light load must be beyond it
