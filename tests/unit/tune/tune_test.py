@@ -400,6 +400,13 @@ class Tune(unittest.TestCase):
         code, text = self.run_seeds(twin, BRAKE)
         self.assertRegex(text, "FAIL +angle_error_max_deg.* 0 of 3")
 
+    def test_speed_control_is_as_fast_as_a_light_rotor_needs(self):
+        """A sixth of the position's loop, which README names, where that is beyond 10 Hz and the rotor's time asks for it."""
+        d = self.drive(motor("NEMA-23"))
+        self.assertGreater(d["speed_bandwidth"], 15)
+        self.assertAlmostEqual(d["speed_bandwidth"], d["flux_bandwidth"] / 6, places=1)
+        self.assertLess(self.drive(motor("scooter"))["speed_bandwidth"], 10)
+
     def test_a_wire_that_is_off_shows_at_light_load(self):
         """Within twice the zone in which a leg's capacitance turns the edges, 1.7 C v / t, no wire is looked for."""
         told = motor("servo")

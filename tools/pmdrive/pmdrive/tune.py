@@ -234,7 +234,7 @@ def values(x, bandwidth=None, tolerance=MEASURED):
         "current_bandwidth": bandwidth or min(x["f_pwm"] / 20, highest * x["L_qh_rated"] / x["L_q"], 1500.0, _reach(x)),
         "injection_bandwidth": INJECTION_HZ,
         "speed_bandwidth": min(max(6 * jerk / rated_speed / (2 * math.pi), 2.0),
-                               INJECTION_HZ / 3.5 / _reluctance(x) if leads else 10.0, _stiffest(x)),
+                               INJECTION_HZ / 3.5 / _reluctance(x) if leads else max(10.0, position_Hz / 6), _stiffest(x)),
         "acceleration": min(0.3 * jerk / _reluctance(x), behind),
         "flux_bandwidth": position_Hz,
         "flux_gain": _flux_gain(x),
