@@ -39,7 +39,8 @@ typedef enum {
 #define OBSERVER_INLINE OBSERVER_active_flux /* the default costs no call */
 /* Those that observer_step() does not hand to observer_step_other(). */
 #define OBSERVER_IS_NEAR(name) (OBSERVER_##name == OBSERVER_INLINE || OBSERVER_##name == OBSERVER_zero_vector)
-/* How many others the image has; one that has active_flux alone takes an instruction more when told so. */
+/* How many others the image has: with 0 the call is left out. Without zero_vector it is one more than there are, since leaving the call
+ * out costs such an image an instruction. */
 enum {
     OBSERVERS_OTHER = (PM_HAS(zero_vector) != 0 ? 0 : 1)
 #define PM_METHOD(name, help, traits, needs) PM_IN_IMAGE(name, +(OBSERVER_IS_NEAR(name) ? 0 : 1))

@@ -16,7 +16,7 @@
  * The load is too high for the current where |along| > 0.65 e, 40 degrees of a round rotor; below 0.4 there is more
  * current than it needs.
  *
- * follow_slow() at 1 kHz while a vector is imposed. Filters of 20 ms; one division, at the end of a rest. State 28 bytes.
+ * follow_slow() at 1 kHz while a vector is imposed. Filters of 20 ms; one division, at the end of a rest. State 32 bytes.
  * Tests: tests/unit/drive/follow_test.cpp, tests/scenario/fault_stall_open.yaml, open_loop_load.yaml,
  * open_loop_salient.yaml. */
 #ifndef DRIVE_FOLLOW_H

@@ -3,7 +3,7 @@
  *
  * Asleep after `injection_rest` of it: no speed or torque is wanted, the rotor stands, i_q is below a 32nd of
  * i_rated in the mean. Then the position stays what it was, the currents are held at zero, and the voltage that this takes is the
- * EMF. Awake again, with the carrier from the next period on,
+ * EMF. Awake again, with the carrier from the next millisecond on,
  *   - within a millisecond of another command
  *   - when the EMF, through 10 ms, shows more than REST_OMEGA: what turns faster is seen by it,
  *   - every REST_LOOK_MS for REST_AWAKE_MS: what turns more slowly gets no further than REST_OMEGA REST_LOOK_MS = 0.6

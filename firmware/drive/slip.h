@@ -12,7 +12,7 @@
  * L di/dt is left out: it passes within the 20 ms. Where |omega| psi_m < 0.4 R i, R 20 % off could count as a slip:
  * nothing is judged there.
  *
- * slip_slow() at 1 kHz while the source leads or shares the lead; no division. State 10 bytes.
+ * slip_slow() at 1 kHz while the source leads or shares the lead; no division. State 8 bytes.
  * Tests: tests/unit/drive/slip_test.cpp, tests/scenario/slip.yaml. */
 #ifndef DRIVE_SLIP_H
 #define DRIVE_SLIP_H
