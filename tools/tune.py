@@ -193,6 +193,11 @@ def dead_time(low, f_pwm):
     return (0.5e-6, "MOSFET board") if low or f_pwm >= FAST_HZ else (2e-6, "IGBT module")
 
 
+def trip_Hz(told):
+    """Turns of the field a second at speed_trip."""
+    return 1.5 * told["electrical", "pole_pairs"] * told["rated", "speed_rated_rad_s"] / (2 * math.pi)
+
+
 def pwm(told, L):
     """Frequency and why. What dead time takes of a leg changes by 2 t_d f_pwm v_dc with its current's sign, and the observer must
     tell the EMF from it at the hand-over: where it would be more than that EMF, fewer periods are taken for a turn and more ripple,
@@ -200,7 +205,7 @@ def pwm(told, L):
     v, i = told["rated", "v_dc_V"], told["rated", "i_rated_A"]
     omega = told["electrical", "pole_pairs"] * told["rated", "speed_rated_rad_s"]
     low = v <= LOW_V
-    turns_Hz = 1.5 * omega / (2 * math.pi)  # at the speed that trips
+    turns_Hz = trip_Hz(told)
     board = max(20e3 if low else 10e3, PER_RISE * told["electrical", "R_s_ohm"] / L)
     wanted = max(board, PER_TURN * turns_Hz, v / (RIPPLE * i * L))
     least = max(board, LEAST_PER_TURN * turns_Hz)
@@ -226,7 +231,7 @@ def in_blocks(x):
 def pwm_in_blocks(told, L, C):
     """Frequency and why: the highest at which an open terminal has rung out within a third of a period."""
     v, i = told["rated", "v_dc_V"], told["rated", "i_rated_A"]
-    turns_Hz = 1.5 * told["electrical", "pole_pairs"] * told["rated", "speed_rated_rad_s"] / (2 * math.pi)
+    turns_Hz = trip_Hz(told)
     board = 20e3 if v <= LOW_V else 10e3
     first, last = (next((f for f in PWM_HZ if f >= max(board, x)), PWM_HZ[-1])
                    for x in (LEAST_PER_TURN * turns_Hz, max(PER_TURN * turns_Hz, v / (RIPPLE * i * L))))
@@ -246,10 +251,9 @@ def complete(x):
     C = float(x["inverter"].get("c_leg_F", C))
     f_pwm, why = pwm_in_blocks(told, L, C) if in_blocks(x) else pwm(told, L)
     f_pwm = float(x["inverter"].get("f_pwm_Hz", f_pwm))
-    turn_rad = 1.5 * poles * told["rated", "speed_rated_rad_s"] / f_pwm
-    if turn_rad > 0.5:
-        raise UsageError(f"at {f_pwm / 1e3:g} kHz the field turns by {turn_rad:.2g} rad a period at speed_trip, 1.5 times rated speed",
-                         "the drive needs two periods a radian, and has 60 kHz at most")
+    if f_pwm < 4 * math.pi * trip_Hz(told):
+        raise UsageError(f"{f_pwm / 1e3:g} kHz are {f_pwm / trip_Hz(told):.3g} periods of a turn of the field at speed_trip, 1.5 times "
+                         "rated speed", f"the drive needs {4 * math.pi:.1f}, and has 60 kHz at most")
     scale = above(1.5 * v, (1, 1.2, 1.5, 2, 2.5, 3, 4, 4.5, 5, 6, 8))
     chosen = {
         "rated": {"torque_rated_Nm": (1.5 * poles * told["electrical", "psi_m_Wb"] * i, "1.5 pole_pairs psi_m i_rated")},

@@ -4,6 +4,8 @@
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
 
+#define FEEDS_SHARE 32 /* of i_max: ten degrees of an i_d of a tenth of rated current, and more */
+
 void drive_trip(drive_t *drive, drive_fault_t fault)
 {
     drive->stage = fault_short_stage(drive, fault); /* which opens the bridge */
@@ -183,8 +185,6 @@ void protection_phases(drive_t *drive)
 }
 
 /* 1 below `from`, 0 above `to`. */
-#define FEEDS_SHARE 32 /* of i_max: ten degrees of an i_d of a tenth of rated current, and more */
-
 static pm_unit_t derate(int32_t x, int32_t from, int32_t to)
 {
     if (x <= from) {
