@@ -3,7 +3,8 @@
  * A port declares what it has (hal_channels(), hal/hal.h), a method what it needs: the last word of its row
  * PM_METHOD(name, help, traits, needs). Both are sums of the names in PM_NEED_LIST. Checked twice:
  *   configuration   the parameter that chooses a method is refused with pm_need_text():
- *                   "needs the neutral voltage: not on this board"
+ *                   "needs the neutral voltage: not on this board"; or "is not in this image", which does not
+ *                   carry the channel, whatever the board has
  *   build           PM_CHANNELS is what the program carries: everything, or in an image what its manifest
  *                   names. A row that needs more fails the build by the method's name (PM_CHECK_NEEDS), a
  *                   board that has less by the channel's name (PM_CHECK_BOARD).
@@ -90,7 +91,7 @@
 extern "C" {
 #endif
 
-/* Why a method is refused, by the first channel that is missing; "" for none. Static text. */
+/* Why a method is refused, by the first channel that is missing of those that are carried; "" for none. Static text. */
 const char *pm_need_text(uint32_t missing);
 
 #ifdef __cplusplus

@@ -6,6 +6,8 @@
 extern "C" {
 #include "firmware/math/legs.h"
 #include "firmware/math/measure.h"
+
+const char *need_text_of_image(uint32_t missing); // pm_need_text() where only the neutral voltage is carried
 }
 
 namespace
@@ -28,6 +30,16 @@ TEST(Measure, AMissingChannelIsNamed)
 TEST(Measure, TheFirstOfSeveralIsNamed)
 {
     EXPECT_STREQ(pm_need_text(NEEDS_CAPTURES | NEEDS_TERMINALS), pm_need_text(NEEDS_TERMINALS));
+}
+
+// A board may have what its image does not carry.
+TEST(Measure, AnImageNamesOnlyTheChannelsThatItCarries)
+{
+    EXPECT_STREQ(need_text_of_image(NEEDS_NEUTRAL), pm_need_text(NEEDS_NEUTRAL));
+    EXPECT_STREQ(need_text_of_image(NEEDS_NEUTRAL | NEEDS_DC_CURRENT), pm_need_text(NEEDS_NEUTRAL));
+    EXPECT_STREQ(need_text_of_image(NEEDS_DC_CURRENT), "is not in this image");
+    EXPECT_STREQ(need_text_of_image(NEEDS_COMMUTATE), "is not in this image");
+    EXPECT_STREQ(need_text_of_image(0), "");
 }
 
 TEST(Legs, StatesOfOneWord)
