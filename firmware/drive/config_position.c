@@ -39,6 +39,13 @@ static pm_unit_t tied_share(maker_t *m)
                : PM_UNIT_MAX;
 }
 
+/* An open-loop start ends where the observer takes over; block commutation may begin right after the align. */
+static bool hands_over(const drive_params_t *p, bool injection)
+{
+    const bool crossings = PM_HAS(six_step) && p->commutation != 0 && p->six_step_start != 0;
+    return !injection && !crossings;
+}
+
 void make_position(maker_t *m, position_config_t *c, bool injection)
 {
     make_observer(m, &c->observer);
@@ -66,6 +73,9 @@ void make_position(maker_t *m, position_config_t *c, bool injection)
     if (m->params->speed_high <= m->params->speed_low) {
         refuse(m, DRIVE_PARAM_speed_high, "must be above speed_low");
         return;
+    }
+    if (m->params->speed_high > m->params->speed_max && hands_over(m->params, injection)) {
+        refuse(m, DRIVE_PARAM_speed_high, "must not be above speed_max without injection");
     }
     c->per_span = per_span(m);
     if (injection) {

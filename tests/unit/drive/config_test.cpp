@@ -101,6 +101,9 @@ const std::vector<Cross> kCrosses = {
      {{DRIVE_PARAM_L_d, 75e-3}, {DRIVE_PARAM_start_method, 3}},
      DRIVE_PARAM_start_method},
     {"speed_high at speed_low", {{DRIVE_PARAM_speed_high, 21}}, DRIVE_PARAM_speed_high},
+    {"hand-over above the highest speed",
+     {{DRIVE_PARAM_start_method, 2}, {DRIVE_PARAM_speed_high, 150.001}},
+     DRIVE_PARAM_speed_high},
     {"trip above the converter", {{DRIVE_PARAM_i_trip, 10.001}}, DRIVE_PARAM_i_trip},
     {"trip at i_max", {{DRIVE_PARAM_i_trip, 5}}, DRIVE_PARAM_i_trip},
     {"over-voltage above the converter", {{DRIVE_PARAM_v_dc_max, 451}}, DRIVE_PARAM_v_dc_max},
@@ -146,6 +149,43 @@ TEST(Config, RefusesWhatCannotBeTogether)
         if (!r.ok) {
             EXPECT_EQ(std::string(drive_param_table[r.param].name), drive_param_table[x.named].name)
                 << x.what;
+        }
+    }
+}
+
+// With injection there is a position at all speeds; block commutation from the align goes on without the observer.
+TEST(Config, AHandOverAboveTheHighestSpeedIsRefusedWhereOpenLoopLeadsToIt)
+{
+    const Changes above = {{DRIVE_PARAM_speed_high, 150.001}};
+    struct {
+        const char *what;
+        Changes changes;
+        bool accepted;
+    } const cases[] = {
+        {"injection", {{DRIVE_PARAM_start_method, 1}}, true},
+        {"injection after the align", {{DRIVE_PARAM_start_method, 3}}, true},
+        {"at the highest speed", {{DRIVE_PARAM_start_method, 2}, {DRIVE_PARAM_speed_high, 150}}, true},
+        {"no saliency", {{DRIVE_PARAM_L_q, 43e-3}}, false},
+        {"blocks from the align",
+         {{DRIVE_PARAM_start_method, 2}, {DRIVE_PARAM_commutation, 1}, {DRIVE_PARAM_six_step_start, 1}},
+         true},
+        {"blocks behind the observer",
+         {{DRIVE_PARAM_start_method, 2},
+          {DRIVE_PARAM_commutation, 1},
+          {DRIVE_PARAM_six_step_start, 0},
+          {DRIVE_PARAM_six_step_speed, 160}},
+         false},
+    };
+    for (const auto &x : cases) {
+        Changes changes = above;
+        changes.insert(changes.end(), x.changes.begin(), x.changes.end());
+        const drive_params_t p = changed(changes);
+        drive_config_t c = {};
+        const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
+        EXPECT_EQ(r.ok, x.accepted) << x.what << ": " << r.reason;
+        if (!x.accepted) {
+            EXPECT_EQ(r.param, DRIVE_PARAM_speed_high) << x.what;
+            EXPECT_STREQ(r.reason, "must not be above speed_max without injection") << x.what;
         }
     }
 }
