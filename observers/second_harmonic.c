@@ -46,6 +46,20 @@ static pm_half_dir_t twice(pm_dir_t dir)
     return pm_dir_sum(dir, dir);
 }
 
+/* With x = 2 theta and y = a cos x + b sin x the resonator's other state is q = a sin x - b cos x, which is its own inverse. */
+void second_harmonic_change(second_harmonic_t *self, second_harmonic_id_t from, second_harmonic_id_t to,
+                            pm_angle_t theta)
+{
+    if (from == SECOND_HARMONIC_STAYS || to == SECOND_HARMONIC_STAYS) {
+        second_harmonic_reset(self);
+        return;
+    }
+    const pm_dq_t mirrored = {.d = self->a, .q = -self->b};
+    const pm_ab_t turned = pm_park_inverse(mirrored, pm_dir(2U * theta));
+    self->a = turned.alpha;
+    self->b = turned.beta;
+}
+
 static pm_q_t notch(second_harmonic_t *self, pm_dir_t dir, pm_q_t eps)
 {
     const pm_half_dir_t at = twice(dir);

@@ -58,6 +58,11 @@ typedef struct {
 
 void second_harmonic_reset(second_harmonic_t *self);
 
+/* Another method between two periods, the next of which has the position theta. The resonator goes on with what the notch has
+ * learnt, and the notch with what the resonator has. */
+void second_harmonic_change(second_harmonic_t *self, second_harmonic_id_t from, second_harmonic_id_t to,
+                            pm_angle_t theta);
+
 /* eps'; dir: direction of the present position. */
 pm_q_t second_harmonic_step(second_harmonic_t *self, const second_harmonic_config_t *config, pm_dir_t dir,
                             pm_q_t eps);

@@ -34,11 +34,22 @@ bool drive_same_frame(const drive_config_t *a, const drive_config_t *b)
 PM_RARE void drive_reconfigure(drive_t *drive, const drive_config_t *config)
 {
     const observer_id_t before = drive->config.position.observer.id;
+#if PM_HAS(second_harmonic)
+    const second_harmonic_id_t removed = drive->config.position.second_harmonic.id;
+#endif
     drive->config = *config;
     const position_config_t *position = &drive->config.position;
     if (position->observer.id != before && drive->stage >= STAGE_OPEN_LOOP) {
         position_change_observer(&drive->position, position, drive->i_ab, drive->status.i);
     }
+#if PM_HAS(second_harmonic)
+    if (position->second_harmonic.id != removed && drive->stage >= STAGE_OPEN_LOOP) {
+        const pm_pll_t *pll = &drive->position.pll;
+        const pm_angle_t turn = (pm_angle_t)pm_omega_to_angle(pll->omega, drive->config.k_theta);
+        second_harmonic_change(&drive->position.second_harmonic, removed, position->second_harmonic.id,
+                               pll->theta + turn);
+    }
+#endif
     if (drive->fault == DRIVE_FAULT_PARAMETERS) {
         drive->command.enable = false;
         drive->fault = DRIVE_FAULT_NONE;

@@ -1,5 +1,5 @@
-// The observer changed by parameter, on the plant with switching inverter, dead time, converter noise and
-// delay.
+// The observer, or the suppression of the second harmonic, changed by parameter: on the plant with switching inverter, dead time,
+// converter noise and delay.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -37,10 +37,15 @@ std::vector<int32_t> observers()
 class Closed
 {
   public:
-    explicit Closed(int32_t observer) : plant_(plant_create(&config_, 1.0, &error_), &plant_destroy)
+    Closed(const plant_config_t &plant, const drive_params_t &params)
+        : config_(plant), params_(params), plant_(plant_create(&config_, 1.0, &error_), &plant_destroy)
     {
-        params_.observer = observer;
         sim_loop_init(&loop, plant_.get(), &params_);
+    }
+
+    explicit Closed(int32_t observer) : Closed(plants::ipm_1000(), direct::params())
+    {
+        this->observer(observer);
     }
 
     void speed(double rad_s, bool enable = true)
@@ -58,9 +63,14 @@ class Closed
 
     void observer(int32_t id)
     {
-        params_.observer = id;
+        set(DRIVE_PARAM_observer, id);
+    }
+
+    void set(drive_param_id_t id, int32_t value)
+    {
+        drive_param_set(&params_, id, value);
         drive_config_t c = {};
-        ASSERT_TRUE(drive_configure(&c, &params_, PM_CHANNELS).ok) << id;
+        ASSERT_TRUE(drive_configure(&c, &params_, PM_CHANNELS).ok) << value;
         ASSERT_TRUE(drive_same_frame(&c, &loop.app.drive.config));
         drive_reconfigure(&loop.app.drive, &c);
     }
@@ -98,8 +108,8 @@ class Closed
     sim_loop_t loop;
 
   private:
-    plant_config_t config_ = plants::ipm_1000();
-    drive_params_t params_ = direct::params();
+    plant_config_t config_;
+    drive_params_t params_;
     const char *error_ = nullptr;
     std::unique_ptr<plant_t, void (*)(plant_t *)> plant_;
 };
@@ -159,6 +169,44 @@ TEST(Switching, OnAStoppedDriveTheNextStartHasTheNewOne)
         EXPECT_EQ(x.state(), DRIVE_RUNNING) << to;
         EXPECT_EQ(x.loop.app.drive.config.position.observer.id, to);
         EXPECT_LT(x.run_ms(100).error_deg, kPosition_deg) << to;
+    }
+}
+
+// tests/scenario/asymmetry.yaml while it runs: a phase with 30 % more resistance, 20 % of speed, rated torque. 4.6 degrees of ripple,
+// 0.4 when it is suppressed. A state read as that of the other method shows 2 to 7 degrees.
+TEST(Switching, SecondHarmonicStaysSuppressedByEitherMethod)
+{
+    constexpr double kSuppressed_deg = 0.6; // the scenario's: mean 0.3, and three times 0.1 of deviation
+    constexpr double kMore = 1.1;           // than all of the ripple, while it comes or goes: 1.04
+    plant_config_t plant = plants::spm_400();
+    plant.winding.dR_ohm[0] = 0.1119;
+    drive_params_t p = direct::params(2);
+    direct::make_spm(p);
+    p.speed_low = 2000;
+    p.speed_high = 3600;
+    p.i_open_loop = 4000;
+    for (const int sign : {1, -1}) {
+        Closed x(plant, p);
+        x.speed(sign * 8.4);
+        x.run_ms(2500);
+        x.load(sign * 2.3);
+        x.run_ms(1000);
+        ASSERT_EQ(x.state(), DRIVE_RUNNING);
+        const double ripple_deg = x.run_ms(300).error_deg;
+        EXPECT_GT(ripple_deg, 3 * kSuppressed_deg);
+        for (const int first : {1, 2}) {
+            const int32_t other = 3 - first;
+            x.set(DRIVE_PARAM_second_harmonic, first);
+            EXPECT_LT(x.run_ms(500).error_deg, kMore * ripple_deg) << "0 to " << first;
+            x.run_ms(500);
+            for (int k = 0; k < 4; ++k) {
+                x.set(DRIVE_PARAM_second_harmonic, k % 2 == 0 ? other : first);
+                EXPECT_LT(x.run_ms(153).error_deg, kSuppressed_deg) << first << ' ' << k;
+            }
+            x.set(DRIVE_PARAM_second_harmonic, 0);
+            EXPECT_LT(x.run_ms(600).error_deg, kMore * ripple_deg) << first << " to 0";
+        }
+        EXPECT_EQ(x.state(), DRIVE_RUNNING);
     }
 }
 

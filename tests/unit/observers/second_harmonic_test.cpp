@@ -20,6 +20,7 @@ using bench::real;
 constexpr double kLeft = 0.20;
 constexpr double kSteady_deg = 0.3;
 constexpr double kTime_s = 0.5;
+constexpr double kGone = 0.01; // what is left of the harmonic once it is learnt
 
 constexpr double kPeriod_s = 100e-6;
 constexpr double kBase_rad_s = 540;
@@ -86,6 +87,14 @@ class Closed
         mean = sum / static_cast<double>(errors.end() - tail);
         return largest;
     }
+
+    void change(second_harmonic_id_t to)
+    {
+        const double next = bench::wrapped(hat_ + omega_ * kPeriod_s);
+        second_harmonic_change(&state, config.id, to, bench::turns(next));
+        config.id = to;
+    }
+
     void speed(double omega_pu)
     {
         omega_pu_ = omega_pu;
@@ -111,7 +120,7 @@ TEST(SecondHarmonic, HarmonicIsSuppressedWithinHalfASecond)
             Closed closed(id, omega);
             closed.run(2.0);
             EXPECT_LE(std::abs(closed.mean), kSteady_deg * kDegree) << id << ' ' << omega;
-            EXPECT_LE(closed.run(0.1), 0.01 * kAmplitude) << id << ' ' << omega;
+            EXPECT_LE(closed.run(0.1), kGone * kAmplitude) << id << ' ' << omega;
         }
     }
 }
@@ -163,6 +172,37 @@ TEST(SecondHarmonic, NotchKeepsItsEstimateThroughAChangeOfSpeed)
     }
     EXPECT_NEAR(real(closed.state.a), a, 0.3 * kAmplitude);
     EXPECT_NEAR(real(closed.state.b), b, 0.3 * kAmplitude);
+}
+
+// By a parameter while the drive runs. The state of the one read as that of the other would be up to twice the harmonic.
+TEST(SecondHarmonic, TheOtherMethodGoesOnWithWhatTheOneHasLearnt)
+{
+    const second_harmonic_id_t both[] = {SECOND_HARMONIC_NOTCH, SECOND_HARMONIC_RESONATOR};
+    for (const double omega : {0.108, 0.2, -0.2, 0.4, 1.0, -1.0}) {
+        Closed closed(SECOND_HARMONIC_NOTCH, omega);
+        closed.run(2.0);
+        for (int k = 1; k < 20; ++k) {
+            closed.change(both[k % 2]);
+            for (int part = 0; part < 5; ++part) { // less than a turn each, so that all of it is looked at
+                EXPECT_LE(closed.run(10e-3), kGone * kAmplitude) << k << ' ' << omega;
+            }
+            closed.run(0.0137); // at other angles
+        }
+    }
+}
+
+TEST(SecondHarmonic, BeginsWithNothingAfterItWasOff)
+{
+    for (const second_harmonic_id_t id : {SECOND_HARMONIC_NOTCH, SECOND_HARMONIC_RESONATOR}) {
+        Closed closed(id, 0.4);
+        closed.run(1.0);
+        closed.change(SECOND_HARMONIC_STAYS);
+        EXPECT_EQ(closed.state.a, 0) << id;
+        closed.state.a = PM_ONE / 2;
+        closed.change(id);
+        EXPECT_EQ(closed.state.a, 0) << id;
+        EXPECT_EQ(closed.state.b, 0) << id;
+    }
 }
 
 TEST(SecondHarmonic, ASteadyErrorSignalPasses)
