@@ -62,18 +62,19 @@ OTHERS = "name", "electrical", "winding", "mechanics", "rated", "inverter", "sen
 
 
 def fields():
-    """{(section, key): (least, most)} of a machine file, as pmsim has them; None of what is no number."""
-    text = (Path(__file__).parent / "pmsim" / "setup_fields.cpp").read_text(encoding="utf-8")
-    found = {}
-    for kind, section, key, least, most in re.findall(r'PM_(\w+)\("(\w+)",\s*"(\w+)",\s*([^,]+),\s*([^,]+),', text):
-        is_number = kind == "FIELD" and (least, most) != ("0", "0") and key not in FLAGS
-        found[section, key] = (float(least), math.inf if most == "PLANT_SETS" else float(most)) if is_number else None
-    return found
+    """{(section, key): (least, most)} of a machine file, as pmsim has them (`pmsim keys`); None of what is no number. And those that
+    are whole numbers."""
+    found, whole = {}, set()
+    for line in (Path(__file__).parent / "machine_keys.txt").read_text(encoding="utf-8").splitlines():
+        if not line.startswith("#"):
+            name, kind, *limits = line.split()
+            place = tuple(name.split("."))
+            found[place] = tuple(map(float, limits)) or None
+            whole |= {place} if kind == "whole" else set()
+    return found, whole
 
 
-FLAGS = "locked", "source_blocks"
-WHOLE = "pole_pairs", "sets", "bits", "timer_counts"
-FIELDS = fields()
+FIELDS, WHOLE = fields()
 SECTIONS = {section for section, _ in FIELDS} | {"drive", "flux_map"}
 PARAMETERS = {entry.name: entry for entry in names.dictionary.ENTRIES if entry.record in names.DRIVE_RECORDS}
 OF_INVERTER = {"f_pwm": "f_pwm_Hz", "timer_counts": "timer_counts"}
@@ -123,7 +124,7 @@ def field(path, section, key, node):
     value, (least, most) = number(path, node, what), FIELDS[section, key]
     if not least <= value <= most:
         refuse(path, node, f"{what} = {node.value} is out of range {least:g} ... {most:g}")
-    if key in WHOLE and value != int(value):
+    if (section, key) in WHOLE and value != int(value):
         refuse(path, node, f"{what} = {node.value} is no whole number")
     return value
 

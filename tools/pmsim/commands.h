@@ -15,6 +15,7 @@ void add_node_command(Command &app, int &exit_code);
 void add_params_command(Command &app);
 void add_tune_command(Command &app);
 void add_metrics_command(Command &app);
+void add_keys_command(Command &app);
 void add_methods_command(Command &app);
 void add_bench_command(Command &app);
 void add_record_command(Command &app);

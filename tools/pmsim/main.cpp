@@ -19,6 +19,7 @@ int main(int argc, char **argv)
     pmsim::add_params_command(app);
     pmsim::add_tune_command(app);
     pmsim::add_metrics_command(app);
+    pmsim::add_keys_command(app);
     pmsim::add_methods_command(app);
     pmsim::add_bench_command(app);
     pmsim::add_record_command(app);

@@ -35,7 +35,7 @@ def expect_exit(code, *arguments):
 
 def check_help():
     text = expect_exit(0, "--help").stdout
-    for command in ("run", "plant", "params", "metrics", "methods", "bench", "record"):
+    for command in ("run", "plant", "params", "metrics", "keys", "methods", "bench", "record"):
         assert command in text, command
         expect_exit(0, command, "--help")
     expect_exit(2)
