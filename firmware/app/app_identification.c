@@ -224,12 +224,9 @@ bool app_identify_put(app_t *app, uint16_t slot, int32_t value)
         (neutral && PM_HAS(zero_inductance) == 0)) {
         return false;
     }
-    commissioning_report_t *report =
-        &app->drive.commissioning_report; /* the drive is off: nobody else writes it */
     app->routines = (uint8_t)value;
-    report->state = (uint8_t)COMMISSIONING_IDLE;
-    report->reason = (uint8_t)COMMISSIONING_NO_REASON;
-    report->progress = 0;
+    procedure_report(&app->drive, COMMISSIONING_IDLE,
+                     COMMISSIONING_NO_REASON); /* it is off: nobody else writes it */
     return true;
 }
 

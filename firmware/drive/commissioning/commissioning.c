@@ -159,19 +159,11 @@ static phase_result_t phase_slow(drive_t *drive)
     }
 }
 
-static void finish(drive_t *drive, commissioning_state_t state, commissioning_reason_t reason)
-{
-    drive->commissioning_report.state = (uint8_t)state;
-    drive->commissioning_report.reason = (uint8_t)reason;
-}
-
 void procedure_identify_begin(drive_t *drive)
 {
     commissioning_report_t *report = &drive->commissioning_report;
     report->routines = drive->command.routines == 0U ? (uint8_t)COMMISSIONING_ALL : drive->command.routines;
-    report->state = (uint8_t)COMMISSIONING_RUNNING;
-    report->reason = (uint8_t)COMMISSIONING_NO_REASON;
-    report->progress = 0;
+    procedure_report(drive, COMMISSIONING_RUNNING, COMMISSIONING_NO_REASON);
     drive->omega_open = 0;
     know(drive);
     enter(drive, SWEEP);
@@ -190,7 +182,7 @@ pm_procedure_t procedure_identify_slow(drive_t *drive)
     self->ms++;
     const phase_result_t result = phase_slow(drive);
     if (result.failed != COMMISSIONING_NO_REASON) {
-        finish(drive, COMMISSIONING_FAILED, result.failed);
+        procedure_report(drive, COMMISSIONING_FAILED, result.failed);
         return reason_of(result.failed);
     }
     if (result.done) {
@@ -200,7 +192,7 @@ pm_procedure_t procedure_identify_slow(drive_t *drive)
         } while (!is_wanted(drive->commissioning_report.routines, next));
         drive->commissioning_report.progress = (uint8_t)(100U * (uint32_t)next / (uint32_t)END);
         if (next == (uint8_t)END) {
-            finish(drive, COMMISSIONING_DONE, COMMISSIONING_NO_REASON);
+            procedure_report(drive, COMMISSIONING_DONE, COMMISSIONING_NO_REASON);
             return PM_DONE;
         }
         enter(drive, next);
@@ -210,5 +202,5 @@ pm_procedure_t procedure_identify_slow(drive_t *drive)
 
 void procedure_identify_abort(drive_t *drive)
 {
-    finish(drive, COMMISSIONING_FAILED, COMMISSIONING_ABORTED);
+    (void)drive; /* procedure_abort() reports it */
 }

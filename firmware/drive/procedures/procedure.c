@@ -97,20 +97,22 @@ bool procedure_without_angle(const drive_t *drive)
 #endif
 }
 
-static void report_identification(drive_t *drive, commissioning_state_t state, commissioning_reason_t reason)
+void procedure_report(drive_t *drive, commissioning_state_t state, commissioning_reason_t reason)
 {
     commissioning_report_t *report = &drive->commissioning_report;
     report->state = (uint8_t)state;
     report->reason = (uint8_t)reason;
-    report->progress = 0;
+    if (state != COMMISSIONING_FAILED) {
+        report->progress = state == COMMISSIONING_DONE ? 100U : 0U;
+    }
 }
 
 void procedure_expect(drive_t *drive)
 {
     if (drive->command.enable && drive->command.mode == DRIVE_MODE_IDENTIFY) {
-        report_identification(drive, COMMISSIONING_RUNNING, COMMISSIONING_NO_REASON);
+        procedure_report(drive, COMMISSIONING_RUNNING, COMMISSIONING_NO_REASON);
     } else if (drive->commissioning_report.state == (uint8_t)COMMISSIONING_RUNNING) {
-        report_identification(drive, COMMISSIONING_FAILED, COMMISSIONING_ABORTED);
+        procedure_report(drive, COMMISSIONING_FAILED, COMMISSIONING_ABORTED);
     } else {
         /* the report of the last one stands */
     }
@@ -130,7 +132,7 @@ void procedure_abort(drive_t *drive)
     default:
         break;
     }
-    if (drive->commissioning_report.state == (uint8_t)COMMISSIONING_RUNNING) { /* not even begun */
-        report_identification(drive, COMMISSIONING_FAILED, COMMISSIONING_ABORTED);
+    if (drive->commissioning_report.state == (uint8_t)COMMISSIONING_RUNNING) { /* begun or not */
+        procedure_report(drive, COMMISSIONING_FAILED, COMMISSIONING_ABORTED);
     }
 }

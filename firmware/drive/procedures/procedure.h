@@ -110,6 +110,9 @@ void procedure_expect(
 pm_procedure_t procedure_slow(drive_t *drive);
 void procedure_abort(drive_t *drive); /* from then on there is none */
 
+/* What the bus reads of an identification. Its progress is 0 at the beginning, 100 when it is done, and stays where it has failed. */
+void procedure_report(drive_t *drive, commissioning_state_t state, commissioning_reason_t reason);
+
 #ifdef __cplusplus
 }
 #endif

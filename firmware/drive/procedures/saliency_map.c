@@ -56,10 +56,8 @@ static void enter(drive_t *drive, uint8_t at)
 
 void procedure_saliency_map_begin(drive_t *drive)
 {
-    commissioning_report_t *report = &drive->commissioning_report;
-    report->routines = (uint8_t)COMMISSIONING_SALIENCY;
-    report->state = (uint8_t)COMMISSIONING_RUNNING;
-    report->reason = (uint8_t)COMMISSIONING_NO_REASON;
+    drive->commissioning_report.routines = (uint8_t)COMMISSIONING_SALIENCY;
+    procedure_report(drive, COMMISSIONING_RUNNING, COMMISSIONING_NO_REASON);
     drive->saliency_map = (saliency_map_result_t){.i = commissioning_current(drive)};
     sine_reset(&drive->procedure.saliency_map.sine, &drive->config.saliency_map.sine, (pm_dq_t){0, 0});
     enter(drive, 0);
@@ -193,13 +191,10 @@ static commissioning_reason_t reason_of(pm_procedure_t result)
 
 static pm_procedure_t finish(drive_t *drive, pm_procedure_t result)
 {
-    commissioning_report_t *report = &drive->commissioning_report;
     if (result == PM_DONE) {
-        report->state = (uint8_t)COMMISSIONING_DONE;
-        report->progress = 100;
+        procedure_report(drive, COMMISSIONING_DONE, COMMISSIONING_NO_REASON);
     } else {
-        report->state = (uint8_t)COMMISSIONING_FAILED;
-        report->reason = (uint8_t)reason_of(result);
+        procedure_report(drive, COMMISSIONING_FAILED, reason_of(result));
         drive->saliency_map = (saliency_map_result_t){.i = 0};
     }
     return result;
@@ -235,8 +230,6 @@ pm_procedure_t procedure_saliency_map_slow(drive_t *drive)
 void procedure_saliency_map_abort(drive_t *drive)
 {
     drive->saliency_map = (saliency_map_result_t){.i = 0};
-    drive->commissioning_report.state = (uint8_t)COMMISSIONING_FAILED;
-    drive->commissioning_report.reason = (uint8_t)COMMISSIONING_ABORTED;
 }
 
 #endif

@@ -46,10 +46,8 @@ static void enter(drive_t *drive, uint8_t part)
 
 void procedure_zero_inductance_begin(drive_t *drive)
 {
-    commissioning_report_t *report = &drive->commissioning_report;
-    report->routines = (uint8_t)COMMISSIONING_NEUTRAL;
-    report->state = (uint8_t)COMMISSIONING_RUNNING;
-    report->reason = (uint8_t)COMMISSIONING_NO_REASON;
+    drive->commissioning_report.routines = (uint8_t)COMMISSIONING_NEUTRAL;
+    procedure_report(drive, COMMISSIONING_RUNNING, COMMISSIONING_NO_REASON);
     drive->zero_inductance = (zero_inductance_result_t){0};
     sine_reset(&drive->procedure.zero_inductance.sine, &drive->config.zero_inductance.sine, (pm_dq_t){0, 0});
     enter(drive, TURN);
@@ -224,14 +222,11 @@ static pm_procedure_t conclude(drive_t *drive)
 
 static pm_procedure_t finish(drive_t *drive, pm_procedure_t result)
 {
-    commissioning_report_t *report = &drive->commissioning_report;
     if (result == PM_DONE) {
-        report->state = (uint8_t)COMMISSIONING_DONE;
-        report->progress = 100;
+        procedure_report(drive, COMMISSIONING_DONE, COMMISSIONING_NO_REASON);
     } else {
-        report->state = (uint8_t)COMMISSIONING_FAILED;
-        report->reason =
-            (uint8_t)(result == PM_FAILED_SALIENCY ? COMMISSIONING_ROUND : COMMISSIONING_NO_CURRENT);
+        procedure_report(drive, COMMISSIONING_FAILED,
+                         result == PM_FAILED_SALIENCY ? COMMISSIONING_ROUND : COMMISSIONING_NO_CURRENT);
         drive->zero_inductance = (zero_inductance_result_t){0};
     }
     return result;
@@ -268,8 +263,6 @@ pm_procedure_t procedure_zero_inductance_slow(drive_t *drive)
 void procedure_zero_inductance_abort(drive_t *drive)
 {
     drive->zero_inductance = (zero_inductance_result_t){0};
-    drive->commissioning_report.state = (uint8_t)COMMISSIONING_FAILED;
-    drive->commissioning_report.reason = (uint8_t)COMMISSIONING_ABORTED;
 }
 
 #endif
