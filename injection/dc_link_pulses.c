@@ -47,7 +47,7 @@ pm_procedure_t dc_link_pulses_find(dc_link_pulses_t *self, const dc_link_pulses_
 {
     for (uint32_t x = 0; x < PULSES_AXES; x++) {
         if (self->response.sum[x] < 5 * config->limits.pole.noise) {
-            return PM_FAILED_TIMEOUT;
+            return PM_FAILED_OPEN;
         }
     }
     return primary_locate(&self->response, &config->limits, &self->found);

@@ -15,7 +15,7 @@
  * Between pulses all legs are off for dc_link_config_t.wait periods: the current's decay by the diodes, as long as the
  * pulse and half of it again, then 5 R C for the link.
  * Call dc_link_pulses_step() each period until it is not PM_RUNNING; after PM_DONE dc_link_pulses_find() once, outside
- * the control interrupt. PM_FAILED_TIMEOUT: the voltage did not fall, nothing is connected.
+ * the control interrupt. PM_FAILED_OPEN: the voltage did not fall, nothing is connected.
  * Duration: 6 repeats (2.5 n + 5 R C / T_s + 7) periods and 1 ms: 120 ms for IPM-1000 with 1 ohm, 470 uF and four
  * repeats. Movement: 1 degree at most (IPM-1000, J of its load machine). Peak of the current: i_pulse and what saturation adds.
  * Tests: tests/unit/injection/dc_link_pulses_test.cpp, tests/scenario/dc_link_pulses.yaml and its twin. */

@@ -27,7 +27,7 @@ static pm_procedure_t drive_pulse(pulses_t *self, const pulses_config_t *config,
         pulses_apply(out, axis, reverse, config->duty);
     } else if (self->timer > config->periods + 1U) {
         if (is_zero(config, i)) {
-            return PM_FAILED_TIMEOUT; /* nothing connected */
+            return PM_FAILED_OPEN;
         }
         self->i = i;
         self->decaying = true;

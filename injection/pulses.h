@@ -94,7 +94,7 @@ static inline void pulses_apply(pulses_out_t *out, uint32_t axis, bool reverse, 
 }
 
 /* One period of the pulse along `axis`. PM_DONE: it is over, self->i are its currents and the next step begins
- * another; PM_FAILED_TIMEOUT: the current did not rise or fall in time. */
+ * another; PM_FAILED_OPEN: no current has come; PM_FAILED_TIMEOUT: it did not fall in time. */
 pm_procedure_t pulses_step(pulses_t *self, const pulses_config_t *config, uint32_t axis, bool reverse,
                            pm_abc_t i, pulses_out_t *out);
 

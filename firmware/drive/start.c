@@ -149,6 +149,18 @@ static uint32_t next_step(const drive_t *drive, uint32_t from)
     return next;
 }
 
+static drive_fault_t fault_of(pm_procedure_t result)
+{
+    switch (result) {
+    case PM_FAILED_OFFSET:
+        return DRIVE_FAULT_SENSOR_OFFSET;
+    case PM_FAILED_OPEN:
+        return DRIVE_FAULT_OPEN_PHASE;
+    default:
+        return DRIVE_FAULT_POSITION_NOT_FOUND;
+    }
+}
+
 /* A procedure has come to its end, this way or that. */
 static void advance(drive_t *drive, pm_procedure_t result)
 {
@@ -163,8 +175,7 @@ static void advance(drive_t *drive, pm_procedure_t result)
     self->procedure = (uint8_t)PROCEDURE_NONE;
     switch (next) {
     case SEQUENCE_FAULT:
-        drive_trip(drive,
-                   result == PM_FAILED_OFFSET ? DRIVE_FAULT_SENSOR_OFFSET : DRIVE_FAULT_POSITION_NOT_FOUND);
+        drive_trip(drive, fault_of(result));
         break;
     case SEQUENCE_RUN:
         begin_running(drive);

@@ -16,6 +16,7 @@ typedef enum {
     PM_FAILED_IMPLAUSIBLE, /* a result that no machine has */
     PM_FAILED_NOT_TURNING, /* the rotor did not follow */
     PM_FAILED_TURNED,      /* the rotor was to stand still */
+    PM_FAILED_OPEN,        /* no current flows: a wire or a switch is open */
     PM_PROCEDURE_COUNT,
 } pm_procedure_t;
 

@@ -18,7 +18,7 @@ const double nan = std::numeric_limits<double>::quiet_NaN();
 std::vector<std::string> refusal_names()
 {
     return {"none",       "done",   "timeout",     "saliency",    "polarity", "offset",
-            "no_current", "uneven", "implausible", "not_turning", "turned"};
+            "no_current", "uneven", "implausible", "not_turning", "turned",   "open"};
 }
 
 // When the drive begins to run.

@@ -80,7 +80,7 @@ TEST(DcLinkPulses, FailsWhenTheVoltageDoesNotFall)
     r.plant.machine.L_d0_H *= 1e4;
     r.plant.machine.L_q0_H *= 1e4;
     r.plant.machine.c_A_Wb5 = 0;
-    EXPECT_EQ(find(kLink, r, config(r), 0.5).state, PM_FAILED_TIMEOUT);
+    EXPECT_EQ(find(kLink, r, config(r), 0.5).state, PM_FAILED_OPEN);
 }
 
 // Four samples before the pulse, one at its end; the legs are off in between.
