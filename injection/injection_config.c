@@ -82,7 +82,7 @@ static pm_num_t answer(const maker_t *m)
 #undef PM_METHOD
     case INJECTION_COUNT:
     default:
-        return pm_num(0);
+        return pm_num(1); /* A: one that the image has not leads to make_injection(), which refuses it */
     }
 }
 
