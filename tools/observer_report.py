@@ -33,6 +33,7 @@ COST = ROOT / "out/build/stm32g431/tests/target/observers/observers_cost.elf"
 # SPM-400 is parametrised as round, whatever its inductances; its open-loop start is against rated load
 START = {"IPM-1000": "", "SPM-400": ", start_method: 2, i_open_loop: 4.5"}
 MACHINES = {"IPM-1000": "ipm_1000.yaml", "SPM-400": "spm_400.yaml"}
+FILES = {**MACHINES, "GMCC KSK89D53U": "gmcc_ksk89d53u.yaml"} # of studies on others
 SPEEDS = [0.05, 0.1, 0.2, 0.5, 1.0]
 LOADS = [0, 0.5, 1]
 USABLE_DEG = 10  # an observer is usable where its largest error at three loads stays below
@@ -99,9 +100,9 @@ class Study:
     def __init__(self, machine, profile, cases, start_s, end_s, drive="", sections=""):
         self.names = [name for name, _ in cases]
         self.window_s = end_s - start_s
-        self.head = [f"title: comparison\nmachine: {ROOT}/sim_plant/machines/{MACHINES[machine]}"]
+        self.head = [f"title: comparison\nmachine: {ROOT}/sim_plant/machines/{FILES[machine]}"]
         self.head += [sections] if sections else []
-        self.head += [f"drive: {{{self.parameter}: 0, {drive}{START[machine]}}}", f"duration_s: {end_s}",
+        self.head += [f"drive: {{{self.parameter}: 0, {drive}{START.get(machine, '')}}}", f"duration_s: {end_s}",
                       f"start: {{theta_e_deg: {self.theta_e_deg}}}", "cases:"]
         self.tail = ["profile:", profile, "expect:", "  - {metric: fault, equals: NONE, book: \"2.3.3\"}"]
         for metric in SEEN[1:]:
