@@ -3,8 +3,8 @@
  *
  *   eps = eps_injection + weight (eps_observer - eps_injection)
  * weight rises from 0 at omega_low to 1 at omega_high; the carrier is on below omega_high and off above
- * 1.1 omega_high (hysteresis). The bandwidths of the loop and of current control move with the weight. Only
- * this module knows both sources, the one of injection/injections.def and the one of observers/observers.def;
+ * 1.1 omega_high (hysteresis). The bandwidth of the loop moves with the weight; that of current control is what the low-speed source
+ * bears as long as the carrier is on, since the current that it separates is what is controlled. Only this module knows both sources, the one of injection/injections.def and the one of observers/observers.def;
  * both keep the contract of firmware/math/estimate.h. The low-speed source steps first: it separates the
  * fundamental current, which the observer takes, from the answer to its carrier.
  * Quality: 1 while the sources agree with the measurement, 0 when the position is lost.
@@ -40,7 +40,7 @@ typedef struct {
     speed_config_t speed;
     pm_q_t omega_low, omega_high;
     int32_t per_span;      /* 1 / (omega_high - omega_low), Q20 */
-    pm_unit_t current_low; /* share of the bandwidth of current control while injection leads */
+    pm_unit_t current_low; /* share of the bandwidth of current control while the carrier is on */
     pm_unit_t tied_share;  /* what a tied observer's disagreement counts */
     uint8_t traits;        /* of the low-speed source */
 #if PM_CARRIES(NEEDS_NEUTRAL)

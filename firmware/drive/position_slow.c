@@ -137,7 +137,7 @@ static int32_t blend(int32_t low, int32_t high, pm_q_t weight)
 
 pm_unit_t position_current_share(const position_t *self, const position_config_t *config)
 {
-    return blend(config->current_low, PM_UNIT_MAX, self->weight);
+    return self->inject ? config->current_low : PM_UNIT_MAX;
 }
 
 PM_RARE void position_turn(position_t *self, const position_config_t *config, pm_angle_t turn, pm_ab_t i)

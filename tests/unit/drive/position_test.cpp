@@ -111,6 +111,22 @@ TEST(Position, CarrierHasHysteresis)
     EXPECT_FALSE(self.inject);
 }
 
+// What is controlled is the current that the source separates, with its delay: as long as there is a carrier.
+TEST(Position, CurrentControlIsSlowedWhileThereIsACarrier)
+{
+    position_config_t c = config();
+    c.current_low = PM_UNIT_MAX / 9;
+    position_t self = started(c);
+    for (const double omega : {0.0, (kLow + kHigh) / 2, 1.05 * kHigh}) {
+        hold(self, c, omega);
+        EXPECT_EQ(position_current_share(&self, &c), c.current_low) << omega;
+    }
+    hold(self, c, 1.2 * kHigh);
+    EXPECT_EQ(position_current_share(&self, &c), PM_UNIT_MAX);
+    hold(self, c, 0.95 * kHigh);
+    EXPECT_EQ(position_current_share(&self, &c), c.current_low);
+}
+
 TEST(Position, WithoutInjectionTheFluxLeadsAlways)
 {
     const position_config_t c = config(false);
