@@ -12,7 +12,8 @@
  * Not I_n cos 2 theta^ of each: the estimate moves with the error that I_p makes, and would hide all of it at
  * 45 degrees. Then the carrier stays on alpha, and I_p follows the load as the saliency map does:
  *   I_p = found I_p(i_q)                                (saliency.h)
- * After any reset it is detected anew. It is not, when the configuration says so: found = 1. */
+ * After a reset at a speed with |omega| t < 0.2 it is detected anew. Faster, as where an observer hands back, what was found before
+ * stands, or 1; also when the configuration says that it is not to be detected. */
 #ifndef INJECTION_STATIONARY_H
 #define INJECTION_STATIONARY_H
 
@@ -35,7 +36,8 @@ typedef struct {
     uint16_t finding; /* values left; 0: found */
 } stationary_t;
 
-void stationary_reset(stationary_t *self, const stationary_config_t *config);
+/* self: what it was, or zeros. omega: per-unit. */
+void stationary_reset(stationary_t *self, const stationary_config_t *config, pm_q_t omega);
 
 /* 1 kHz, while finding: the answer along the axis, position and speed, and I_p(i_q). True when the axis
  * changes with it. */

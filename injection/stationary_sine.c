@@ -6,7 +6,7 @@ void stationary_sine_reset(stationary_sine_t *self, const stationary_sine_config
                            const obs_in_t *in)
 {
     sine_reset(&self->sine, &config->sine, in->i_dq);
-    stationary_reset(&self->stationary, &config->stationary);
+    stationary_reset(&self->stationary, &config->stationary, in->omega);
     self->phase = pm_dir(0);
     self->turn = pm_dir(0);
     self->gain = config->saliency.gain_0;

@@ -10,7 +10,7 @@
 void stationary_square_reset(stationary_square_t *self, const stationary_square_config_t *config,
                              const obs_in_t *in)
 {
-    stationary_reset(&self->stationary, &config->stationary);
+    stationary_reset(&self->stationary, &config->stationary, in->omega);
     self->i = in->i;
     self->half_delta = (pm_dq_t){0, 0};
     self->carrier = -config->v_h;

@@ -155,4 +155,43 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{"square", INJECTION_stationary_square, 35e-4, 0.01, 0.03, 60, 0.040}),
     [](const auto &p) { return p.param.name; });
 
+// The two axes are looked at a time t apart; what I_n leaves of itself is then of the order (omega t)^2.
+TEST(StationaryFound, StandsWhenAFastRotorIsHandedBack)
+{
+    constexpr double kFound = 1.1, kI_p = 0.4, kBetween = 0.8; // rad, at base speed
+    stationary_config_t c = {};
+    c.i_n = bench::fixed(0.1, 28);
+    c.between = bench::fixed(kBetween, 20);
+    c.find = true;
+    const pm_q_t slow = bench::fixed(-0.15 / kBetween, 28), fast = bench::fixed(-0.25 / kBetween, 28);
+    stationary_t s = {};
+    const auto find = [&](unsigned values) {
+        obs_in_t in = {};
+        in.dir = bench::direction(0);
+        for (unsigned k = 0; k < values; ++k) {
+            stationary_find(&s, &c, bench::fixed(kFound * kI_p, 28), &in, bench::fixed(kI_p, 28));
+        }
+    };
+    stationary_reset(&s, &c, fast); // never found: what the configuration says
+    EXPECT_FALSE(stationary_finding(&s));
+    EXPECT_EQ(s.found, PM_ONE);
+    stationary_reset(&s, &c, slow);
+    EXPECT_TRUE(stationary_finding(&s));
+    find(STATIONARY_VALUES);
+    EXPECT_FALSE(stationary_finding(&s));
+    EXPECT_NEAR(bench::real(s.found, 28), kFound, 1e-6);
+    stationary_reset(&s, &c, fast);
+    EXPECT_FALSE(stationary_finding(&s));
+    EXPECT_NEAR(bench::real(s.found, 28), kFound, 1e-6);
+    stationary_reset(&s, &c, slow);
+    find(STATIONARY_VALUES / 2);
+    stationary_reset(&s, &c, fast); // half found is not
+    EXPECT_FALSE(stationary_finding(&s));
+    EXPECT_EQ(s.found, PM_ONE);
+    c.find = false;
+    stationary_reset(&s, &c, 0);
+    EXPECT_FALSE(stationary_finding(&s));
+    EXPECT_EQ(s.found, PM_ONE);
+}
+
 } // namespace
