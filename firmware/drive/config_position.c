@@ -46,15 +46,32 @@ static bool hands_over(const drive_params_t *p, bool injection)
     return !injection && !crossings;
 }
 
-void make_position(maker_t *m, position_config_t *c, bool injection)
+/* Sources and observers that do not go together. */
+static void check_pair(maker_t *m, const position_config_t *c)
 {
-    make_observer(m, &c->observer);
 #if PM_HAS(zero_vector) && PM_HAS(pwm_excitation)
-    if (injection && c->observer.id == OBSERVER_zero_vector &&
-        m->params->injection == (int32_t)INJECTION_pwm_excitation) {
+    if (c->observer.id == OBSERVER_zero_vector && m->params->injection == (int32_t)INJECTION_pwm_excitation) {
         refuse(m, DRIVE_PARAM_injection, "wants the sample of the observer that is chosen");
     }
 #endif
+#if PM_HAS(random_square) && PM_HAS(mras_current)
+    const bool reference = c->observer.id == OBSERVER_mras_current ||
+                           c->observer.id == OBSERVER_mras_voltage || c->observer.id == OBSERVER_mras_simple;
+    if (reference && m->params->injection == (int32_t)INJECTION_random_square) {
+        refuse(m, DRIVE_PARAM_injection,
+               "has the spectrum of an error to a model reference: another carrier");
+    }
+#endif
+    (void)m;
+    (void)c;
+}
+
+void make_position(maker_t *m, position_config_t *c, bool injection)
+{
+    make_observer(m, &c->observer);
+    if (injection) {
+        check_pair(m, c);
+    }
 #if PM_CARRIES(NEEDS_NEUTRAL)
     c->traits_high = (uint8_t)observer_traits(c->observer.id);
 #endif

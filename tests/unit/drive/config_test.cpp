@@ -190,6 +190,33 @@ TEST(Config, AHandOverAboveTheHighestSpeedIsRefusedWhereOpenLoopLeadsToIt)
     }
 }
 
+TEST(Config, SourcesAndObserversThatDoNotGoTogetherAreRefused)
+{
+    const struct {
+        int32_t injection, observer, start_method;
+        const char *reason;
+    } cases[] = {
+        {INJECTION_random_square, OBSERVER_mras_current, 1, "has the spectrum"},
+        {INJECTION_random_square, OBSERVER_mras_voltage, 1, "has the spectrum"},
+        {INJECTION_random_square, OBSERVER_mras_simple, 1, "has the spectrum"},
+        {INJECTION_random_square, OBSERVER_ekf_reduced, 1, ""},
+        {INJECTION_pulsating_square, OBSERVER_mras_current, 1, ""},
+        {INJECTION_random_square, OBSERVER_mras_current, 2, ""}, // open loop: no carrier
+    };
+    for (const auto &x : cases) {
+        const drive_params_t p = changed({{DRIVE_PARAM_injection, static_cast<double>(x.injection)},
+                                          {DRIVE_PARAM_observer, static_cast<double>(x.observer)},
+                                          {DRIVE_PARAM_start_method, static_cast<double>(x.start_method)}});
+        drive_config_t c = {};
+        const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
+        EXPECT_EQ(r.ok, x.reason[0] == '\0') << x.injection << ' ' << x.observer << ": " << r.reason;
+        if (!r.ok) {
+            EXPECT_EQ(r.param, DRIVE_PARAM_injection);
+            EXPECT_EQ(std::string(r.reason).rfind(x.reason, 0), 0U) << r.reason;
+        }
+    }
+}
+
 TEST(Config, RefusesWhatDoesNotFitItsFormat)
 {
     // kp = w_c L / (V/A) beyond 32 of Q26
