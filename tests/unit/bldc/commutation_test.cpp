@@ -195,4 +195,75 @@ TEST(Commutation, InstantsWrap)
     EXPECT_EQ(c.strikes, 0);
 }
 
+// Until the start has seen its crossings t_60 is the last interval alone, from then on the mean of six.
+TEST(Commutation, AStartForgetsAllButTheLastInterval)
+{
+    commutation_t c;
+    commutation_start(&c, 2, 0, 100000, 3);
+    uint32_t at = c.crossing;
+    for (const uint32_t interval : {80000U, 70000U, 66000U}) {
+        EXPECT_GT(c.young, 0);
+        at += interval;
+        commutation_crossed(&c, at);
+        EXPECT_NEAR(commutation_t_60(&c), interval, 1);
+    }
+    EXPECT_EQ(c.young, 0);
+    double sum = 6 * 66000;
+    for (const uint32_t interval : {60000U, 63000U, 62000U, 61000U, 64000U, 60000U}) {
+        at += interval;
+        commutation_crossed(&c, at);
+        sum += interval - 66000.0; // one of those of 66000 goes
+        EXPECT_NEAR(commutation_t_60(&c), sum / 6, 1);
+    }
+}
+
+// Four sectors instead of one, and the half to the commutation.
+TEST(Commutation, ASlowStartIsWaitedForForUpToFourSectors)
+{
+    commutation_t c;
+    const commutation_config_t config = make();
+    commutation_start(&c, 0, 0, 100000, 6);
+    const double t_60 = 2 * (std::sqrt(2) - 1) * 100000;
+    const double crossing = 100000 * std::sqrt(2);
+    c.sector = 1;
+    for (const double ahead : {0.5, 3.9}) {
+        commutation_ahead(&c, static_cast<uint32_t>(crossing + ahead * t_60));
+        EXPECT_NEAR(commutation_due(&c, &config), crossing + (ahead + 0.5) * t_60, 3 * kRounding) << ahead;
+    }
+    for (const double ahead : {4.1, 4.9, 9.0}) {
+        commutation_ahead(&c, static_cast<uint32_t>(crossing + ahead * t_60));
+        EXPECT_NEAR(commutation_due(&c, &config), crossing + 4.5 * t_60, 3 * kRounding) << ahead;
+    }
+}
+
+TEST(Commutation, CrossingsThatAreTakenAsTheyWereAreCountedUpToATurn)
+{
+    commutation_t c = locked();
+    for (uint32_t n = 1; n <= 9; ++n) {
+        commutation_crossed(&c, n * kT60);
+        EXPECT_EQ(c.whole, n < SECTORS ? n : SECTORS);
+    }
+    commutation_crossed(&c, 9 * kT60 + 100); // far too early
+    EXPECT_EQ(c.whole, 0);
+    commutation_crossed(&c, c.crossing + commutation_t_60(&c));
+    EXPECT_EQ(c.whole, 1);
+    commutation_missed(&c);
+    EXPECT_EQ(c.whole, 0);
+}
+
+TEST(Commutation, AllStrikesThatCanBeAskedForAreCounted)
+{
+    commutation_t c = locked();
+    commutation_config_t config = make();
+    config.strikes = 255;
+    for (int n = 1; n < 255; ++n) {
+        commutation_missed(&c);
+        ASSERT_EQ(commutation_state(&c, &config), COMMUTATION_LOCKED) << n;
+    }
+    for (int n = 255; n < 600; ++n) {
+        commutation_missed(&c);
+        ASSERT_EQ(commutation_state(&c, &config), COMMUTATION_LOST) << n;
+    }
+}
+
 } // namespace

@@ -386,4 +386,23 @@ TEST(Freewheeling, BrakingCurrentByThePattern)
     EXPECT_EQ(braking(PATTERN_PWM_ON, 0, 2500), braking(PATTERN_ON_PWM, 0, 2500)) << "an EMF above the link";
 }
 
+// The series of the header to its last term, in fixed point.
+TEST(Freewheeling, SeriesAreThoseOfTheHeader)
+{
+    constexpr double kSeries = 2e-5;
+    const freewheeling_config_t config = kFan.config();
+    const double omega = 0.3 * kFan.base_rad_s;
+    const freewheeling_in_t in = kFan.in(PATTERN_PWM_ON, 0, 0.3, omega);
+    const double x = kFan.x_V(true, 0.3, omega), R = kFan.R_ohm, L = kFan.L_H;
+    const double i = 2 * x / (3 * R); // the most: w = 1/2
+    const double w = 3 * R * i / (2 * x + 3 * R * i), w_2 = w * w;
+    const double angle_rad = 2 * omega * L * w / R * (1 + w_2 * (1.0 / 3 + w_2 * (1.0 / 5 + w_2 / 7)));
+    EXPECT_NEAR(angle(kFan, in, i), angle_rad, kSeries * angle_rad);
+    for (const double e : {0.3, 0.6, 0.99}) {
+        const double rad = e * omega * L / R;
+        const double back_A = x * rad / (3 * omega * L) * (1 + e / 2 + e * e / 6 + e * e * e / 24);
+        EXPECT_NEAR(real(freewheeling_current(&config, &in, fixed(rad))) * kBase_A, back_A, kSeries * back_A);
+    }
+}
+
 } // namespace

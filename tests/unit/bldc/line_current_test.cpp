@@ -229,4 +229,18 @@ TEST(LineCurrent, ALineOfItsShareHasTheFundamentalOfQ)
     EXPECT_NEAR(real(LINE_OF_PHASES) * real(LINE_OF_Q), 1.5, 1e-7);
 }
 
+// The millisecond without a duty: the current is controlled again.
+TEST(LineCurrent, ADutyHoldsUntilTheNextMillisecond)
+{
+    Line line(8);
+    line.give(0.6, -20, 20);
+    line.period();
+    EXPECT_NEAR(line.u, 0.6, 1e-7);
+    line.want(3);
+    for (int k = 0; k < 200; ++k) {
+        line.period();
+    }
+    EXPECT_NEAR(line.i_A, 3, kRest_A);
+}
+
 } // namespace

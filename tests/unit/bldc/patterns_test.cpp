@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 #include "tests/unit/bldc/rig.h"
 
@@ -245,6 +246,35 @@ TEST(Patterns, EachShowsTheCrossings)
             EXPECT_TRUE(twin.six_step.lost) << id << complementary;
         }
     }
+}
+
+// An on time of `least` is long enough: u = 1/2 is N counts of the period, or N/2 in each of two pulses.
+TEST(Patterns, TheOnTimeIsSampledDownToTheLeast)
+{
+    for (const auto &[id, on] : {std::pair{PATTERN_H_PWM_L_ON, kN - 1},
+                                 {PATTERN_H_ON_L_PWM, kN - 1},
+                                 {PATTERN_H_PWM_L_PWM_ALTERNATING, (kN - 1) / 2}}) {
+        pattern_config_t c = make(id);
+        c.half_period = kN - 1; // even
+        c.least = static_cast<uint16_t>(on);
+        EXPECT_EQ(pattern_sample(&c, 0, PM_ONE / 2).legs, ZERO_LEGS_APART) << id;
+        c.least++;
+        EXPECT_NE(pattern_sample(&c, 0, PM_ONE / 2).legs, ZERO_LEGS_APART) << id;
+    }
+}
+
+// 1 ... 2 N - 1, also where the lead reaches beyond the period before, or there is none before its end.
+TEST(Patterns, SamplesStayWithinThePeriod)
+{
+    pattern_config_t c = make(PATTERN_H_ON_L_PWM);
+    c.lead = 600;
+    EXPECT_EQ(pattern_sample(&c, 0, fixed(0.25, 28)).at, 1); // the pulse ends at N / 4
+    c.lead = 0;
+    EXPECT_EQ(pattern_sample(&c, 0, 0).at, 2 * kN - 1); // the off time at 2 N
+    c.lead = 1;
+    EXPECT_EQ(pattern_sample(&c, 0, 0).at, 2 * kN - 1);
+    c.lead = 2;
+    EXPECT_EQ(pattern_sample(&c, 0, 0).at, 2 * kN - 2);
 }
 
 } // namespace

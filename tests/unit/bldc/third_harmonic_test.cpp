@@ -175,4 +175,40 @@ TEST(ThirdHarmonic, ARotorThatStopsIsLost)
     EXPECT_TRUE(r.six_step.lost);
 }
 
+// However slow the rotor, zero is not ahead.
+TEST(ThirdHarmonic, ZeroIsNeverAheadOfACrossing)
+{
+    const third_harmonic_config_t config = {1000000, false, false};
+    third_harmonic_t self = {};
+    third_harmonic_slow(&self, &config, 100, 1);
+    EXPECT_GT(self.seen, 0);
+    third_harmonic_open(&self, 0);
+    EXPECT_FALSE(third_harmonic_step(&self, &config, 0, 100, true));
+    EXPECT_FALSE(third_harmonic_step(&self, &config, PM_Q(0.1), 200, true));
+    EXPECT_FALSE(self.ahead);
+}
+
+// A sample ahead of the crossing before it was opened is none of this crossing.
+TEST(ThirdHarmonic, OpeningForgetsTheSampleAhead)
+{
+    const third_harmonic_config_t config = {0, false, false};
+    third_harmonic_t self = {};
+    third_harmonic_slow(&self, &config, 100000, PM_ONE);
+    EXPECT_FALSE(third_harmonic_step(&self, &config, -PM_Q(0.3), 1000, true));
+    third_harmonic_open(&self, 2000);
+    EXPECT_FALSE(third_harmonic_step(&self, &config, PM_Q(0.3), 3000, true));
+}
+
+TEST(ThirdHarmonic, TheLagIsTakenOffTheInstant)
+{
+    const third_harmonic_config_t config = {100000, false, false}; // u = 1/2
+    third_harmonic_t self = {};
+    third_harmonic_slow(&self, &config, 100000, PM_ONE);
+    EXPECT_NEAR(self.lag, 25000, 2);
+    third_harmonic_open(&self, 0);
+    EXPECT_FALSE(third_harmonic_step(&self, &config, -PM_Q(0.3), 100000, true));
+    EXPECT_TRUE(third_harmonic_step(&self, &config, PM_Q(0.1), 104000, true));
+    EXPECT_NEAR(self.crossing, 103000 - 25000, 3);
+}
+
 } // namespace

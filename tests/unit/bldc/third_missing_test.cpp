@@ -97,4 +97,104 @@ TEST(ThirdMissing, FreewheelingAndAnotherSectorBeginAnew)
     }
 }
 
+struct Stepper {
+    third_missing_t seen = {};
+    // The terminal and v_zero relative to what they are at rest.
+    void operator()(double open, double zero = 0, uint8_t sector = 2, zero_legs_t legs = ZERO_LEGS_APART,
+                    double link = kLink)
+    {
+        zero_sample_t sample = {};
+        sample.v_dc = PM_Q(link);
+        sample.v[1] = per_unit(static_cast<double>(legs) * link / 2 + open);
+        const third_missing_in_t in = {&sample, per_unit(zero), sector, 1, legs};
+        third_missing_step(&seen, &kConfig, &in);
+    }
+    void settle(double open, uint8_t sector = 2, zero_legs_t legs = ZERO_LEGS_APART)
+    {
+        for (int k = 0; k < 10; ++k) {
+            (*this)(open, 0, sector, legs);
+        }
+    }
+};
+
+constexpr double kSeen = 0.0008 / (2 * kPsi3 / kPsi); // of the terminal's mean: what is asked for is `least`
+
+// Means of eight: the first sample of a step is an eighth of it.
+TEST(ThirdMissing, SwingsAreThoseOfAMeanOfEight)
+{
+    for (const int way : {1, -1}) {
+        for (const double of_least : {0.9, 1.1}) {
+            Stepper s;
+            s.settle(0.05);
+            s(0.05 + way * 8 * of_least * kSeen);
+            EXPECT_EQ(s.seen.missing, of_least > 1) << way;
+        }
+    }
+}
+
+// A terminal that only rises, or falls, swings too; so does v_zero.
+TEST(ThirdMissing, ASwingHasTwoEnds)
+{
+    for (const int way : {1, -1}) {
+        for (const bool there : {true, false}) {
+            Stepper s;
+            s.settle(-0.05 * way);
+            for (int k = 0; k < 60; ++k) {
+                const double x = way * 0.002 * k;
+                s(-0.05 * way + x, there ? 0.25 * x : 0); // more than the fifth that is asked for
+            }
+            EXPECT_EQ(s.seen.missing, !there) << way;
+        }
+    }
+}
+
+// A rotor that is held, its terminal in the middle of a link that sags: no swing of its EMF.
+TEST(ThirdMissing, ALinkThatMovesIsNoSwing)
+{
+    for (const zero_legs_t legs : {ZERO_LEGS_APART, ZERO_LEGS_HIGH}) {
+        Stepper s;
+        for (int k = 0; k < 60; ++k) {
+            s(-0.03, 0, 2, legs, kLink - 0.002 * k);
+        }
+        EXPECT_FALSE(s.seen.missing) << legs;
+    }
+}
+
+// What rings behind the freewheeling, in each place anew: the terminal is at rest from the fifth sample on.
+TEST(ThirdMissing, RingingIsNoSwing)
+{
+    Stepper s;
+    for (int n = 0; n < 5; ++n) {
+        s(n % 2 == 0 ? kLink / 2 : -kLink / 2); // at a rail
+        for (const double ring : {0.2, -0.15, 0.1, 0.05}) {
+            s(ring);
+        }
+        s.settle(0.05);
+        EXPECT_FALSE(s.seen.missing) << n;
+    }
+}
+
+// Each pair of places that follow one another: what is seen in one is no swing of the other.
+TEST(ThirdMissing, EverySectorAndInstantHasItsPlace)
+{
+    for (uint8_t sector = 0; sector < 6; ++sector) {
+        for (const int next : {1, 0}) {
+            for (const zero_legs_t from : {ZERO_LEGS_LOW, ZERO_LEGS_APART, ZERO_LEGS_HIGH}) {
+                for (const zero_legs_t to : {ZERO_LEGS_LOW, ZERO_LEGS_APART, ZERO_LEGS_HIGH}) {
+                    if (next == 0 && from == to) {
+                        continue;
+                    }
+                    const auto level = [](zero_legs_t legs, double x) {
+                        return legs == ZERO_LEGS_HIGH ? -x : x;
+                    };
+                    Stepper s;
+                    s.settle(level(from, 0.05), sector, from);
+                    s.settle(level(to, 0.15), static_cast<uint8_t>((sector + next) % 6), to);
+                    EXPECT_FALSE(s.seen.missing) << int(sector) << from << to;
+                }
+            }
+        }
+    }
+}
+
 } // namespace
