@@ -380,4 +380,97 @@ TEST(ZeroCrossing, InstantsWrap)
     EXPECT_NEAR(static_cast<int32_t>(b.self.at), 0, kShape_counts);
 }
 
+// y of the swing at two instants, over t_60, of a terminal that is neither ahead nor past by a rail; whether the second has found
+// the crossing that is due `early` behind it.
+struct Pair {
+    double from, y_from, to, y_to, early;
+
+    bool found(Bench &b) const
+    {
+        zero_expected_t e = kExpected;
+        e.at = static_cast<uint32_t>(static_cast<int32_t>(std::lround((to + early) * kT60)));
+        b.open();
+        EXPECT_FALSE(b.step(at(b, from, y_from), e));
+        EXPECT_TRUE(b.self.ahead);
+        return b.step(at(b, to, y_to), e);
+    }
+    static Sample at(const Bench &b, double place, double y)
+    {
+        return b.terminal(std::round(place * kT60), kV_dc / 2 + y * kAmplitude * kPi / 3);
+    }
+};
+
+// Where it is 15 degrees early, a quarter of t_60, samples a quarter of t_60 apart or nearer must agree with the slope.
+TEST(ZeroCrossing, FromWhereACrossingIsEarlyOn)
+{
+    for (const double early : {-0.5, 0.0, 0.2, 0.24, 0.26, 0.4}) {
+        Bench b;
+        EXPECT_EQ((Pair{-0.1, -0.5, 0.05, 0.6, early}).found(b), early < 0.25) << early; // 1.1 in 0.15
+    }
+    for (const double apart : {0.1, 0.24, 0.26, 0.3}) {
+        Bench b;
+        EXPECT_EQ((Pair{0.02 - apart, -0.6, 0.02, 0.6, 0.4}).found(b), apart > 0.25) << apart;
+    }
+}
+
+// Four times what the EMF rises by in between, and half of the rail for a noisy channel.
+TEST(ZeroCrossing, SamplesThatAgreeAreWithinFourSlopes)
+{
+    const double rail = 0.35 / (kAmplitude * kPi / 3);
+    for (const double apart : {0.02, 0.05, 0.1, 0.2}) {
+        for (const double rails : {-0.6, 0.0, 0.4, 0.6, 0.9}) {
+            const double jump = 4 * apart + rails * rail;
+            Bench b;
+            EXPECT_EQ((Pair{-0.1, -0.4 * jump, -0.1 + apart, 0.6 * jump, 0.3}).found(b), rails < 0.5)
+                << apart << ' ' << rails;
+        }
+    }
+}
+
+// x <= 3/4: however far a first sample is behind one that the rail has cut.
+TEST(ZeroCrossing, ALateCrossingIsNoEarlierThanThreeQuartersOfASector)
+{
+    for (const double y : {0.3, 0.6, 0.74, 0.77, 0.9, 1.2}) {
+        Bench b;
+        b.legs = ZERO_LEGS_LOW;
+        b.open();
+        EXPECT_FALSE(b.step(b.terminal(-20000, 0)));
+        EXPECT_TRUE(b.self.cut);
+        ASSERT_TRUE(b.step(b.terminal(80000, y * kAmplitude * kPi / 3))) << y;
+        EXPECT_NEAR(static_cast<int32_t>(b.self.at), 80000 - std::min(y, 0.75) * kT60, 2 * kError_counts)
+            << y;
+    }
+}
+
+TEST(ZeroCrossing, ASwingIsThatOfTheSpeedAndNeverNone)
+{
+    Bench b;
+    for (const double slower : {0.5, 1.0, 3.0}) {
+        const pm_q_t y = zero_crossing_swing(&b.config, static_cast<uint32_t>(slower * kT60));
+        EXPECT_NEAR(bldc_rig::real(y), kAmplitude * kPi / 3 / kBase_V / slower, 1e-6);
+    }
+    b.config.swing = 1;
+    EXPECT_GT(zero_crossing_swing(&b.config, 1000 * kT60), 0);
+}
+
+// Behind the freewheeling, without a sample ahead: once it is due, one past sample is enough; before, the next must say the same,
+// which more than 15 degrees before takes the slope of the EMF, too.
+TEST(ZeroCrossing, ASecondPastSampleIsBelievedWhereTheCrossingIsNearly)
+{
+    for (const double early : {-0.05, 0.1, 0.2, 0.3}) {
+        for (const bool agrees : {true, false}) {
+            Bench b;
+            b.open();
+            zero_expected_t e = kExpected;
+            e.at = static_cast<uint32_t>(static_cast<int32_t>(std::lround((0.1 + early) * kT60)));
+            const bool first = b.step(Pair::at(b, 0.06, 0.05), e);
+            EXPECT_EQ(first, early + 0.04 < 0);
+            if (!first) {
+                EXPECT_FALSE(b.self.ahead);
+                EXPECT_EQ(b.step(Pair::at(b, 0.1, agrees ? 0.1 : 0.5), e), agrees || early < 0.25) << early;
+            }
+        }
+    }
+}
+
 } // namespace
