@@ -127,6 +127,13 @@ class Bench
             }
             in.sample = &sample;
         }
+        zero_sample_t before = {};
+        if (stale > 0) {
+            --stale;
+            before.v_dc = fixed(kLink, PM_Q_BITS);
+            before.v[0] = before.v[1] = before.v[2] = fixed(kLink / 2, PM_Q_BITS);
+            in.sample = &before;
+        }
         if (third) {
             in.v_zero = fixed(zero_at(static_cast<double>(now)), PM_Q_BITS);
         }
@@ -209,7 +216,9 @@ class Bench
     };
     std::vector<Opened> opened;
     double u = kU;
+    int stale = 0;                                 // samples that were not asked for
     bool third = false;                            // v_zero
+    double frozen = 0;                             // v_zero from shortly behind crossing 2 on
     double lag = 0;                                // of v_zero, counts
     double (*late)(int64_t k) = nullptr;           // of crossing k
     double (*seen)(int64_t k, double y) = nullptr; // another distance, of sector k
@@ -281,6 +290,9 @@ class Bench
             ++k;
         }
         // Gone as soon as the last crossing was seen, so that no sample is ahead of the next one.
+        if (frozen != 0 && at - lag > z(2) + 0.4 * T_) {
+            return frozen;
+        }
         const bool gone = held != INT64_MAX && at - lag > z(held - 1) + kPeriod;
         return gone ? 0 : (k % 2 == 0 ? 1 : -1) * distance(k, at - lag);
     }
@@ -406,6 +418,32 @@ TEST(SixStepSteps, ACommutationBelongsToOnePeriod)
     }
 }
 
+// A sample that is not there is made good by the next: the sector is open since its commutation.
+TEST(SixStepSteps, ASectorIsOpenSinceItsCommutationWhereASampleIsMissing)
+{
+    const double T = 6 * kPeriod;
+    for (const int32_t at : {1, 2, 700, kPeriod - 1}) {
+        Bench b(T, configured(T), 3);
+        b.reset();
+        const uint32_t due = commutation_due(&b.s.commutation, &b.config.commutation);
+        six_step_in_t in = {};
+        in.now = due - static_cast<uint32_t>(at) - kPeriod;
+        in.u = fixed(kU, PM_Q_BITS);
+        six_step_out_t out = {};
+        for (int n = 0; n < 3; ++n) {
+            six_step_step(&b.s, &b.config, &in, &out);
+            in.now += kPeriod;
+        }
+        zero_sample_t ahead = {};
+        ahead.v_dc = fixed(kLink, PM_Q_BITS);
+        ahead.v[0] = ahead.v[1] = ahead.v[2] = fixed(kLink / 2 - 0.1, PM_Q_BITS);
+        in.sample = &ahead;
+        six_step_step(&b.s, &b.config, &in, &out);
+        EXPECT_EQ(b.s.crossing.sector, 4);
+        EXPECT_EQ(b.s.crossing.open_since, due) << at;
+    }
+}
+
 // One instant in the sector that the sample is in. PWM_ON: D - lead in even, N + D - lead in odd sectors.
 TEST(SixStepSteps, ASampleIsAskedForInTheSectorThatItIsIn)
 {
@@ -502,6 +540,37 @@ TEST(SixStepSteps, AnAngleAtTheEndsOfATurnIsInASector)
     six_step_reset(&s, &c, PM_TURN(0.25), 0, 0);
     EXPECT_FALSE(s.reverse);
     EXPECT_GT(commutation_t_60(&s.commutation), 1000 * T);
+}
+
+TEST(SixStepSteps, ARotorAtTheEndOfASectorStandsInOne)
+{
+    const six_step_config_t c = configured(7 * kPeriod);
+    const struct {
+        pm_angle_t theta;
+        uint8_t sector;
+    } cases[] = {{PM_TURN(1.0 / 12) - 1, 5}, {PM_TURN(1.0 / 12) + 1, 0}, {0, 5},
+                 {PM_TURN(0.25) - 2, 0},     {PM_TURN(0.25) + 2, 1},     {PM_TURN(11.0 / 12) - 5, 4},
+                 {PM_TURN(11.0 / 12) + 1, 5}};
+    for (const auto &x : cases) {
+        six_step_t s = {};
+        six_step_begin(&s, &c, x.theta, false, 30000, 0);
+        EXPECT_EQ(s.commutation.sector, x.sector) << x.theta;
+    }
+}
+
+// Until there is a crossing none is counted, nor learnt from.
+TEST(SixStepSteps, ResetHasNothingToLearnFrom)
+{
+    const double T = 20 * kPeriod;
+    for (const bool was : {true, false}) {
+        Bench b(T, configured(T));
+        b.s.learn = was;
+        b.s.alike = 3;
+        b.reset(0.05);
+        b.run(8); // in the sector
+        EXPECT_EQ(b.s.alike, 3U);
+        EXPECT_EQ(b.s.commutation.whole, 0);
+    }
 }
 
 TEST(SixStepSteps, BeginTakesTheSectorThatTheRotorStandsInTheMiddleOf)
@@ -624,6 +693,7 @@ TEST(SixStepSteps, ResetLeavesNothingOfTheRunBefore)
         used.run(before);
         Bench again(T, configured(T), 2, false, used.now + 17), fresh = again;
         again.s = used.s;
+        again.stale = 2; // samples of the run before
         again.reset();
         fresh.reset();
         for (int n = 0; n < 40; ++n) {
@@ -991,6 +1061,43 @@ TEST(SixStepSteps, ThirdHarmonicThatStaysAheadIsWaitedFor)
     EXPECT_NEAR(static_cast<double>(b.commutations[3]), b.z(3) + half, kRounding);
 }
 
+// A sample ahead of the crossing was taken a lag ago, and its crossing is behind that of the signal by what was learnt.
+TEST(SixStepSteps, ThirdHarmonicIsAheadAsOfItsOwnInstant)
+{
+    const double T = 11.3 * kPeriod;
+    for (const double deviation : {kDivider, -kDivider}) {
+        Bench b = star_point(T, 4, false);
+        b.s.thresholds.u_V[2] = fixed(deviation, PM_Q_BITS);
+        b.reset(0.3);
+        while (b.s.commutation.crossed != 5 && b.within(5)) {
+            b.period();
+        }
+        ASSERT_EQ(b.s.commutation.crossed, 5); // C rises next
+        b.run(6);
+        ASSERT_EQ(b.s.commutation.crossed, 5);
+        const double at = static_cast<double>(b.now - kPeriod) - b.lag + deviation / kSwing * T;
+        EXPECT_NEAR(static_cast<int32_t>(b.s.commutation.ahead - static_cast<uint32_t>(std::llround(at))), 0,
+                    kRounding);
+    }
+}
+
+// Given up, it is no sample ahead of the one behind it, which has the other sign.
+TEST(SixStepSteps, ThirdHarmonicThatIsGivenUpIsNotFoundLater)
+{
+    const double T = 11.3 * kPeriod;
+    Bench b = star_point(T, 0, false);
+    b.reset(0.3);
+    b.frozen = kSwing / 3; // ahead of crossing 3, downwards
+    while (b.s.commutation.strikes == 0 && b.within(20)) {
+        b.period();
+    }
+    ASSERT_EQ(b.s.commutation.strikes, 1);
+    ASSERT_EQ(b.s.commutation.crossed, 3);
+    b.run(6); // another sector takes longer
+    EXPECT_EQ(b.s.commutation.crossed, 3);
+    EXPECT_EQ(b.s.commutation.strikes, 1);
+}
+
 // One sample of the run before is no sample ahead of a crossing.
 TEST(SixStepSteps, ThirdHarmonicOfTheRunBeforeIsForgotten)
 {
@@ -1001,7 +1108,7 @@ TEST(SixStepSteps, ThirdHarmonicOfTheRunBeforeIsForgotten)
         used.run(before);
         Bench b = star_point(T, 0, false);
         b.s = used.s;
-        b.reset(0.3);
+        b.reset(0.1); // the signal is not yet past the crossing before: no crossing of the next one
         b.run(60);
         EXPECT_EQ(b.s.commutation.strikes, 0);
         expect_on_time(b, 0, T);

@@ -292,7 +292,7 @@ TEST(ZeroCrossing, PassesOverFreewheelingAndBlanking)
     EXPECT_FALSE(b.self.ahead);
     EXPECT_FALSE(b.step(b.sample(-30001)));
     EXPECT_FALSE(b.self.ahead);
-    EXPECT_FALSE(b.step(b.sample(-10000)));
+    EXPECT_FALSE(b.step(b.sample(-30000)));
     EXPECT_TRUE(b.self.ahead);
 }
 
@@ -471,6 +471,111 @@ TEST(ZeroCrossing, ASecondPastSampleIsBelievedWhereTheCrossingIsNearly)
             }
         }
     }
+}
+
+// A leg that falls to the lower rail with both legs low: y of the last sample above it, a twentieth of t_60 before the next.
+struct IntoTheRail {
+    Bench b;
+    double rail_V = 0.35;
+
+    explicit IntoTheRail(double y)
+    {
+        b.sector = 1;
+        b.legs = ZERO_LEGS_LOW;
+        b.open();
+        EXPECT_FALSE(step(0, y * kAmplitude * kPi / 3));
+        EXPECT_TRUE(b.self.ahead);
+    }
+    bool step(double at, double v)
+    {
+        return b.step(b.terminal(at * kT60, v));
+    }
+    double found() const
+    {
+        return static_cast<double>(static_cast<int32_t>(b.self.at)) / kT60;
+    }
+};
+
+TEST(ZeroCrossing, ACrossingIntoTheRailIsBehindTheLastSampleBySlope)
+{
+    const double small = 1e-4; // of t_60
+    IntoTheRail by_slope(0.1);
+    EXPECT_TRUE(by_slope.step(0.15, 0));
+    EXPECT_NEAR(by_slope.found(), 0.1, small);
+    // faster than expected: by this sample at the latest
+    IntoTheRail by_sample(0.1);
+    EXPECT_TRUE(by_sample.step(0.05, 0));
+    EXPECT_NEAR(by_sample.found(), 0.05, small);
+    // an offset up to a quarter of `rail` is the rail: not before the slope is through
+    for (const double offset : {0.1, 0.24}) {
+        IntoTheRail rests(0.1);
+        EXPECT_FALSE(rests.step(0.05, offset * rests.rail_V));
+        EXPECT_NEAR(rests.found(), 0, small);
+        EXPECT_TRUE(rests.step(0.15, offset * rests.rail_V));
+        EXPECT_NEAR(rests.found(), 0.1, small) << offset;
+    }
+    // more is a terminal on its way
+    IntoTheRail moves(0.1);
+    EXPECT_FALSE(moves.step(0.05, 0.27 * moves.rail_V));
+    EXPECT_NEAR(moves.found(), 0.05, small);
+}
+
+// Neither side tells a distance: it was by this sample.
+TEST(ZeroCrossing, BetweenTwoRailsItIsTheSampleItself)
+{
+    Bench b;
+    b.legs = ZERO_LEGS_LOW;
+    b.open();
+    EXPECT_FALSE(b.step(b.terminal(-3000, 0)));
+    EXPECT_TRUE(b.self.cut);
+    EXPECT_TRUE(b.step(b.terminal(1000, kV_dc)));
+    EXPECT_EQ(static_cast<int32_t>(b.self.at), 1000);
+}
+
+// A rotor twice as fast as expected: by interpolation the crossing is at 0, by the slope of one sample it would not be.
+TEST(ZeroCrossing, SamplesThatNoRailHasCutAreInterpolated)
+{
+    const auto y_V = [](double at) { return 2 * at / kT60 * kAmplitude * kPi / 3; };
+    // the off time, cut by the rail, tells less than the on time before
+    Bench b;
+    b.open();
+    EXPECT_FALSE(b.step(b.terminal(-6000, kV_dc / 2 + y_V(-6000))));
+    b.legs = ZERO_LEGS_LOW;
+    EXPECT_FALSE(b.step(b.terminal(-2000, 0)));
+    EXPECT_FALSE(b.self.cut);
+    b.legs = ZERO_LEGS_APART;
+    EXPECT_TRUE(b.step(b.terminal(2000, kV_dc / 2 + y_V(2000))));
+    EXPECT_NEAR(static_cast<int32_t>(b.self.at), 0, kError_counts);
+    // of two cut ones the later one counts
+    Bench cut;
+    cut.legs = ZERO_LEGS_LOW;
+    cut.open();
+    EXPECT_FALSE(cut.step(cut.terminal(-6000, 0)));
+    EXPECT_FALSE(cut.step(cut.terminal(-2000, 0)));
+    EXPECT_EQ(static_cast<int32_t>(cut.self.at), -2000);
+    // with both legs high `rail` is above v_dc: 0.1 V over it is not at the rail
+    Bench high;
+    high.legs = ZERO_LEGS_HIGH;
+    high.open();
+    EXPECT_FALSE(high.step(high.terminal(-4000, kV_dc + y_V(-4000))));
+    EXPECT_TRUE(high.step(high.terminal(1000, kV_dc + y_V(1000))));
+    EXPECT_LT(y_V(1000), 0.35);
+    EXPECT_NEAR(static_cast<int32_t>(high.self.at), 0, kError_counts);
+}
+
+// A terminal that has come from a rail with one sample past the crossing and goes on with the slope: from the next one's distance.
+TEST(ZeroCrossing, AnEarlySampleThatDisagreesIsTheFirstPastTheCrossing)
+{
+    zero_expected_t e = kExpected;
+    e.at = 40000;
+    Bench b;
+    b.open();
+    EXPECT_FALSE(b.step(Pair::at(b, -0.02, -0.4), e));
+    EXPECT_TRUE(b.self.ahead);
+    EXPECT_FALSE(b.step(Pair::at(b, 0.0, 0.2), e)); // 0.6 in 0.02
+    EXPECT_FALSE(b.self.ahead);
+    ASSERT_TRUE(b.step(Pair::at(b, 0.04, 0.24), e));
+    EXPECT_NEAR(static_cast<int32_t>(b.self.at), (0.04 - 0.24) * kT60, 2 * kError_counts);
 }
 
 } // namespace

@@ -181,7 +181,7 @@ TEST(BlockConfig, ThresholdsAreComparedWithTerminalsAlone)
 TEST(BlockConfig, SixtyDegreesAreRounded)
 {
     drive_params_t p = fan();
-    for (int k = 0; k < 12; ++k) {
+    for (int k = 0; k < 60; ++k) {
         p.speed_trip += 101;
         const six_step_config_t c = configured(p);
         EXPECT_NEAR(c.crossing.t_60, c.commutation.turn_base / 6.0, 0.5) << c.commutation.turn_base;
