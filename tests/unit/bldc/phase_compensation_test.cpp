@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/unit/bldc/rig.h"
@@ -193,6 +194,31 @@ TEST(PhaseCompensation, IsTheShareOfTheSwing)
         EXPECT_NEAR(self.shift[2], expected, 4) << share; // A upwards
         EXPECT_NEAR(self.shift[5], -expected, 4) << share;
         EXPECT_EQ(self.shift[0], 0);
+    }
+}
+
+// shift = t_60 u / swing of each sector, up to 3/8 of t_60; what stands behind the six is left alone.
+TEST(PhaseCompensation, ShiftsAreTheShareOfTheSwing)
+{
+    struct {
+        phase_compensation_t self;
+        int32_t behind[2];
+    } x = {{}, {77, 78}};
+    constexpr uint32_t kT60 = 60000;
+    constexpr double kSwing = 0.4;
+    const thresholds_t learnt = {{fixed(0.04, 28), fixed(-0.02, 28), fixed(0.3, 28)},
+                                 {fixed(0.01, 28), fixed(0.03, 28), fixed(-0.04, 28)}};
+    for (const bool reverse : {false, true}) {
+        phase_compensation_slow(&x.self, &learnt, reverse, kT60, fixed(kSwing, 28));
+        for (uint32_t s = 0; s < SECTORS; ++s) {
+            const uint8_t leg = sector_legs(s, reverse).open;
+            const double u = (s % 2 == 0 ? 1 : -1) * real(learnt.u_V[leg]) +
+                             (reverse ? 1 : -1) * real(learnt.u_H[leg]); // thresholds.h
+            const double share = std::max(-0.375, std::min(0.375, u / kSwing));
+            EXPECT_NEAR(x.self.shift[s], share * kT60, 2) << s;
+        }
+        EXPECT_EQ(x.behind[0], 77);
+        EXPECT_EQ(x.behind[1], 78);
     }
 }
 

@@ -152,4 +152,17 @@ TEST(Thresholds, StayWithinTheirLimit)
     EXPECT_EQ(b.self.u_V[0], b.config.most);
 }
 
+// Of three terminals: what stands behind them is left alone.
+TEST(Thresholds, SlowWritesTheThreeTerminals)
+{
+    struct {
+        thresholds_t self;
+        pm_q_t behind[2];
+    } x = {{{1, 2, 3}, {300, 600, 900}}, {77, 78}};
+    thresholds_slow(&x.self);
+    EXPECT_EQ(x.behind[0], 77);
+    EXPECT_EQ(x.behind[1], 78);
+    EXPECT_EQ(x.self.u_H[2], 300);
+}
+
 } // namespace
