@@ -14,8 +14,7 @@
 static void follow(six_step_t *self)
 {
     self->expected.t_60 = commutation_t_60(&self->commutation);
-    const uint32_t next = sector_next(self->commutation.crossed);
-    self->expected.at = self->commutation.crossing + self->expected.t_60 - (uint32_t)self->phase.shift[next];
+    self->expected.at = self->commutation.crossing + self->expected.t_60;
     self->moved = true;
 }
 
@@ -63,6 +62,7 @@ static void begin(six_step_t *self, const six_step_config_t *config, uint32_t se
 {
     self->lost = false;
     self->learn = false;
+    self->alike = 0;
     follow(self);
     six_step_slow(self, config);
     open_sector(self, config, sector, now);
