@@ -49,10 +49,11 @@ TEST(BoardStart, TheUpperSwitchesAreChargedBeforeTheFirstPulse)
     EXPECT_NEAR(s.omega_rad_s, target_rad_s, 0.05 * target_rad_s);
 }
 
+// No upper switch closes, so no current flows.
 TEST(BoardStart, WithoutTheChargeTheMotorDoesNotStart)
 {
     const Start s = started(false);
-    EXPECT_EQ(s.fault, DRIVE_FAULT_POSITION_NOT_FOUND);
+    EXPECT_EQ(s.fault, DRIVE_FAULT_OPEN_PHASE);
     EXPECT_NEAR(s.omega_rad_s, 0.0, 0.1);
 }
 
