@@ -6,8 +6,8 @@
 /* I_p beyond this is no machine's. */
 #define FOUND_LEAST PM_Q(0.25)
 #define FOUND_MOST  PM_Q(4.0)
-/* What I_n leaves of itself is small to the second order of the angle: 0.2 rad, Q16. */
-#define SLOW 13107
+/* What I_n leaves of itself is of the second order of the angle: 0.5 rad, Q16. */
+#define SLOW 32768
 
 /* By what the rotor turns between the axes, rad, Q16. */
 static int32_t turned(const stationary_config_t *config, pm_q_t omega)

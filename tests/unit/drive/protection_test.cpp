@@ -239,12 +239,12 @@ TEST(Protection, OffsetsWithinRangeAreSubtracted)
     EXPECT_NEAR(real(x.d.i_abc.b), 0, 1e-6);
 }
 
-TEST(Protection, NoCurrentMeansNoPosition)
+TEST(Protection, NoCurrentMeansAnOpenPhase)
 {
     Drive x(direct::params(1));
     x.enable(true);
     x.run_ms(110 + 400);
-    EXPECT_EQ(x.fault(), DRIVE_FAULT_POSITION_NOT_FOUND);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_OPEN_PHASE);
     EXPECT_FALSE(x.driven());
 }
 

@@ -120,9 +120,10 @@ TEST(Sequence, ARefusalIsAFaultOrLeadsToTheFallBack)
                 EXPECT_EQ(x.d.sequence.procedure, PROCEDURE_NONE);
                 continue;
             }
-            const bool offset = reason == PM_FAILED_OFFSET;
-            EXPECT_EQ(x.fault(), offset ? DRIVE_FAULT_SENSOR_OFFSET : DRIVE_FAULT_POSITION_NOT_FOUND)
-                << reason;
+            const drive_fault_t fault = reason == PM_FAILED_OFFSET ? DRIVE_FAULT_SENSOR_OFFSET
+                                        : reason == PM_FAILED_OPEN ? DRIVE_FAULT_OPEN_PHASE
+                                                                   : DRIVE_FAULT_POSITION_NOT_FOUND;
+            EXPECT_EQ(x.fault(), fault) << reason;
             EXPECT_EQ(drive_fault_record(&x.d)->refusal.procedure, PROCEDURE_initial_pulses);
             EXPECT_EQ(drive_fault_record(&x.d)->refusal.reason, reason);
             x.step();

@@ -163,7 +163,7 @@ TEST(StationaryFound, StandsWhenAFastRotorIsHandedBack)
     c.i_n = bench::fixed(0.1, 28);
     c.between = bench::fixed(kBetween, 20);
     c.find = true;
-    const pm_q_t slow = bench::fixed(-0.15 / kBetween, 28), fast = bench::fixed(-0.25 / kBetween, 28);
+    const pm_q_t slow = bench::fixed(-0.45 / kBetween, 28), fast = bench::fixed(-0.55 / kBetween, 28);
     stationary_t s = {};
     const auto find = [&](unsigned values) {
         obs_in_t in = {};
