@@ -82,7 +82,7 @@ static pm_num_t answer(const maker_t *m)
 #undef PM_METHOD
     case INJECTION_COUNT:
     default:
-        return pm_num(1); /* A: one that the image has not leads to make_injection(), which refuses it */
+        return pm_num(0);
     }
 }
 
@@ -106,11 +106,27 @@ static pm_q_t saturates(const maker_t *m)
     return share;
 }
 
+static bool is_in_image(injection_id_t id)
+{
+    switch (id) {
+#define PM_METHOD(name, help, traits, needs) PM_IN_IMAGE(name, case INJECTION_##name : return true;)
+#include "injection/injections.def"
+#undef PM_METHOD
+    case INJECTION_COUNT:
+    default:
+        return false;
+    }
+}
+
 /* The carrier must pass the legs, its answer be four times the noise, the saliency 5 %, and some of it be left at half of rated
- * current; at all of rated current for sources that follow the axis of the saliency. */
+ * current; at all of rated current for sources that follow the axis of the saliency. Of a source that the image has not nothing can be
+ * said: make_injection() is to refuse it. */
 bool injection_sees_saliency(const maker_t *m)
 {
     const drive_params_t *p = m->params;
+    if (!is_in_image((injection_id_t)p->injection)) {
+        return true;
+    }
     const pm_num_t noise = pm_num_dec(4 * p->i_noise, drive_param_exp10[DRIVE_PARAM_i_noise]);
     return carrier_passes(m) && pm_num_cmp(answer(m), noise) > 0 && p->L_q - p->L_d > p->L_q / 20 &&
            saturates(m) < (reads_across(m) ? 4 : 1) * PM_ONE;

@@ -12,8 +12,8 @@
  * Not I_n cos 2 theta^ of each: the estimate moves with the error that I_p makes, and would hide all of it at
  * 45 degrees. Then the carrier stays on alpha, and I_p follows the load as the saliency map does:
  *   I_p = found I_p(i_q)                                (saliency.h)
- * After a reset at a speed with |omega| t < 0.5 it is detected anew. Faster, as where an observer hands back, what was found before
- * stands, or 1; also when the configuration says that it is not to be detected. */
+ * It is detected after a reset at a speed with |omega| t < 0.5, unless the configuration says that it is not to
+ * be. Faster, as where an observer hands back, what was found before stands; found = 1 where nothing was. */
 #ifndef INJECTION_STATIONARY_H
 #define INJECTION_STATIONARY_H
 

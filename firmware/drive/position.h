@@ -3,10 +3,11 @@
  *
  *   eps = eps_injection + weight (eps_observer - eps_injection)
  * weight rises from 0 at omega_low to 1 at omega_high; the carrier is on below omega_high and off above
- * 1.1 omega_high (hysteresis). The bandwidth of the loop moves with the weight; that of current control is what the low-speed source
- * bears as long as the carrier is on, since the current that it separates is what is controlled. Only this module knows both sources, the one of injection/injections.def and the one of observers/observers.def;
- * both keep the contract of firmware/math/estimate.h. The low-speed source steps first: it separates the
- * fundamental current, which the observer takes, from the answer to its carrier.
+ * 1.1 omega_high (hysteresis). The bandwidth of the loop moves with the weight. That of current control is what
+ * the low-speed source bears as long as the carrier is on: what is controlled is the current that the source
+ * separates, with its delay. Only this module knows both sources, the one of injection/injections.def and the
+ * one of observers/observers.def; both keep the contract of firmware/math/estimate.h. The low-speed source
+ * steps first: it separates the fundamental current, which the observer takes, from the answer to its carrier.
  * Quality: 1 while the sources agree with the measurement, 0 when the position is lost.
  *
  * A high-speed source of the third harmonic (SOURCE_THIRD_TURN) must have shown it before its weight rises: the mean of its vector

@@ -1,5 +1,5 @@
-// The observer, or the suppression of the second harmonic, changed by parameter: on the plant with switching inverter, dead time,
-// converter noise and delay.
+// The observer, or the suppression of the second harmonic, changed by parameter, and the hand-over between a low-speed source and an
+// observer: on the plant with switching inverter, dead time, converter noise and delay.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -207,6 +207,85 @@ TEST(Switching, SecondHarmonicStaysSuppressedByEitherMethod)
             EXPECT_LT(x.run_ms(600).error_deg, kMore * ripple_deg) << first << " to 0";
         }
         EXPECT_EQ(x.state(), DRIVE_RUNNING);
+    }
+}
+
+drive_params_t with_source(injection_id_t id, double loop_Hz, double control_Hz)
+{
+    drive_params_t p = direct::params(1);
+    p.injection = static_cast<int32_t>(id);
+    p.v_injection = 35000;
+    p.injection_bandwidth = static_cast<int32_t>(1000 * loop_Hz);
+    p.speed_bandwidth = static_cast<int32_t>(1000 * control_Hz);
+    p.acceleration = 30000;
+    return p;
+}
+
+plant_config_t with_legs()
+{
+    plant_config_t c = plants::ipm_1000();
+    c.inverter.c_leg_F = 0.5e-9; // METHODS.md, section 14
+    return c;
+}
+
+// What is controlled is the mean of a window: half of it and 1.5 periods old, T = (N + 2) / 2 T_s. Current control of bandwidth w_c
+// is stable below w_c T = pi / 2. In the middle of the blend, 29 to 33 rad/s; sine.h asks for 0.4.
+TEST(HandOver, CurrentControlOfASineIsStableBelowAQuarterOfATurnOfDelay)
+{
+    constexpr double kDelay_s = (20 + 2) / 2.0 * 1e-4, kOwn_Hz = 500;
+    const double limit_Hz = 0.25 / kDelay_s; // w_c T = pi / 2
+    const struct {
+        double bandwidth_Hz;
+        bool holds;
+    } cases[] = {{0.4 / kDelay_s / 2 / bench::kPi, true}, {0.6 * limit_Hz, true}, {1.4 * limit_Hz, false}};
+    for (const injection_id_t id : {INJECTION_pulsating_sine, INJECTION_rotating_sine}) {
+        for (const auto &x : cases) {
+            Closed c(with_legs(), with_source(id, 7, 2));
+            c.loop.app.drive.config.position.current_low = bench::fixed(x.bandwidth_Hz / kOwn_Hz, 31);
+            c.speed(5);
+            c.run_ms(900);
+            c.speed(33);
+            c.run_ms(2000);
+            SCOPED_TRACE(x.bandwidth_Hz);
+            EXPECT_EQ(c.state() == DRIVE_RUNNING, x.holds) << id;
+            if (x.holds) {
+                EXPECT_TRUE(c.loop.app.drive.position.inject);
+                EXPECT_LT(c.run_ms(200).error_deg, 15); // presets: no map of the saliency
+            }
+        }
+    }
+}
+
+// I_p of a source along alpha stands where an observer hands back. Twin: looked for on the turning rotor.
+TEST(HandOver, IpIsNotLookedForOnAFastRotor)
+{
+    for (const bool looks : {false, true}) {
+        drive_params_t p = with_source(INJECTION_stationary_square, 25, 2);
+        p.v_injection = 70000;
+        Closed c(with_legs(), p);
+        c.speed(15);
+        c.run_ms(1200);
+        stationary_config_t &config = c.loop.app.drive.config.position.injection.stationary_square.stationary;
+        const stationary_t &found = c.loop.app.drive.position.injection.stationary_square.stationary;
+        const pm_q_t at_first = found.found;
+        EXPECT_LT(c.run_ms(500).error_deg, 4);
+        c.speed(60);
+        c.run_ms(2000);
+        ASSERT_FALSE(c.loop.app.drive.position.inject);
+        if (looks) { // no angle is too far for a rotor that is taken to rest between the axes
+            config.between = 0;
+        }
+        c.speed(15);
+        c.run_ms(2000);
+        ASSERT_EQ(c.state(), DRIVE_RUNNING);
+        ASSERT_TRUE(c.loop.app.drive.position.inject);
+        EXPECT_EQ(found.found == at_first, !looks);
+        const double error_deg = c.run_ms(500).error_deg;
+        if (looks) {
+            EXPECT_GT(error_deg, 12);
+        } else {
+            EXPECT_LT(error_deg, 4);
+        }
     }
 }
 
