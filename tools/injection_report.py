@@ -22,7 +22,6 @@ from campaigns.pool import Pool
 from observer_report import PMSIM, ROOT, count_lost, degrees, fact, fail, methods, plt, table, worst_of
 
 MACHINE = "IPM-1000"
-R_S, I_RATED = 6.0, 4.0
 OTHER = "GMCC KSK89D53U"  # a compressor, with the settings of its file for all sources
 LIST = "injection/injections.def"
 LOADS = [0, 0.5, 0.75, 1]
@@ -237,16 +236,16 @@ def seen(results):
     return {name: r["carrier"] for name, r in results.items() if name not in within}
 
 
-def costs(results, spectra_name, counted):
+def costs(results, spectra_name, values, counted):
     """What the carrier takes and how it sounds."""
-    rated_W = 1.5 * R_S * I_RATED ** 2
+    rated_W = 1.5 * values["R_s"] * values["i_rated"] ** 2
     carriers = seen(results)
     body = []
     for name in results:
         figures = ["between the samples", "", "", ""]
         if name in carriers:
             c = carriers[name]
-            loss_W = carrier_report.loss_W(c, R_S)
+            loss_W = carrier_report.loss_W(c, values["R_s"])
             loudest_Hz = c.lines_Hz[(c.lines_A * carrier_report.heard(c.lines_Hz)).argmax()]
             figures = [f"{1e3 * c.rms_A:.0f} mA", f"{1e3 * loss_W:.0f} mW, {100 * loss_W / rated_W:.2f} %",
                        f"{1e3 * c.heard_A:.0f} mA", f"{loudest_Hz:.0f} Hz"]
@@ -278,7 +277,7 @@ def page(rows, results, plot_name, spectra_name, values, bytes_of, counted):
     text.append("## Properties\n")
     text.append(table(["source", "carrier", "position loop", "speed control", "traits", "measures with",
                        "needs to know", "bytes of state + configuration"], body))
-    text.append(costs(results, spectra_name, counted))
+    text.append(costs(results, spectra_name, values, counted))
     text.append(f"## Error over load\n\n![{MACHINE}]({plot_name})\n")
     heads = [f"{100 * load:.0f} %" for load in LOADS]
     for key, per_load, title in (

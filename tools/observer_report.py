@@ -33,7 +33,7 @@ COST = ROOT / "out/build/stm32g431/tests/target/observers/observers_cost.elf"
 # SPM-400 is parametrised as round, whatever its inductances; its open-loop start is against rated load
 START = {"IPM-1000": "", "SPM-400": ", start_method: 2, i_open_loop: 4.5"}
 MACHINES = {"IPM-1000": "ipm_1000.yaml", "SPM-400": "spm_400.yaml"}
-FILES = {**MACHINES, "GMCC KSK89D53U": "gmcc_ksk89d53u.yaml"} # of studies on others
+FILES = {**MACHINES, "GMCC KSK89D53U": "gmcc_ksk89d53u.yaml"}  # of studies on others
 SPEEDS = [0.05, 0.1, 0.2, 0.5, 1.0]
 LOADS = [0, 0.5, 1]
 USABLE_DEG = 10  # an observer is usable where its largest error at three loads stays below
