@@ -28,17 +28,18 @@ static inline void zero_anti_rotating_step(zero_anti_rotating_t *self,
                                            const injection_in_t *in, injection_out_t *out)
 {
     const pm_q_t x = zero_voltage(self, config, in);
+    const pm_dq_t i = pm_park_half(in->i, in->dir);
     const pm_unit_t next = zero_cosine(self, config);
     zero_sequence_sample_t sample;
     if (self->measured != 0U) {
-        sample = zero_measured(self, config, in, x);
+        sample = zero_measured(self, config, in, i, x);
     } else {
         const pm_unit_t r = zero_swing(self, next);
         self->told.q += self->rate.q;
         sample.d = x + pm_unit(self->told.q, r);
         sample.s = pm_unit(self->s_told, r);
     }
-    zero_close(self, config, in, sample, out);
+    zero_close(self, config, i, sample, out);
     out->carrier = excitation_of(carrier_anti_rotating(zero_amplitude(config, next), in->ahead));
 }
 #endif

@@ -44,11 +44,12 @@ void zero_rotating_step(zero_rotating_t *self, const zero_rotating_config_t *con
 {
     zero_t *zero = &self->zero;
     const pm_q_t x = zero_voltage(zero, config, in);
+    const pm_dq_t i = pm_park_half(in->i, in->dir);
     const pm_dir_t axis = direction(zero, config);
     const zero_sequence_sample_t sample =
-        zero->measured != 0U ? zero_measured(zero, config, in, x) : told(zero, config, in, x);
+        zero->measured != 0U ? zero_measured(zero, config, in, i, x) : told(zero, config, in, x);
     self->x[zero->at + (zero->sign < 0 ? config->half : 0U)] = x;
-    zero_close(zero, config, in, sample, out);
+    zero_close(zero, config, i, sample, out);
     out->carrier = excitation_of(carrier_along(pm_mulh(config->v_h, PM_FRAC(0.125)), axis));
 }
 

@@ -19,7 +19,10 @@
 static void set_told(zero_t *self, const zero_config_t *config, const obs_in_t *in)
 {
     const pm_q_t i_q = in->i_dq.q;
-    const pm_q_t rise = pm_div(saliency_i_p(&config->saliency, i_q), config->saliency.i_p_0);
+    const int32_t c_re =
+        pm_mulh_add(config->c_re, i_q / 2, pm_shl(pm_sat(pm_mulh(i_q / 2, config->c_q), 26), 5));
+    const pm_q_t rise = pm_mul(pm_div(saliency_i_p(&config->saliency, i_q), config->saliency.i_p_0),
+                               pm_div(c_re, config->c_re));
     const pm_q_t a = pm_clamp(rise, PM_Q(0.5), PM_Q(2.0)) / 8;
     const pm_q_t kappa = config->kappa_0 + pm_mul(config->kappa_2, pm_mul(i_q, i_q));
     const bool decouples = config->form != (uint8_t)ZERO_NOT_DECOUPLED;
@@ -43,11 +46,10 @@ static void set_told(zero_t *self, const zero_config_t *config, const obs_in_t *
 
 void zero_reset(zero_t *self, const zero_config_t *config, const obs_in_t *in)
 {
-    const pm_half_dir_t twice = pm_dir_sum(in->dir, in->dir);
     const pm_dq_t i = pm_park_half(in->i, in->dir);
+    const injection_in_t sample = {.i = in->i, .dir = in->dir};
     *self = (zero_t){.sign = 1,
-                     .u = {pm_mulh(in->i.alpha, twice.cos) - pm_mulh(in->i.beta, twice.sin),
-                           pm_mulh(in->i.alpha, twice.sin) + pm_mulh(in->i.beta, twice.cos)},
+                     .u = zero_link(config, &sample, i),
                      .power = config->power_0,
                      .warm = config->warm,
                      .measured = config->told_first ? 0U : 1U};

@@ -5,6 +5,9 @@
  * Where the mutual inductances of the phases change with the position otherwise than their own,
  * dL_0 = L_s2 - M_s2 is not zero, nor under load its cross-coupling counterpart L_c0:
  *   v_0 = p psi_0 + e_0,  psi_0 = -1/2 Re[c i e^{j 2 theta}],  c = dL_0 - j L_c0
+ * and c moves with the current where the iron saturates, r the rated one:
+ *   dL_0(i) = dL_0 + (zero_dL_0_d - dL_0) i_d / r + (zero_dL_0_q - dL_0) (i_q / r)^2
+ *   L_c0(i) = zero_L_c0 + (zero_L_c0_q - zero_L_c0) i_q / r
  * A carrier V_h r e^{j chi}, r its swing, drives a current with both sequences, so that
  *   v_0 = -A r [cos(2 theta + chi) + kappa cos(4 theta + theta_m - chi)],  A = dL_0 V_h L_sa / (2 D)
  * kappa = K / L_sa, theta_m: saliency.h. v_0 is proportional to the voltage of the instant and none at the
@@ -13,10 +16,11 @@
  *   x_k = (y_k - a y_k-1) / (1 - a)       mean over [k-1, k), of the samples y
  *
  * Two forms of what v_0 should be and how it changes with the position, d = x - v_0^ and s = dv_0 / dtheta:
- *   measured  u_k = i_k e^{j 2 theta^_k},  g = c (u_k - u_k-1) / T_s:  d = x + 1/2 Re g,  s = Im g
+ *   measured  u_k = c(i_k) i_k e^{j 2 theta^_k},  g = (u_k - u_k-1) / T_s:  d = x + 1/2 Re g,  s = Im g
  *   told      the expression above at theta^ with A(i_q), kappa(i_q), theta_m(i_q) of the saliency map
- * The measured form knows dL_0 and L_c0 and nothing else: resistance, dead time, delay and load are in the
- * current as in the voltage. Its basin is +-60 to +-75 degrees for kappa = 0.27, that of the told one +-90.
+ * The measured form knows c and nothing else: resistance, dead time, delay and load are in the
+ * current as in the voltage. c of each sample and not of the load, as its slope shows in the carrier's answer: half of
+ * what c moves by is a part that turns with 6 theta. Its basin is +-60 to +-75 degrees for kappa = 0.27, that of the told one +-90.
  *
  * The carrier has N periods, N even, and a swing of the opposite sign half of it later. With h = N / 2,
  *   d~ = d_k - d_k-h,  s~ = s_k - s_k-h     free of what moves slower: EMF, load
@@ -51,7 +55,8 @@ typedef enum { ZERO_BEGINS_TOLD, ZERO_TOLD, ZERO_MEASURED, ZERO_NOT_DECOUPLED } 
 
 typedef struct {
     int32_t v_now, v_past;           /* shares of y_k and y_k-1 in x, Q20 */
-    int32_t c_re, c_im;              /* c / T_s, Q20 */
+    int32_t c_re, c_im;              /* c / T_s without a current, Q20, */
+    int32_t c_d, c_q, c_cross;       /* and what i_d, i_q^2, i_q of unit current add to it, Q25 */
     int32_t v_h;                     /* Q31 */
     pm_angle_t step;                 /* 2 pi / N */
     uint32_t half;                   /* h */
@@ -77,7 +82,7 @@ typedef struct {
 } zero_place_t;
 
 typedef struct {
-    pm_ab_t u;   /* Q26 */
+    pm_ab_t u;   /* c i e^{j 2 theta^} / T_s, Q14 */
     int32_t y;   /* as pm_small() */
     int32_t sum; /* of p */
     pm_q_t eps;
@@ -113,20 +118,28 @@ static inline pm_q_t zero_voltage(zero_t *self, const zero_config_t *config, con
     return pm_shl(pm_sat(x, 18), PM_Q_BITS - 18);
 }
 
-/* The measured form. */
-static inline zero_sequence_sample_t zero_measured(zero_t *self, const zero_config_t *config,
-                                                   const injection_in_t *in, pm_q_t x)
+/* u of the present sample; i: half of the current, estimated frame. */
+static inline pm_ab_t zero_link(const zero_config_t *config, const injection_in_t *in, pm_dq_t i)
 {
     const pm_half_dir_t twice = pm_dir_sum(in->dir, in->dir);
-    const pm_ab_t u = {pm_mulh_sub(pm_mulh(in->i.alpha, twice.cos), in->i.beta, twice.sin),
-                       pm_mulh_add(pm_mulh(in->i.alpha, twice.sin), in->i.beta, twice.cos)};
-    const int32_t re = pm_shl(pm_sat(u.alpha - self->u.alpha, 25), 6); /* as pm_small() of Q26 */
-    const int32_t im = pm_shl(pm_sat(u.beta - self->u.beta, 25), 6);
-    const int32_t g_re = pm_mulh_sub(pm_mulh(re, config->c_re), im, config->c_im);
-    const int32_t g_im = pm_mulh_add(pm_mulh(re, config->c_im), im, config->c_re);
+    const int32_t alpha = pm_mulh_sub(pm_mulh(in->i.alpha, twice.cos), in->i.beta, twice.sin); /* Q26 */
+    const int32_t beta = pm_mulh_add(pm_mulh(in->i.alpha, twice.sin), in->i.beta, twice.cos);
+    const int32_t square = pm_shl(pm_sat(pm_mulh(i.q, config->c_q), 26), 5);
+    const int32_t re = pm_mulh_add(pm_mulh_add(config->c_re, i.d, config->c_d), i.q, square);
+    const int32_t im = pm_mulh_add(config->c_im, i.q, config->c_cross);
+    const pm_ab_t u = {pm_mulh_sub(pm_mulh(alpha, re), beta, im), pm_mulh_add(pm_mulh(alpha, im), beta, re)};
+    return u;
+}
+
+/* The measured form. */
+static inline zero_sequence_sample_t zero_measured(zero_t *self, const zero_config_t *config,
+                                                   const injection_in_t *in, pm_dq_t i, pm_q_t x)
+{
+    const pm_ab_t u = zero_link(config, in, i);
+    const int32_t re = pm_sat(u.alpha - self->u.alpha, 14);
+    const int32_t im = pm_sat(u.beta - self->u.beta, 14);
     self->u = u;
-    const zero_sequence_sample_t sample = {x + pm_shl(pm_sat(g_re, 20), PM_Q_BITS - 21),
-                                           pm_shl(pm_sat(g_im, 20), PM_Q_BITS - 20)};
+    const zero_sequence_sample_t sample = {x + pm_shl(re, PM_Q_BITS - 15), pm_shl(im, PM_Q_BITS - 14)};
     return sample;
 }
 
@@ -151,14 +164,13 @@ static inline int32_t zero_amplitude(const zero_config_t *config, pm_unit_t r)
     return pm_mulh(config->v_h, r);
 }
 
-/* Closes the period: d~, s~, eps and the fundamental current. */
-static inline void zero_close(zero_t *self, const zero_config_t *config, const injection_in_t *in,
+/* Closes the period: d~, s~, eps and the fundamental current; i as zero_link() has it. */
+static inline void zero_close(zero_t *self, const zero_config_t *config, pm_dq_t i,
                               zero_sequence_sample_t sample, injection_out_t *out)
 {
     const uint32_t at = self->at;
     zero_place_t *place = &self->place[at];
     const pm_dq_t past = place->i;
-    const pm_dq_t i = pm_park_half(in->i, in->dir);
     const pm_q_t s = sample.s - place->s;
     const int32_t p = pm_mulh(sample.d - place->d, s);
     self->sum += p - place->p;

@@ -6,7 +6,8 @@
 
 #if PM_CARRIES(NEEDS_NEUTRAL)
 
-#define V_BITS 22
+#define V_BITS    22
+#define LINK_BITS 25
 
 /* h: the nearest whole number of periods to half a carrier. */
 static int32_t half_of(const maker_t *m)
@@ -84,10 +85,32 @@ static void make_channel(maker_t *m, zero_config_t *c, pm_num_t unit)
 }
 
 /* c / T_s of a current per unit, in `unit`. */
-static int32_t link(maker_t *m, drive_param_id_t id, pm_num_t unit)
+static pm_num_t link(const maker_t *m, pm_num_t c, pm_num_t unit)
 {
-    return fixed(m, pm_num_div(pm_num_mul(si(m, id), m->base.i), pm_num_mul(m->base.t_s, unit)), SMALL_BITS,
-                 id);
+    return pm_num_div(pm_num_mul(c, m->base.i), pm_num_mul(m->base.t_s, unit));
+}
+
+/* What a current of one per unit to the `power` adds to c / T_s. `id`: c at the rated current; 0: as without. */
+static int32_t move(maker_t *m, drive_param_id_t id, drive_param_id_t without, int power, pm_num_t unit)
+{
+    const pm_num_t rated = si(m, id);
+    if (rated.m == 0) {
+        return 0;
+    }
+    const pm_num_t i_rated = pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i);
+    const pm_num_t by = pm_num_div(link(m, pm_num_sub(rated, si(m, without)), unit), i_rated);
+    return fixed(m, power == 2 ? pm_num_div(by, i_rated) : by, LINK_BITS, id);
+}
+
+static void make_link(maker_t *m, zero_config_t *c)
+{
+    const pm_num_t unit = zero_unit(m);
+    c->c_re = fixed(m, link(m, si(m, DRIVE_PARAM_dL_0), unit), SMALL_BITS, DRIVE_PARAM_dL_0);
+    c->c_im = pm_sub_sat(
+        0, fixed(m, link(m, si(m, DRIVE_PARAM_zero_L_c0), unit), SMALL_BITS, DRIVE_PARAM_zero_L_c0));
+    c->c_d = move(m, DRIVE_PARAM_zero_dL_0_d, DRIVE_PARAM_dL_0, 1, unit);
+    c->c_q = move(m, DRIVE_PARAM_zero_dL_0_q, DRIVE_PARAM_dL_0, 2, unit);
+    c->c_cross = pm_sub_sat(0, move(m, DRIVE_PARAM_zero_L_c0_q, DRIVE_PARAM_zero_L_c0, 1, unit));
 }
 
 static void make_kappa(maker_t *m, zero_config_t *c)
@@ -129,8 +152,7 @@ void make_zero_sequence(maker_t *m, zero_config_t *c)
     make_carrier(m, c);
     make_channel(m, c, unit);
     make_kappa(m, c);
-    c->c_re = link(m, DRIVE_PARAM_dL_0, unit);
-    c->c_im = pm_sub_sat(0, link(m, DRIVE_PARAM_zero_L_c0, unit));
+    make_link(m, c);
     c->form = (uint8_t)m->params->zero_form;
     c->told_first = m->params->zero_form != (int32_t)ZERO_MEASURED;
     c->turn6 =
@@ -167,6 +189,11 @@ void make_zero_rotating(maker_t *m, zero_rotating_config_t *c)
 /* Half a step of the converter and what rounding adds, of an amplitude; A is 1/8. */
 polarity_carrier_t zero_rotating_polarity(maker_t *m, const zero_rotating_config_t *c)
 {
+    if (m->params->polarity == 2 && m->params->zero_falls == 2) {
+        refuse(m, DRIVE_PARAM_zero_falls,
+               "the pole by the answer at the neutral: which way that goes must be found first, identify "
+               "--only neutral");
+    }
     const uint32_t n = 2U * c->half;
     const pm_num_t one = pm_num_mul(pm_num_div(si(m, DRIVE_PARAM_neutral_full_scale), m->base.v),
                                     pm_num_from_fixed(c->v_now, V_BITS));
@@ -175,7 +202,7 @@ polarity_carrier_t zero_rotating_polarity(maker_t *m, const zero_rotating_config
                                 .noise =
                                     fixed(m, pm_num_mul(one, share), Q_BITS, DRIVE_PARAM_neutral_full_scale),
                                 .h_d = PM_Q(0.125),
-                                .reversed = m->params->zero_falls != 0};
+                                .reversed = m->params->zero_falls == 1};
 }
 
 /* eps is h periods old; 0.3 rad of phase, as sine.h. The current is h / 2 periods old. */

@@ -75,7 +75,8 @@ static void two_phase_nodes(const circuit_t *c, const point_t *p, circuit_nodes_
 static bool has_plain_nodes(const circuit_t *c)
 {
     const winding_t *w = &c->machine.winding;
-    return circuit_symmetrical(c) && c->machine.plain && w->flux_terms == 0 && w->inductance_terms == 0;
+    return circuit_symmetrical(c) && c->machine.plain && w->flux_terms == 0 && w->inductance_terms == 0 &&
+           !w->zero_moves;
 }
 
 void circuit_terminals(const circuit_t *c, const point_t *p, double v_leg_V[PLANT_LEGS])

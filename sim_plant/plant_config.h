@@ -37,7 +37,10 @@ typedef struct {
     plant_connection_t connection; /* open: legs 0 to 2 feed one end of the phases, 3 to 5 the other (E17) */
     double M_d_H, M_q_H;           /* mutual inductance between the sets, E16 */
     double L_0_H;                  /* of the zero sequence; must be positive for an open winding */
-    double dL_0_H, L_c0_H;         /* E3: L_s2 - M_s2 and its cross-coupling counterpart */
+    double dL_0_H, L_c0_H;         /* E3: L_s2 - M_s2 and its cross-coupling counterpart, */
+    /* how they move with a star's own currents: dL_0 (1 + dL_0_d i_d + dL_0_q i_q^2) and L_c0 + L_c0_q i_q.
+     * Where the currents take dL_0 through zero, the model ends. */
+    double dL_0_d_1_A, dL_0_q_1_A2, L_c0_q_H_A;
     plant_harmonic_t emf[PLANT_HARMONICS]; /* E5: flux linkage of phase A, psi_n cos(n theta + phase), Wb */
     /* E3, x = n theta + phase, L in H; orders n = 2, 5, 8, 11 ... and -1, -4, -7, -10 ... (winding.h): */
     plant_harmonic_t saliency[PLANT_HARMONICS]; /* psi_ab = L [cos x, sin x; sin x, -cos x] i_ab */

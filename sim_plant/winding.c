@@ -132,6 +132,11 @@ void winding_init(winding_t *winding, const plant_winding_t *parameters, double 
     winding->M_d_H = parameters->M_d_H;
     winding->M_q_H = parameters->M_q_H;
     winding_terms(winding, parameters, R_s_ohm, psi_m_Wb, psi_core_Wb, magnet_scale);
+    winding->dL_0_d_H_A = parameters->dL_0_H * parameters->dL_0_d_1_A;
+    winding->dL_0_q_H_A2 = parameters->dL_0_H * parameters->dL_0_q_1_A2;
+    winding->L_c0_q_H_A = parameters->L_c0_q_H_A;
+    winding->zero_moves =
+        winding->dL_0_d_H_A != 0.0 || winding->dL_0_q_H_A2 != 0.0 || winding->L_c0_q_H_A != 0.0;
     for (int n = 0; n < PLANT_HARMONICS; n++) {
         if (parameters->cogging[n].order > 0) {
             winding->cogging[winding->cogging_terms++] = parameters->cogging[n];
@@ -160,6 +165,30 @@ void winding_branch(winding_t *w, const double axis[PLANT_LEGS], double R_ohm)
     pack(w);
 }
 
+/* dpsi_0/dt of what moves with the currents of a star */
+static double moving_zero_V(const winding_t *w, rotor_t rotor, double omega_e_rad_s, const double i_A[ACTIVE],
+                            const double i_A_s[ACTIVE], int set)
+{
+    ab_t i_ab = {i_A[2 * set], i_A[2 * set + 1]}, i_ab_s = {i_A_s[2 * set], i_A_s[2 * set + 1]};
+    dq_t i = frame_to_dq(i_ab, rotor);
+    dq_t i_s = frame_to_dq(i_ab_s, rotor);
+    i_s.d += omega_e_rad_s * i.q;
+    i_s.q -= omega_e_rad_s * i.d;
+    rotor_t triple = winding_multiple(rotor, 3);
+    if (set > 0) { /* whose phase X is 30 degrees further on */
+        triple = (rotor_t){triple.s, -triple.c};
+    }
+    double dL_0_H = w->dL_0_d_H_A * i.d + w->dL_0_q_H_A2 * i.q * i.q;
+    double dL_0_H_s = w->dL_0_d_H_A * i_s.d + 2.0 * w->dL_0_q_H_A2 * i.q * i_s.q;
+    double L_c0_H = w->L_c0_q_H_A * i.q;
+    double L_c0_H_s = w->L_c0_q_H_A * i_s.q;
+    double re = dL_0_H * i.d + L_c0_H * i.q; /* of c (i_d + j i_q) */
+    double im = dL_0_H * i.q - L_c0_H * i.d;
+    double re_s = dL_0_H_s * i.d + dL_0_H * i_s.d + L_c0_H_s * i.q + L_c0_H * i_s.q;
+    double im_s = dL_0_H_s * i.q + dL_0_H * i_s.q - L_c0_H_s * i.d - L_c0_H * i_s.d;
+    return -0.5 * (re_s * triple.c - im_s * triple.s) + 1.5 * omega_e_rad_s * (re * triple.s + im * triple.c);
+}
+
 double winding_zero_V(const winding_t *w, rotor_t rotor, double omega_e_rad_s, const double i_A[ACTIVE],
                       const double i_A_s[ACTIVE], int set)
 {
@@ -182,6 +211,9 @@ double winding_zero_V(const winding_t *w, rotor_t rotor, double omega_e_rad_s, c
     }
     for (int a = 0; a < w->active; a++) {
         v_V += w->all_R_ohm[zero][w->coordinate[a]] * i_A[a];
+    }
+    if (w->zero_moves) {
+        v_V += moving_zero_V(w, rotor, omega_e_rad_s, i_A, i_A_s, set);
     }
     return v_V;
 }

@@ -19,7 +19,12 @@
  *   psi_0 = L/2 Re(e^{jx} i)      zero_saliency, with
  *   psi   = L e^{-jx} i_0
  *
- * dL_0 and L_c0 are a zero_saliency of order 2 with L e^{j phase} = -dL_0 + j L_c0. Of three equal phases
+ * dL_0 and L_c0 are a zero_saliency of order 2 with L e^{j phase} = -dL_0 + j L_c0. What of them moves with
+ * the currents of a star, c = dL_0_d i_d + dL_0_q i_q^2 - j L_c0_q i_q, adds
+ *
+ *   psi_0 = -1/2 Re(c (i_d + j i_q) e^{j 3 theta})
+ *
+ * which meets no current: it is in the voltage of the neutral alone. Of three equal phases
  * only n = 2, 5, 8, 11 ... and -1, -4, -7, -10 ... are possible; config.c refuses others. A harmonic of phase
  * inductances
  *
@@ -89,6 +94,8 @@ typedef struct {
     double all_R_ohm[COORDS][COORDS];
     flux_term_t flux[FLUX_TERMS];
     inductance_term_t inductance[INDUCTANCE_TERMS];
+    bool zero_moves; /* with the currents: */
+    double dL_0_d_H_A, dL_0_q_H_A2, L_c0_q_H_A;
 } winding_t;
 
 /* psi_core_Wb: magnet flux that the core has already; psi_m_Wb: what it is to be before gain errors. */

@@ -340,6 +340,11 @@ enum {
     OD_PARAMETER_ZERO_SECOND_PHASE,
     OD_PARAMETER_ZERO_SECOND_EVEN,
 #endif
+#if PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating)
+    OD_PARAMETER_ZERO_DL_0_D,
+    OD_PARAMETER_ZERO_DL_0_Q,
+    OD_PARAMETER_ZERO_L_C0_Q,
+#endif
 #if PM_HAS(counted_carrier)
     OD_PARAMETER_INJECTION_PRE_COMP,
 #endif

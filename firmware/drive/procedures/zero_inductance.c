@@ -22,7 +22,7 @@
 #define LEAST_SHARE 256  /* of i_max: an answer in the currents */
 
 /* Along phase A, and across it. */
-enum { TURN, WITH, FREE, WITHOUT, TURN_ON, FREE_ON, WITHOUT_ON, PARTS };
+enum { TURN, WITH, FREE, WITHOUT, TURN_ON, WITH_ON, FREE_ON, WITHOUT_ON, PARTS };
 
 static pm_q_t current(const drive_t *drive)
 {
@@ -36,10 +36,8 @@ static void enter(drive_t *drive, uint8_t part)
     self->ms = 0;
     self->hold.still = 0;
     self->values = 0;
-    if (part == (uint8_t)WITHOUT) { /* not of those with the current */
-        self->at[0].a = (pm_dq_t){0, 0};
-        self->at[0].b = (pm_dq_t){0, 0};
-        self->at[0].y = (pm_dq_t){0, 0};
+    if (part == (uint8_t)WITHOUT || part == (uint8_t)WITHOUT_ON) { /* not of those with the current */
+        self->at[part / (uint8_t)TURN_ON] = (zero_means_t){.a = {0, 0}, .b = {0, 0}, .y = {0, 0}};
     }
     drive->commissioning_report.progress = (uint8_t)(100U * part / (uint8_t)PARTS);
 }
@@ -76,7 +74,7 @@ static bool holds(drive_t *drive)
 {
     zero_inductance_t *self = &drive->procedure.zero_inductance;
     const zero_inductance_config_t *c = &drive->config.zero_inductance;
-    const bool with = self->part <= (uint8_t)WITH || self->part == (uint8_t)TURN_ON;
+    const bool with = self->part % (uint8_t)TURN_ON <= (uint8_t)WITH;
     const pm_q_t i = current(drive);
     const pm_q_t wanted = with ? i : 0;
     self->i = pm_approach(self->i, wanted, i / RISE_MS + 1);
@@ -114,17 +112,18 @@ static bool add_value(drive_t *drive)
     const pm_dq_t i_sin = window_sine(&self->sine.window, per_n);
     const pm_q_t y_cos = window_cosine(&self->neutral, per_n).d;
     const pm_q_t y_sin = window_sine(&self->neutral, per_n).d;
-    const uint32_t at = self->part == (uint8_t)WITHOUT_ON ? 1U : 0U;
+    const uint32_t at = self->part / (uint8_t)TURN_ON;
+    const bool with = self->part % (uint8_t)TURN_ON == (uint8_t)WITH;
+    const pm_q_t size = size_of(pm_hypot(y_cos, y_sin), i_cos, i_sin);
     add(&self->at[at].a, i_cos.d, i_sin.d);
     add(&self->at[at].b, i_cos.q, i_sin.q);
     add(&self->at[at].y, y_cos, y_sin);
-    if (at == 0U) {
-        const pm_q_t size = size_of(pm_hypot(y_cos, y_sin), i_cos, i_sin);
-        if (self->part == (uint8_t)WITH && self->values == 0U) {
-            self->first = size;
-        }
-        polarity_add(&self->size[self->part == (uint8_t)WITH ? 0 : 1], size - self->first);
+    if (with && self->values == 0U) {
+        self->first = size;
+        self->size[0] = (polarity_mean_t){.sum = 0};
+        self->size[1] = (polarity_mean_t){.sum = 0};
     }
+    polarity_add(&self->size[with ? 0 : 1], size - self->first);
     self->values++;
     return self->values >= VALUES;
 }
@@ -142,19 +141,24 @@ static pm_q_t share(int64_t x, int64_t y)
     return one == 0 ? 0 : (pm_q_t)pm_quotient(x, (int32_t)one);
 }
 
-/* Which way, if it is sure. */
-static void find_fall(drive_t *drive)
+/* Which way, if it is sure; across phase A, too, if it is. */
+static void find_fall(drive_t *drive, bool across)
 {
     const zero_inductance_t *self = &drive->procedure.zero_inductance;
     zero_inductance_result_t *r = &drive->zero_inductance;
     const polarity_config_t none = {.reversed = false};
     const pm_q_t noise = pm_hypot(polarity_noise(&self->size[0]), polarity_noise(&self->size[1]));
     const pm_q_t rise = polarity_mean(&self->size[0]) - polarity_mean(&self->size[1]);
+    pm_sigma_t margin;
     bool rises;
-    if (polarity_judge(&none, rise, self->first / SHARE, noise, &r->margin, &rises) == PM_DONE) {
+    const bool sure = polarity_judge(&none, rise, self->first / SHARE, noise, &margin, &rises) == PM_DONE;
+    if (!across) {
+        r->margin = sure ? margin : 0;
         r->falls = !rises;
-    } else {
+    } else if (sure && r->falls == rises) {
         r->margin = 0;
+    } else {
+        /* the same way, or none: the start's own margin then refuses where it must */
     }
 }
 
@@ -216,7 +220,7 @@ static pm_procedure_t conclude(drive_t *drive)
         return PM_FAILED_SALIENCY;
     }
     find_star(drive);
-    find_fall(drive);
+    find_fall(drive, true);
     return PM_DONE;
 }
 
@@ -242,9 +246,7 @@ pm_procedure_t procedure_zero_inductance_slow(drive_t *drive)
     if (self->ms > LATEST_MS) {
         return finish(drive, PM_FAILED_NO_CURRENT);
     }
-    const bool waits = self->part == (uint8_t)TURN || self->part == (uint8_t)FREE ||
-                       self->part == (uint8_t)TURN_ON || self->part == (uint8_t)FREE_ON;
-    if (waits) {
+    if (self->part % 2U == 0U) { /* waits */
         if (held) {
             enter(drive, (uint8_t)(self->part + 1U));
         }
@@ -252,6 +254,9 @@ pm_procedure_t procedure_zero_inductance_slow(drive_t *drive)
     }
     if (self->ms % block != 0U || !add_value(drive)) {
         return PM_RUNNING;
+    }
+    if (self->part == (uint8_t)WITHOUT) {
+        find_fall(drive, false);
     }
     if (self->part != (uint8_t)WITHOUT_ON) {
         enter(drive, (uint8_t)(self->part + 1U));

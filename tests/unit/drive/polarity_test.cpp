@@ -164,6 +164,7 @@ drive_params_t rotating()
     p.position_find = 0;
     p.injection = INJECTION_zero_rotating;
     p.dL_0 = 2000000;
+    p.zero_falls = 0;
     p.neutral_full_scale = 10000;
     p.neutral_filter = 100000;
     p.injection_bandwidth = 20000;
@@ -460,6 +461,15 @@ TEST(Polarity, AParameterThatCannotBeIsRefusedByName)
         const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
         EXPECT_FALSE(r.ok);
         EXPECT_EQ(r.param, DRIVE_PARAM_polarity);
+    }
+    for (const bool by_current : {false, true}) { // which way the answer at the neutral goes was not found
+        drive_params_t p = rotating();
+        p.zero_falls = 2;
+        p.polarity = by_current ? 2 : 0;
+        drive_config_t c = {};
+        const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
+        EXPECT_EQ(r.ok, !by_current);
+        EXPECT_TRUE(r.ok || r.param == DRIVE_PARAM_zero_falls);
     }
     EXPECT_EQ(refused([](drive_params_t &p) {
                   p.position_find = 1;

@@ -50,7 +50,8 @@ class Run
     double loop_Hz = 0;            // of a position loop that moves `error`; 0: imposed
     Complex disturbance_V = 0;     // in the stator, that nobody knows of
     double L_c0_H = 0;             // cross-coupling of the zero sequence
-    bool sampled = true;           // samples that are asked for are taken
+    double dL_0_d_H_A = 0, dL_0_q_H_A2 = 0, L_c0_q_H_A = 0; // what of it moves with the current
+    bool sampled = true;                                    // samples that are asked for are taken
     std::vector<excitation_t> given;
 
     explicit Run(const injection_config_t &c) : config_(c)
@@ -158,7 +159,9 @@ class Run
     double flux_zero() const
     {
         const Complex u = i_ * std::polar(1.0, 3 * theta);
-        return bench::kNeutral.flux_Wb(i_ * std::polar(1.0, theta), theta) - 0.5 * L_c0_H * u.imag();
+        const Complex c(dL_0_d_H_A * i_.real() + dL_0_q_H_A2 * i_.imag() * i_.imag(),
+                        -L_c0_H - L_c0_q_H_A * i_.imag());
+        return bench::kNeutral.flux_Wb(i_ * std::polar(1.0, theta), theta) - 0.5 * (c * u).real();
     }
 
     // The loop of drive/position.c at standstill: a double pole with damping 0.9.

@@ -16,6 +16,8 @@ using bench::Machine;
 
 // Measured form: first order in the change of the position over the period and in the rounding of the figures.
 constexpr double kZero_deg = 0.03;
+// Where c moves, second order in the carrier's current.
+constexpr double kMoves_deg = 0.1;
 // With 30 ohm the voltage changes by 7 % within a period, of which the RC sees the end more.
 constexpr double kResistance_deg = 0.1;
 // The lock without L_c0 is that of the formula to the first order in L_c0 / dL_0: 0.1 of 7 degrees.
@@ -50,13 +52,16 @@ drive_params_t parameters(const Choice &choice)
     return p;
 }
 
-injection_config_t config(const Choice &choice)
+injection_config_t config(const Choice &choice, const std::function<void(drive_params_t &)> &change = nullptr)
 {
     drive_params_t p = parameters(choice);
     p.v_injection = 70000;
     p.zero_form = choice.form;
     p.dL_0 = static_cast<int32_t>(std::lround(p.dL_0 * choice.dL_0_told));
     p.zero_L_c0 = static_cast<int32_t>(std::lround(choice.L_c0_told_H * 1e9));
+    if (change) {
+        change(p);
+    }
     drive_config_t c = {};
     const drive_result_t result = drive_configure(&c, &p, PM_CHANNELS);
     EXPECT_TRUE(result.ok) << result.reason;
@@ -130,6 +135,38 @@ TEST(ZeroSequence, CrossSaturationMovesTheLock)
         Choice told = choice;
         told.L_c0_told_H = 0.5e-3;
         EXPECT_NEAR(settled(told, 0, 0.5e-3).eps / kDegree, 0, kZero_deg) << choice.id;
+    }
+}
+
+// c moves with the current of every sample: told of it no error, at any position; without, half of the part that
+// turns with 6 theta, of a third of dL_0 here, is left.
+TEST(ZeroSequence, WhatMovesWithTheCurrentIsToldForEachSample)
+{
+    for (const Choice &choice : kAll) {
+        drive_params_t p = parameters(choice);
+        const double rated = p.i_rated * 1e-3, dL_0_H = p.dL_0 * 1e-9;
+        double worst_untold = 0;
+        for (const bool told : {true, false}) {
+            for (const double theta : {0.1, 0.26, 0.4, 0.9, 1.7}) {
+                rig::Run run(config(choice, [&](drive_params_t &q) {
+                    q.zero_dL_0_d = told ? static_cast<int32_t>(std::lround(0.9 * dL_0_H * 1e9)) : 0;
+                    q.zero_dL_0_q = told ? static_cast<int32_t>(std::lround(0.85 * dL_0_H * 1e9)) : 0;
+                    q.zero_L_c0_q = told ? static_cast<int32_t>(std::lround(-0.15 * dL_0_H * 1e9)) : 0;
+                }));
+                run.theta = theta;
+                run.i_dq_A = {-0.4 * rated, rated};
+                run.dL_0_d_H_A = -0.1 * dL_0_H / rated;
+                run.dL_0_q_H_A2 = -0.15 * dL_0_H / (rated * rated);
+                run.L_c0_q_H_A = -0.15 * dL_0_H / rated;
+                const double error_deg = run.after(kSettled).eps / kDegree;
+                if (told) {
+                    EXPECT_NEAR(error_deg, 0, kMoves_deg) << choice.id << ' ' << theta;
+                } else {
+                    worst_untold = std::max(worst_untold, std::abs(error_deg));
+                }
+            }
+        }
+        EXPECT_GT(worst_untold, 3) << choice.id;
     }
 }
 

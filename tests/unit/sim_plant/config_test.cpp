@@ -68,6 +68,15 @@ const Garbage garbage[] = {
     {"M_q_H", [](plant_config_t &c) { c.winding.M_q_H = inf; }},
     {"dL_0_H", [](plant_config_t &c) { c.winding.dL_0_H = nan; }},
     {"L_c0_H", [](plant_config_t &c) { c.winding.L_c0_H = nan; }},
+    {"dL_0_d_1_A", [](plant_config_t &c) { c.winding.dL_0_d_1_A = nan; }},
+    {"dL_0_q_1_A2", [](plant_config_t &c) { c.winding.dL_0_q_1_A2 = inf; }},
+    {"L_c0_q_H_A", [](plant_config_t &c) { c.winding.L_c0_q_H_A = nan; }},
+    {"are of a star",
+     [](plant_config_t &c) {
+         c.winding.connection = PLANT_OPEN;
+         c.winding.L_0_H = 1e-3;
+         c.winding.L_c0_q_H_A = 1e-6;
+     }},
     {"winding.emf must", [](plant_config_t &c) { c.winding.emf[3] = {5, nan, 0.0}; }},
     {"winding.emf must", [](plant_config_t &c) { c.winding.emf[0] = {1001, 0.01, 0.0}; }},
     {"winding.saliency must", [](plant_config_t &c) { c.winding.saliency[0] = {4, 1e-3, 0.0}; }},

@@ -136,6 +136,41 @@ TEST(ZeroSequence, RotatingInjectionInAStar)
     }
 }
 
+// The same where dL_0 and L_c0 move with the currents, from the slopes of psi_0 = -1/2 Re[c i e^{j 3 theta}].
+TEST(ZeroSequence, RotatingInjectionWhereTheInductancesMove)
+{
+    plant_config_t config = ipm_saturating();
+    plant_winding_t &w = config.winding;
+    config.mech.locked = true;
+    w.L_0_H = 14e-3;
+    w.dL_0_H = 2e-3;
+    w.dL_0_d_1_A = -0.04;
+    w.dL_0_q_1_A2 = -0.01;
+    w.L_c0_q_H_A = -75e-6;
+    reference::FluxMap flux = reference::inverse(energy_form(config.machine));
+    const auto flux_0_Wb = [&](double i_d_A, double i_q_A, double theta) {
+        Complex c(w.dL_0_H * (1.0 + w.dL_0_d_1_A * i_d_A + w.dL_0_q_1_A2 * i_q_A * i_q_A),
+                  -w.L_c0_q_H_A * i_q_A);
+        return -0.5 * (c * Complex(i_d_A, i_q_A) * std::polar(1.0, 3.0 * theta)).real();
+    };
+    double worst_V = 0.0, peak_V = 0.0;
+    for (int at = 0; at < 360; at += 15) {
+        double theta = at * deg;
+        Injected seen = inject(config, theta, Complex(-2.5, 3.0));
+        double i_d = seen.i_dq_A.real(), i_q = seen.i_dq_A.imag();
+        constexpr double step_A = 1e-4;
+        Eigen::RowVector2d slope((flux_0_Wb(i_d + step_A, i_q, theta) - flux_0_Wb(i_d - step_A, i_q, theta)),
+                                 (flux_0_Wb(i_d, i_q + step_A, theta) - flux_0_Wb(i_d, i_q - step_A, theta)));
+        slope /= 2.0 * step_A;
+        Eigen::RowVector2d answer = slope * flux({i_d, i_q}, 0.0).L_H.inverse();
+        // the voltage 35 e^{j (chi - theta)} in the rotor's frame, as the complex amplitude of e^{j chi}
+        Complex v_0_V = 35.0 * std::polar(1.0, -theta) * (answer(0) - j * answer(1));
+        worst_V = std::max(worst_V, std::abs(seen.v_0_V - v_0_V));
+        peak_V = std::max(peak_V, std::abs(v_0_V));
+    }
+    measured("zsv_rotating_moves", worst_V / peak_V, bound_zero, "of_peak", "6.2.1");
+}
+
 // 11.2.1: v_SN = - 3 omega psi_3 sin 3 theta of a non-salient machine, whatever flows.
 TEST(ZeroSequence, ThirdHarmonicOfAStar)
 {

@@ -9,12 +9,14 @@ extern "C" {
 #include <Eigen/Dense>
 
 #include <cmath>
+#include <complex>
 
 namespace
 {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using Complex = std::complex<double>;
 
 constexpr double pi = 3.14159265358979323846;
 // Sums of a few dozen products of numbers near one: rounding.
@@ -519,6 +521,44 @@ TEST(SaliencyOrder, SecondOfTheZeroSequenceIsThatOfTheBook)
                 EXPECT_GT(std::fabs(v_V), 1e-3);
                 EXPECT_NEAR(winding_zero_V(&other, rotor, 200.0, i_A, i_A_s, set), v_V, 1e-12);
             }
+        }
+    }
+}
+
+// What moves with the currents, from psi_0 of its definition along a path of currents and angle: theta = 0.8 + 200 t.
+TEST(ZeroSequence, MovesWithTheCurrentsOfAStar)
+{
+    constexpr double dL_0 = 2e-3, by_d = -0.04, by_q = -0.01, L_c0 = 0.2e-3, cross = -75e-6;
+    plant_winding_t still{}, moving{};
+    still.sets = moving.sets = 2;
+    still.dL_0_H = moving.dL_0_H = dL_0;
+    still.L_c0_H = moving.L_c0_H = L_c0;
+    moving.dL_0_d_1_A = by_d;
+    moving.dL_0_q_1_A2 = by_q;
+    moving.L_c0_q_H_A = cross;
+    winding_t one, other;
+    winding_init(&one, &still, R_s, psi_m, psi_m, 1.0);
+    winding_init(&other, &moving, R_s, psi_m, psi_m, 1.0);
+    const double i_A[ACTIVE] = {3.0, -2.0, 1.0, 0.5}, i_A_s[ACTIVE] = {700.0, 900.0, -400.0, 100.0};
+    const double omega = 200.0;
+    for (double theta : angles) {
+        for (int set = 0; set < 2; set++) {
+            const auto added_Wb = [&](double t) {
+                const Complex at = std::polar(1.0, theta + omega * t);
+                const Complex i =
+                    Complex(i_A[2 * set] + i_A_s[2 * set] * t, i_A[2 * set + 1] + i_A_s[2 * set + 1] * t) /
+                    at;
+                const double more = dL_0 * (by_d * i.real() + by_q * i.imag() * i.imag());
+                const Complex c(more, -cross * i.imag());
+                return -0.5 * (c * i * at * at * at * std::polar(1.0, -3.0 * set * pi / 6.0)).real();
+            };
+            const double step_s = 1e-7;
+            const double expected_V = (added_Wb(step_s) - added_Wb(-step_s)) / (2.0 * step_s);
+            const rotor_t rotor = {std::cos(theta), std::sin(theta)};
+            const double v_V = winding_zero_V(&other, rotor, omega, i_A, i_A_s, set) -
+                               winding_zero_V(&one, rotor, omega, i_A, i_A_s, set);
+            EXPECT_GT(std::fabs(expected_V), 1e-4);
+            EXPECT_NEAR(v_V, expected_V, 1e-8);
         }
     }
 }

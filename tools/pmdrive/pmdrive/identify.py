@@ -113,9 +113,7 @@ def parameters(drive, found):
     if "saliency" in found:
         wanted.update((name, x[name]) for name in RESULTS["saliency"])
     if "neutral" in found:
-        wanted.update((name, x[name]) for name in ("dL_0", "zero_L_c0", "star_alpha", "star_beta"))
-        if x["zero_falls"] < 2:  # else nothing is known of it
-            wanted["zero_falls"] = x["zero_falls"]
+        wanted.update((name, x[name]) for name in RESULTS["neutral"])
     wanted.update((name, x[name]) for name in ("psi_m", "J") if name in x)
     return raw_values(wanted)
 
