@@ -189,6 +189,69 @@ TEST(BlockDuty, TheOtherSignBrakesAndBeginsAnew)
     EXPECT_NEAR(x.omega_rel, -speed_rel(0.4), kSpeed * speed_rel(0.4));
 }
 
+void low_side(plant_config_t &c)
+{
+    c.sensor.shunt = PLANT_LOW_SIDE;
+    c.sensor.settle_s = 1.3e-6;
+}
+
+void to_full_voltage(Fan &x, int32_t pattern)
+{
+    x.params().pattern = pattern;
+    x.params().t_duty = 300;
+    x.enable(DRIVE_MODE_DUTY);
+    x.duty(0.3);
+    x.run_s(1.0);
+    x.duty(1);
+    x.run_s(1.4);
+}
+
+// Hidden for b = 2 f_pwm (dead time + settling) of a period, tests/scenario/six_step_low_side.yaml.
+TEST(BlockDuty, LowSideShuntsShowTheCurrentUpToAllOfTheVoltage)
+{
+    for (const int32_t pattern : {0, 1, 5}) {
+        Fan x(0.17, low_side);
+        to_full_voltage(x, pattern);
+        EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE) << pattern;
+        EXPECT_NEAR(u(x), pattern == 0 ? 1 - 4 * 20e3 * 1.8e-6 : 1, 1e-3) << pattern;
+        EXPECT_GT(x.omega_rel, pattern == 0 ? 0.942 : 1.085) << pattern;
+    }
+}
+
+// Twin: told that they are in the lines, the drive finds a sum that is not zero, or controls what is not there.
+TEST(BlockDuty, TwinLowSideShuntsToldInLineAreAFault)
+{
+    for (const int32_t pattern : {0, 1}) {
+        Fan x(0.17, low_side);
+        x.params().t_settle = 0;
+        to_full_voltage(x, pattern);
+        EXPECT_TRUE(x.fault() == DRIVE_FAULT_SENSOR_SUM || x.fault() == DRIVE_FAULT_OVER_CURRENT) << pattern;
+    }
+}
+
+// freewheeling.h: with a slow sample and four times the inductance, as told, a duty that is taken back brakes with less. Where the high
+// leg is chopped, pattern 1, the longest freewheeling is that of even sectors, where the low leg is, pattern 2, of odd ones: as long.
+TEST(BlockDuty, TheFreewheelingLimitsWhatItBrakesWith)
+{
+    const auto braked = [](int32_t pattern, int32_t limit) {
+        Fan x;
+        x.params().pattern = pattern;
+        x.params().freewheeling_limit = limit;
+        x.params().t_blank = 20000;
+        x.params().L_d = x.params().L_q = 4 * x.params().L_d;
+        x.params().t_duty = 100;
+        start(x, 0.6, 1.6);
+        x.duty(0);
+        x.run_s(0.1);
+        EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+        return x.omega_rel;
+    };
+    const double high = braked(1, 1);
+    EXPECT_GT(high, braked(1, 0) + 0.02);
+    EXPECT_NEAR(braked(2, 1), high, 0.005);
+    EXPECT_GT(braked(4, 1), braked(4, 0) + 0.02);
+}
+
 TEST(BlockDuty, AStopSlowsDownWithTheAcceleration)
 {
     Fan x;

@@ -18,6 +18,16 @@ using fan::kRated_Nm;
 using fan::kRated_rad_s;
 
 constexpr double kAngle_deg = 1;
+constexpr double kVirtual_deg = 1.5; // tests/scenario/six_step_virtual.yaml
+
+// A channel at the star point, behind 1 kHz.
+void star_point(plant_config_t &c)
+{
+    c.sensor.v_zero_full_scale_V = 5;
+    c.sensor.v_zero_filter_s = 159e-6;
+    c.sensor.v_zero_noise_lsb = 0.5;
+    c.sensor.v_zero_offset_V = 0.02;
+}
 
 TEST(Block, StartsFromRestByTheCrossingsBothWays)
 {
@@ -48,6 +58,210 @@ TEST(Block, TorqueModeTurnsTheFanAtTheSpeedOfItsTorque)
         const double omega = std::sqrt((0.2 * kRated_Nm - 2e-3) / 1.8e-6);
         EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
         EXPECT_NEAR(x.omega_rel, direction * omega / kRated_rad_s, 0.03 * 0.492);
+    }
+}
+
+TEST(Block, CommutatesByTheThirdHarmonicOfTheStarPoint)
+{
+    for (const double direction : {1.0, -1.0}) {
+        Fan x(1.0, star_point);
+        x.params().zero_reference = CROSSINGS_third_harmonic;
+        x.enable();
+        x.speed_rel(0.4 * direction);
+        x.run_s(1.3);
+        ASSERT_EQ(x.fault(), DRIVE_FAULT_NONE);
+        ASSERT_EQ(x.drive().stage, STAGE_SIX_STEP);
+        x.run_s(0.1);
+        EXPECT_NEAR(x.omega_rel, 0.4 * direction, 0.02 * 0.4);
+        EXPECT_LT(x.worst_deg, kAngle_deg);
+    }
+}
+
+TEST(Block, CommutatesByTheThirdHarmonicOfTheTerminals)
+{
+    for (const double direction : {1.0, -1.0}) {
+        Fan x;
+        x.params().zero_reference = CROSSINGS_virtual_third;
+        x.enable();
+        x.speed_rel(0.4 * direction);
+        x.run_s(1.3);
+        ASSERT_EQ(x.fault(), DRIVE_FAULT_NONE);
+        ASSERT_EQ(x.drive().stage, STAGE_SIX_STEP);
+        x.run_s(0.1);
+        EXPECT_NEAR(x.omega_rel, 0.4 * direction, 0.02 * 0.4);
+        EXPECT_LT(x.worst_deg, kVirtual_deg);
+    }
+}
+
+// Told a trapezoid, a sine starts and shows none of its third harmonic. Twins: a trapezoid that is held shows nothing at all, and
+// by the terminals the sine's start finds its crossings.
+TEST(Block, AThirdHarmonicThatIsNotThereIsAFaultOfItsOwn)
+{
+    constexpr auto kSine = [](plant_config_t &c) {
+        star_point(c);
+        for (plant_harmonic_t &harmonic : c.winding.emf) {
+            harmonic = {};
+        }
+    };
+    for (const double direction : {1.0, -1.0}) {
+        Fan x(1.0, kSine);
+        x.params().zero_reference = CROSSINGS_third_harmonic;
+        x.enable();
+        x.speed_rel(0.5 * direction);
+        x.until_fault_s(5);
+        EXPECT_EQ(x.fault(), DRIVE_FAULT_NO_THIRD_HARMONIC);
+        EXPECT_FALSE(x.driven());
+    }
+    Fan held(1.0, star_point);
+    held.params().zero_reference = CROSSINGS_third_harmonic;
+    held.params().resync_tries = 1;
+    plant_set_locked(held.plant(), true);
+    held.enable();
+    held.speed_rel(0.5);
+    held.until_fault_s(5);
+    EXPECT_EQ(held.fault(), DRIVE_FAULT_STALL);
+    Fan terminals(1.0, kSine);
+    terminals.enable();
+    terminals.speed_rel(0.5);
+    terminals.run_s(1.3);
+    EXPECT_EQ(terminals.fault(), DRIVE_FAULT_NONE);
+    EXPECT_NEAR(terminals.omega_rel, 0.5, 0.01);
+}
+
+// Every condition by itself, of a drive that fulfils all of them.
+TEST(Block, TheVectorGivesTheRotorOnlyWhereTheObserverIsSureOfIt)
+{
+    Fan x;
+    x.params().six_step_start = 0;
+    x.params().six_step_speed = 157080; // half of rated speed
+    x.enable();
+    x.speed_rel(0.45);
+    x.run_s(1.5);
+    ASSERT_EQ(x.drive().stage, STAGE_VECTOR);
+    ASSERT_FALSE(block_may_begin(&x.drive())) << "too slow";
+    x.drive().config.block.omega_on = x.drive().config.block.omega_on / 4 * 3;
+    ASSERT_TRUE(block_may_begin(&x.drive()));
+    const struct {
+        const char *what;
+        void (*change)(drive_t &);
+    } without[] = {
+        {"commutation", [](drive_t &d) { d.config.block.on = false; }},
+        {"state", [](drive_t &d) { d.state = DRIVE_STOPPING; }},
+        {"mode", [](drive_t &d) { d.command.mode = DRIVE_MODE_CURRENT; }},
+        {"weight", [](drive_t &d) { d.position.weight = PM_ONE - 1; }},
+        {"quality", [](drive_t &d) { d.position.quality = PM_Q(0.5); }},
+        {"speed", [](drive_t &d) { d.pll.omega = -d.config.block.omega_on + 1; }},
+    };
+    for (const auto &at : without) {
+        drive_t d = x.drive();
+        at.change(d);
+        EXPECT_FALSE(block_may_begin(&d)) << at.what;
+    }
+    x.drive().pll.omega = -x.drive().pll.omega;
+    EXPECT_TRUE(block_may_begin(&x.drive())) << "either direction";
+}
+
+// A rotor that the vector has turned was no stall, however soon it is lost.
+TEST(Block, LostBehindTheVectorIsThePosition)
+{
+    Fan x;
+    x.params().six_step_start = 0;
+    x.params().six_step_speed = 157080;
+    x.params().resync_tries = 0;
+    x.params().flying_start = 0;
+    x.enable();
+    x.speed_rel(0.6);
+    for (int ms = 0; ms < 3000 && x.drive().stage != STAGE_SIX_STEP; ++ms) {
+        x.run_s(1e-3);
+    }
+    ASSERT_EQ(x.drive().stage, STAGE_SIX_STEP);
+    x.run_s(5e-3);
+    ASSERT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    ASSERT_LT(x.drive().block_ms, 40);
+    x.drive().block.six_step.lost = true;
+    x.run_s(2e-3);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_POSITION_LOST);
+    EXPECT_FALSE(x.driven());
+}
+
+// The first crossings of a start say a speed that no rotor has so soon.
+TEST(Block, AnOverSpeedAtOnceFromRestIsAStall)
+{
+    Fan x;
+    x.params().resync_tries = 0;
+    x.enable();
+    x.speed_rel(0.4);
+    for (int ms = 0; ms < 2000 && x.drive().stage != STAGE_SIX_STEP; ++ms) {
+        x.run_s(1e-3);
+    }
+    ASSERT_EQ(x.drive().stage, STAGE_SIX_STEP);
+    x.run_s(2e-3);
+    ASSERT_NE(x.drive().block.six_step.commutation.young, 0);
+    ASSERT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    x.drive().block.six_step.commutation.sum =
+        static_cast<uint32_t>(x.drive().config.block.six_step.commutation.turn_base / 2);
+    x.run_s(2e-3);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_STALL);
+    EXPECT_FALSE(x.driven());
+}
+
+// A torque asks for no speed: the other way it goes on below three quarters of six_step_speed, where a speed begins anew.
+TEST(Block, ATorqueTheOtherWayBrakesAsFarAsCrossingsShow)
+{
+    constexpr double kEnd = 0.75 * 100 / kRated_rad_s;
+    for (const drive_mode_t mode : {DRIVE_MODE_TORQUE, DRIVE_MODE_SPEED}) {
+        Fan x;
+        x.params().six_step_speed = 100000;
+        x.enable(mode);
+        x.torque_rel(0.2);
+        x.speed_rel(0.4);
+        x.run_s(1.5);
+        ASSERT_EQ(x.drive().stage, STAGE_SIX_STEP);
+        ASSERT_GT(x.omega_rel, 1.3 * kEnd);
+        x.torque_rel(-0.2);
+        x.speed_rel(-0.4);
+        double last = 1;
+        for (int ms = 0; ms < 1000 && x.drive().stage == STAGE_SIX_STEP; ++ms) {
+            last = x.omega_rel;
+            x.run_s(1e-3);
+        }
+        if (mode == DRIVE_MODE_TORQUE) {
+            EXPECT_LT(last, 0.6 * kEnd);
+        } else {
+            EXPECT_NEAR(last, kEnd, 0.02);
+        }
+        x.run_s(2.0);
+        EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+        EXPECT_LT(x.omega_rel, -0.35);
+    }
+}
+
+// Looked at in each period, before a leg is written.
+TEST(Block, WhatIsBeyondItsLimitOpensTheBridgeInThePeriod)
+{
+    const struct {
+        void (*raise)(drive_t &, drive_in_t &);
+        drive_fault_t fault;
+    } cases[] = {
+        {[](drive_t &, drive_in_t &in) { in.hw_fault = true; }, DRIVE_FAULT_HARDWARE},
+        {[](drive_t &, drive_in_t &in) { in.i_leg[0] = 65535; }, DRIVE_FAULT_OVER_CURRENT},
+        {[](drive_t &, drive_in_t &in) { in.v_dc = 65535; }, DRIVE_FAULT_OVER_VOLTAGE},
+    };
+    for (const auto &at : cases) {
+        Fan x;
+        x.enable();
+        x.speed_rel(0.4);
+        x.run_s(1.3);
+        ASSERT_EQ(x.drive().stage, STAGE_SIX_STEP);
+        drive_in_t in = x.seen();
+        drive_out_t out = {};
+        drive_step(&x.drive(), &in, &out);
+        EXPECT_NE(out.legs, PM_LEGS_OFF);
+        at.raise(x.drive(), in);
+        drive_step(&x.drive(), &in, &out);
+        EXPECT_EQ(out.legs, PM_LEGS_OFF) << at.fault;
+        EXPECT_EQ(out.trip, 1U) << at.fault;
+        EXPECT_EQ(x.drive().fault, at.fault);
     }
 }
 

@@ -22,9 +22,12 @@ constexpr double kRated_rad_s = 314.16, kRated_Nm = 0.225;
 class Fan
 {
   public:
-    explicit Fan(double theta_rad = 1.0)
+    explicit Fan(double theta_rad = 1.0, void (*change)(plant_config_t &) = nullptr)
         : setup_(pmsim::load_machine_file("sim_plant/machines/bldc_fan.yaml"))
     {
+        if (change != nullptr) {
+            change(setup_.plant);
+        }
         pmsim::derive_board_parameters(setup_);
         const char *error = nullptr;
         plant_.reset(plant_create(&setup_.plant, theta_rad, &error));
@@ -54,6 +57,12 @@ class Fan
     bool driven() const
     {
         return loop_.app.out.legs != PM_LEGS_OFF;
+    }
+
+    // What the drive was given in the last period.
+    const drive_in_t &seen() const
+    {
+        return loop_.app.in;
     }
 
     void enable(drive_mode_t mode = DRIVE_MODE_SPEED)
