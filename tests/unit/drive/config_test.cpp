@@ -640,19 +640,28 @@ TEST(Config, ABlockPatternThatHidesTheCurrentIsRefused)
 
 TEST(Config, ACarrierThatTheLegsCannotMakeAboutHalfDutyIsRefused)
 {
-    const auto refused = [](int32_t v_injection_mV) {
+    const auto refused = [](int32_t v_injection_mV, int32_t t_settle_ns = 0) {
         drive_params_t p;
         drive_params_default(&p);
         p.start_method = 1;
         p.position_find = 2;
         p.polarity = 3;
         p.injection = 4;
+        p.f_pwm = t_settle_ns != 0 ? 40000 : 10000;
+        p.dead_time = t_settle_ns != 0 ? 1000 : 2000;
+        p.f_injection = p.f_pwm * 50; // N = 20
+        p.t_settle = t_settle_ns;
         p.v_injection = v_injection_mV;
         drive_config_t c = {};
         return drive_configure(&c, &p, PM_CHANNELS);
     };
     EXPECT_TRUE(refused(100000).ok);
     EXPECT_EQ(refused(200000).param, DRIVE_PARAM_v_injection);
+    // Low-side shunts that see nothing for 4 us behind an edge leave 0.68 of a period: 0.18 of the 300 V about half duty.
+    const drive_result_t shunts = refused(57000, 3000);
+    EXPECT_EQ(shunts.param, DRIVE_PARAM_v_injection) << shunts.reason;
+    EXPECT_NE(std::string(shunts.reason).find("half duty"), std::string::npos) << shunts.reason;
+    EXPECT_TRUE(refused(51000, 3000).ok) << refused(51000, 3000).reason;
 }
 
 // 4/3 of 6 V of dead time and 1 V of a device. Left to itself the drive then starts without injection.

@@ -122,13 +122,28 @@ TEST(TorquePolarity, ALoadThatTurnsTheRotorIsNotTakenForThePole)
     }
 }
 
+// Half of speed_trip within a pulse: not the rotor, but a loop that runs away.
+TEST(TorquePolarity, ALoopThatRunsAwayIsRefused)
+{
+    for (const double omega : {0.6, -0.6}) {
+        Start x(weak_magnets(), told(), 190 * kDegree);
+        x.run([](const drive_t &d) {
+            return d.sequence.procedure == PROCEDURE_torque_polarity && d.beside.torque_polarity.part != 0U;
+        });
+        ASSERT_EQ(x.drive().sequence.procedure, PROCEDURE_torque_polarity);
+        x.drive().position.pll.omega = bench::fixed(omega, 28);
+        EXPECT_EQ(procedure_torque_polarity_slow(&x.drive()), PM_FAILED_SALIENCY);
+    }
+}
+
 // A frame that the EMF turns round meanwhile has the pole.
 TEST(TorquePolarity, WhatTheEmfHasShownStands)
 {
     Start x(weak_magnets(), told(), 190 * kDegree);
     x.run([](const drive_t &d) {
-        return d.sequence.procedure == PROCEDURE_torque_polarity && d.beside.torque_polarity.pulses > 0U;
+        return d.sequence.procedure == PROCEDURE_torque_polarity && d.beside.torque_polarity.part != 0U;
     });
+    ASSERT_EQ(x.drive().sequence.procedure, PROCEDURE_torque_polarity);
     x.drive().position.slip.count = 1;
     const pm_angle_t theta = x.drive().position.pll.theta;
     x.run_past(PROCEDURE_torque_polarity);
