@@ -181,6 +181,20 @@ TEST(FlyingStart, ARotorAtRestIsNotTurning)
     }
 }
 
+// Of a single pulse no speed is known.
+TEST(FlyingStart, OnePulseIsNoSpeed)
+{
+    const flying_start_config_t c = {};
+    const pm_machine_t machine = {0, 0, q28(0.5), q28(0.5)};
+    for (const int count : {0, 1}) {
+        flying_start_t self = {};
+        self.length = 32;
+        self.count = static_cast<decltype(self.count)>(count);
+        self.pulse[0].i = {q28(0.5), 0};
+        EXPECT_EQ(flying_start_find(&self, &c, &machine, 1 << 28), PM_FAILED_NOT_TURNING);
+    }
+}
+
 // Slower and slower: found with the right sign, or not at all.
 TEST(FlyingStart, ASlowRotorIsFoundRightOrNotAtAll)
 {

@@ -196,6 +196,11 @@ TEST(Follow, TheRestTellsTheResistance)
     x.R = 1.2 * kR;
     x.rest(FOLLOW_REST_MS - 1); // too short
     EXPECT_EQ(x.self.R, x.told.R_s);
+    for (int ms = 0; ms < int(FOLLOW_REST_MS); ++ms) { // long enough, without a current
+        follow_rest(&x.self, fixed(0.1, 28));
+    }
+    follow_rested(&x.self, &x.told, 0, fixed(kV_dc, 28));
+    EXPECT_EQ(x.self.R, x.told.R_s);
 }
 
 TEST(Follow, TheLoadIsJudgedByTheLag)

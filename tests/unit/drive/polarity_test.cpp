@@ -416,6 +416,44 @@ TEST(Polarity, AStepNeedsItsCarrierAndItsAxis)
     }
 }
 
+// Of a carrier for which no blocks were made, and of another one, nothing is said.
+TEST(Polarity, TheSecondHarmonicIsNotJudgedWithoutItsBlocks)
+{
+    for (const int32_t polarity : {3, 4}) {
+        for (const bool other : {true, false}) {
+            Start x(with_neutral(), polarity == 4 ? second_of_rotating() : sine(polarity, 70000, 250000),
+                    0.4);
+            x.run_to(PROCEDURE_lock);
+            if (other) {
+                x.drive().config.position.injection.id = INJECTION_pulsating_square;
+            } else {
+                x.drive().config.polarity.block_ms = 0;
+            }
+            const pm_procedure_t result = polarity == 4 ? procedure_secondary_voltage_slow(&x.drive())
+                                                        : procedure_secondary_current_slow(&x.drive());
+            EXPECT_EQ(result, PM_FAILED_POLARITY) << polarity;
+        }
+    }
+}
+
+// Of a linear machine twice as many values are taken each time; with the shortest of blocks up to 256, in as many milliseconds.
+TEST(Polarity, NoMoreThan256ValuesAreTaken)
+{
+    plant_config_t linear = with_neutral();
+    linear.machine.c_A_Wb5 = 0;
+    Start x(linear, sine(3, 70000, 250000), 0.4);
+    x.run_to(PROCEDURE_secondary_current);
+    x.drive().config.polarity.block_ms = 1;
+    uint32_t values = 0;
+    const int periods = x.run([&values](const drive_t &d) {
+        values = std::max(values, uint32_t(d.beside.secondary_current.x.count));
+        return d.sequence.procedure != PROCEDURE_secondary_current;
+    });
+    EXPECT_EQ(values, 256U);
+    EXPECT_NEAR(periods, 2560, 100);
+    EXPECT_EQ(drive_status(&x.drive())->refusal.reason, PM_FAILED_POLARITY);
+}
+
 // What is left of a pulse's current, of any winding; of a pulse beyond the time constant, what a time constant leaves.
 TEST(Polarity, DecayOfDualPulsesIsThatOfTheWinding)
 {

@@ -468,6 +468,55 @@ TEST(Protection, CurrentModeHasNoPositionToLose)
     EXPECT_EQ(x.d.fault, DRIVE_FAULT_NONE);
 }
 
+// In control, or turned by a vector at the speed of its ramp; else the rotor has not followed, and shows no third harmonic for that.
+TEST(Protection, AMissingThirdHarmonicIsNamedWhereTheRotorTurns)
+{
+    const struct {
+        drive_stage_t stage;
+        pm_q_t omega, ramp, square;
+        drive_fault_t fault;
+    } cases[] = {
+        {STAGE_VECTOR, PM_Q(0.3), 0, 0, DRIVE_FAULT_NO_THIRD_HARMONIC},
+        {STAGE_VECTOR, PM_Q(0.3), 0, PM_ONE, DRIVE_FAULT_POSITION_LOST},
+        {STAGE_OPEN_LOOP, PM_Q(0.23), PM_Q(0.3), 0, DRIVE_FAULT_NO_THIRD_HARMONIC},
+        {STAGE_OPEN_LOOP, PM_Q(0.22), PM_Q(0.3), 0, DRIVE_FAULT_POSITION_LOST},
+        {STAGE_OPEN_LOOP, PM_Q(-0.3), PM_Q(-0.3), PM_ONE, DRIVE_FAULT_POSITION_LOST},
+    };
+    for (const auto &at : cases) {
+        Drive x;
+        x.d.stage = at.stage;
+        x.d.config.position.traits_high = SOURCE_THIRD_TURN;
+        x.d.position.pll.omega = at.omega;
+        x.d.position.omega_mean = at.omega;
+        x.d.position.square = at.square;
+        x.d.omega_ramp = at.ramp;
+        EXPECT_EQ(protection_fault_of_lost(&x.d), at.fault) << at.omega << ' ' << at.square;
+    }
+}
+
+// A vector in control waits for it for its time; an imposed one does not.
+TEST(Protection, AThirdHarmonicThatStaysAwayIsAFault)
+{
+    const struct {
+        drive_stage_t stage;
+        unsigned ms;
+        drive_fault_t fault;
+    } cases[] = {{STAGE_VECTOR, POSITION_ABSENT_MS, DRIVE_FAULT_NONE},
+                 {STAGE_VECTOR, POSITION_ABSENT_MS + 1U, DRIVE_FAULT_NO_THIRD_HARMONIC},
+                 {STAGE_OPEN_LOOP, POSITION_ABSENT_MS + 1U, DRIVE_FAULT_NONE}};
+    for (const auto &at : cases) {
+        Drive x;
+        x.step();
+        x.d.stage = at.stage;
+        x.d.state = DRIVE_RUNNING;
+        x.d.i_abc = {0, 0, 0};
+        x.d.position.quality = PM_ONE;
+        x.d.position.absent_ms = static_cast<uint16_t>(at.ms);
+        protection_slow(&x.d);
+        EXPECT_EQ(x.d.fault, at.fault) << at.ms;
+    }
+}
+
 // One by one, where the control period has seen that something is beyond its limit.
 TEST(Protection, StepNamesTheCause)
 {

@@ -184,6 +184,20 @@ TEST(SaliencyMap, ACurrentThatDoesNotComeIsNoCurrent)
     EXPECT_EQ(x.report().reason, COMMISSIONING_NO_CURRENT);
 }
 
+// Told no flux of its carrier, it finds no inductance where there is an answer.
+TEST(SaliencyMap, AnInductanceThatIsNotPositiveIsImplausible)
+{
+    for (const pm_q_t sign : {0, -1}) {
+        Bench x(locked());
+        x.loop.app.drive.config.saliency_map.flux *= sign;
+        x.command(true);
+        x.run_s(16);
+        EXPECT_EQ(x.report().state, COMMISSIONING_FAILED);
+        EXPECT_EQ(x.report().reason, COMMISSIONING_IMPLAUSIBLE);
+        EXPECT_EQ(x.map().i, 0);
+    }
+}
+
 TEST(SaliencyMap, ARotorThatHasTurnedIsSaid)
 {
     for (const double turn_deg : {3.0, -3.0}) {

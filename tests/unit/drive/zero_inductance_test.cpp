@@ -133,6 +133,11 @@ class Bench
         return bench::wrapped(t.theta_e_rad) / kDegree;
     }
 
+    plant_t *plant()
+    {
+        return plant_.get();
+    }
+
     sim_loop_t loop = {};
 
   private:
@@ -280,6 +285,22 @@ TEST(ZeroInductanceFails, WithoutAnAnswer)
     x.run_s(kLongest_s);
     EXPECT_EQ(x.report().state, COMMISSIONING_FAILED);
     EXPECT_EQ(x.report().reason, COMMISSIONING_ROUND);
+    EXPECT_EQ(x.result().dL_0, 0);
+}
+
+// The motor has come off while its carrier is on.
+TEST(ZeroInductanceFails, WithoutACurrent)
+{
+    const Motor m = kMotors[0];
+    Bench x(plant_of(m), parameters(m), m.theta_deg);
+    x.run_s(0.5);
+    ASSERT_EQ(x.report().state, COMMISSIONING_RUNNING);
+    for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
+        plant_set_leg_fault(x.plant(), leg, PLANT_WIRE_OPEN);
+    }
+    x.run_s(kLongest_s);
+    EXPECT_EQ(x.report().state, COMMISSIONING_FAILED);
+    EXPECT_EQ(x.report().reason, COMMISSIONING_NO_CURRENT);
     EXPECT_EQ(x.result().dL_0, 0);
 }
 

@@ -110,6 +110,13 @@ TEST(InjectionConfig, SaliencyOfFivePerCentIsEnough)
 }
 
 // And not where noise hides the answer.
+// One that is not of the list has no traits: no parameter outside its range makes it ambiguous.
+TEST(InjectionConfig, ASourceThatIsNoneHasNoTraits)
+{
+    EXPECT_NE(injection_traits(INJECTION_rotating_sine), 0U);
+    EXPECT_EQ(injection_traits(INJECTION_COUNT), 0U);
+}
+
 TEST(InjectionConfig, AnswerMustExceedTheNoise)
 {
     for (int32_t id = 0; id < INJECTION_COUNT; ++id) {

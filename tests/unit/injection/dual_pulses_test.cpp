@@ -137,17 +137,19 @@ TEST(DualPulses, WaitForACurrentToEndAndSayWhenItDoesNot)
 {
     const Rig r = ipm(0);
     dual_pulses_config_t c = make(r);
-    dual_pulses_t self = {};
     const pm_dir_t d = pm_dir(0);
-    pulses_out_t out;
-    int k = 0;
-    pm_procedure_t result = PM_RUNNING;
-    for (; result == PM_RUNNING && k < 1000; ++k) {
-        result = dual_pulses_step(&self, &c, {PM_Q(0.1), 0}, d, &out);
-        EXPECT_FALSE(out.driven);
+    for (const pm_ab_t i : {pm_ab_t{PM_Q(0.1), 0}, pm_ab_t{0, -PM_Q(0.1)}}) { // along either axis
+        dual_pulses_t self = {};
+        pulses_out_t out;
+        int k = 0;
+        pm_procedure_t result = PM_RUNNING;
+        for (; result == PM_RUNNING && k < 1000; ++k) {
+            result = dual_pulses_step(&self, &c, i, d, &out);
+            EXPECT_FALSE(out.driven);
+        }
+        EXPECT_EQ(result, PM_FAILED_TIMEOUT);
+        EXPECT_EQ(k, c.timeout + 1);
     }
-    EXPECT_EQ(result, PM_FAILED_TIMEOUT);
-    EXPECT_EQ(k, c.timeout + 1);
 }
 
 TEST(DualPulses, SayThatNothingIsConnected)

@@ -96,6 +96,26 @@ TEST(InjectionStages, VirtualFrameIsAheadByHalfOfThetaM)
     EXPECT_GT(real(saliency_shift(&c.saliency, bench::fixed(0.4, 28))), 7 * kDegree);
 }
 
+// With another stage alone the source keeps the frame of the position.
+TEST(InjectionStages, WithoutTheVirtualFrameTheSourceHasThatOfThePosition)
+{
+    injection_stages_config_t c =
+        configured({{&drive_params_t::cross_coupling_comp, 2}}).position.injection.stages;
+    injection_stages_t self = {};
+    injection_stages_reset(&self, &c);
+    obs_in_t slow = {};
+    slow.i_dq = {0, bench::fixed(0.4, 28)};
+    injection_stages_slow(&self, &c, &slow, 0);
+    c.direct = false;
+    const injection_in_t in = at(0.9);
+    injection_in_t to = {};
+    injection_stages_before(&self, &c, &in, &to);
+    EXPECT_EQ(to.dir.cos, in.dir.cos);
+    EXPECT_EQ(to.dir.sin, in.dir.sin);
+    EXPECT_EQ(to.ahead.cos, in.ahead.cos);
+    EXPECT_EQ(to.ahead.sin, in.ahead.sin);
+}
+
 TEST(InjectionStages, SaliencyOfAnOrderIsTakenOut)
 {
     for (const int order : {-4, 8, -10, 14}) {

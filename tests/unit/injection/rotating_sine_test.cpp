@@ -86,6 +86,21 @@ TEST(RotatingSine, PositiveSequenceShowsTheResistance)
                 kFirstOrder_deg);
 }
 
+// A saliency too small to be told from the load's share leaves the share of no load at any: 3/4 of what the positive sequence shows.
+TEST(RotatingSine, TheLoadCountsWhereTheSaliencyIsLarge)
+{
+    const Machine &m = bench::kIpmLinear;
+    const double kappa = (m.L_q0_H - m.L_d0_H) / (m.L_q0_H + m.L_d0_H);
+    const double R = 12, told = 6, omega_h = 2 * bench::kPi * 500;
+    const double more_deg = (R - told) / (2 * omega_h) * (1 / m.L_d0_H + 1 / m.L_q0_H) / kDegree;
+    injection_config_t c = config(told, true);
+    ASSERT_TRUE(c.rotating_sine.with_load);
+    const double without = -(1 - 0.75 * (1 + kappa * kappa)) * more_deg;
+    EXPECT_GT(std::abs(settled(c, 0, R, {0, 3}).eps / kDegree - without), 2 * kFirstOrder_deg);
+    c.rotating_sine.with_load = false;
+    EXPECT_NEAR(settled(c, 0, R, {0, 3}).eps / kDegree, without, kFirstOrder_deg);
+}
+
 TEST(RotatingSine, FundamentalCurrentIsTheMean)
 {
     const injection_config_t c = config(6);

@@ -184,6 +184,9 @@ TEST(ThreePhaseHf, FailsWithoutSaliencyWithoutACurrentAndWithUnevenPhases)
     Rig uneven = r;
     uneven.plant.sensor.gain_error[1] = 0.4;
     EXPECT_EQ(look(uneven, c, 1).result, PM_FAILED_UNEVEN);
+    three_phase_hf_config_t noisy = c; // where the noise may be the saliency
+    noisy.noise = PM_Q(0.005);
+    EXPECT_EQ(look(r, noisy, 1).result, PM_FAILED_SALIENCY);
 }
 
 // Currents by formula, for what no machine does: a negative sequence as large as the positive one, which leaves no two

@@ -238,6 +238,45 @@ TEST(ZeroSequence, ChangesOverToTheMeasuredForm)
     EXPECT_NEAR(begins.after(kSettled).eps / kDegree, 0, kResistance_deg);
 }
 
+// Told an error beyond any angle's, the measured form has lost its answer. Until the told one has settled, there is none to agree with.
+TEST(ZeroSequence, ChangesBackToTheToldFormWhereTheMeasuredOneIsLost)
+{
+    const Choice choice = {INJECTION_zero_anti_rotating, 500, ZERO_BEGINS_TOLD};
+    const zero_config_t c = config(choice).zero_anti_rotating;
+    obs_in_t in = {};
+    in.dir = bench::direction(0);
+    for (const double eps : {0.45, -0.45, 0.55, -0.55}) {
+        zero_anti_rotating_t self;
+        zero_anti_rotating_reset(&self, &c, &in);
+        EXPECT_EQ(self.measured, 0U);
+        self.measured = 1;
+        self.warm = 0;
+        self.eps = self.eps_mean = bench::fixed(eps, 28);
+        zero_anti_rotating_slow(&self, &c, &in);
+        EXPECT_EQ(self.measured, std::abs(eps) < 0.5 ? 1U : 0U) << eps;
+        EXPECT_EQ(self.warm > 0, std::abs(eps) > 0.5) << eps;
+    }
+}
+
+// Of a rotor that turns: what is left of the carrier along d swings with six times the angle, and has no mean.
+TEST(ZeroSequence, TheCarrierAlongDIsToldInTheMean)
+{
+    double mean[3];
+    for (int k = 0; k < 3; ++k) {
+        rig::Run run(config({INJECTION_zero_pulsating, 500, ZERO_TOLD}));
+        run.omega = 2 * bench::kPi * 10;
+        run.error = (k - 1) * 10 * kDegree;
+        run.after(5000);
+        double sum = 0;
+        for (int n = 0; n < 10000; ++n) { // ten turns
+            sum += run.step().eps;
+        }
+        mean[k] = sum / 10000;
+    }
+    EXPECT_NEAR(mean[1] / kDegree, 0, kTold_deg);
+    EXPECT_NEAR((mean[2] - mean[0]) / (20 * kDegree), 1, 0.2);
+}
+
 TEST(ZeroSequence, FundamentalCurrentIsTheMeanOverHalfACarrier)
 {
     for (const Choice &choice : kAll) {

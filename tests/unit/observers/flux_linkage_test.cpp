@@ -215,6 +215,22 @@ TEST(FluxLinkage, IsTheReferenceToTheRoundingOfItsFormats)
     EXPECT_GT(largest, 0);
 }
 
+// Tied once it is a pure integrator, which a second time leaves as it is, to the last bit.
+TEST(FluxLinkage, TiedTwiceIsTied)
+{
+    const observer_config_t c = config();
+    Closed closed(kBase, c, Rotation(kMachine, kBase, 0.3, {0, 2}));
+    closed.settled_deg(0.2);
+    ASSERT_NE(closed.state.flux_linkage.turn, 0);
+    observer_tie(&closed.state, &c);
+    const flux_linkage_t once = closed.state.flux_linkage;
+    EXPECT_EQ(once.turn, 0);
+    EXPECT_EQ(once.leak, 0);
+    observer_tie(&closed.state, &c);
+    EXPECT_EQ(closed.state.flux_linkage.flux.psi.alpha, once.flux.psi.alpha);
+    EXPECT_EQ(closed.state.flux_linkage.flux.psi.beta, once.flux.psi.beta);
+}
+
 // Tied and free, and back: the flux that it stands for stays.
 TEST(FluxLinkage, AChangeOfTheLowPassMovesNothing)
 {

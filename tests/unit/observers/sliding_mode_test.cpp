@@ -231,6 +231,28 @@ TEST(SlidingMode, EveryRemedyHalvesTheRipple)
               kRippleShare * Closed(conventional, slow).settled().ripple);
 }
 
+// On the surface there is no sign to take: nothing is added to what is zero already.
+TEST(SlidingMode, TheSignOfNothingIsNothing)
+{
+    const sliding_mode_config_t c =
+        bench::sliding_mode_config(bench::kIpmLinear, bench::kIpmBase, SLIDING_MODE_SIGN, true);
+    sliding_mode_t self = {};
+    obs_in_t in = {};
+    obs_out_t out;
+    in.dir = bench::direction(0);
+    sliding_mode_reset(&self, &c, &in);
+    for (int k = 0; k < 10; ++k) {
+        sliding_mode_step(&self, &c, &in, &out);
+        EXPECT_EQ(self.z.alpha, 0);
+        EXPECT_EQ(self.z.beta, 0);
+        EXPECT_EQ(out.eps, 0);
+    }
+    in.v = {PM_Q(0.01), -PM_Q(0.01)};
+    sliding_mode_step(&self, &c, &in, &out);
+    EXPECT_EQ(self.z.alpha, self.K);
+    EXPECT_EQ(self.z.beta, -self.K);
+}
+
 // A gain of nothing is a thousandth of the base voltage, and one beyond the base is the base.
 TEST(SlidingMode, GainHasLimits)
 {

@@ -241,6 +241,40 @@ TEST(Third, IsRefusedWithoutAThirdHarmonicAndBelowFourStepsOfIt)
         EXPECT_EQ(drive_configure(&c, &p, PM_CHANNELS).param, DRIVE_PARAM_speed_high) << id;
         p.speed_high = static_cast<int32_t>(1000 * least * 1.02);
         EXPECT_TRUE(drive_configure(&c, &p, PM_CHANNELS).ok) << id;
+        p.psi_3 = 1000; // four steps are more than it has at speed_trip
+        p.dL_0 = 0;
+        EXPECT_EQ(drive_configure(&c, &p, PM_CHANNELS).param, DRIVE_PARAM_speed_high) << id;
+    }
+}
+
+// Where another source leads the size is not learnt, and what crossings have told is given up for the position.
+TEST(Third, WhatItDoesNotLeadItDoesNotLearn)
+{
+    for (const pm_q_t weight : {0, PM_ONE / 2, PM_ONE}) {
+        Star at{157, {0, 2}, 2 * kDegree};
+        Source integration(params(OBSERVER_third_integration), at);
+        Source crossings(params(OBSERVER_third_crossings), at);
+        for (int k = 0; k < 2000; ++k) {
+            at.theta_rad += at.omega_rad_s * kB.period_s;
+            for (Source *source : {&integration, &crossings}) {
+                obs_in_t in = at.seen(&source->more);
+                source->more.v_zero += source->more.v_zero / 5; // a larger third harmonic than told
+                obs_out_t out;
+                observer_step(&source->state, &source->c, &in, &out);
+                if (k % 10 == 9) {
+                    observer_slow(&source->state, &source->c, &in, &out, weight);
+                }
+            }
+            if (k > 1000 && k % 10 == 9) {
+                EXPECT_EQ(crossings.state.third_crossings.ahead == 0, weight == 0) << k;
+            }
+        }
+        const double share = integration.state.third_integration.share / double(THIRD_Z_ONE);
+        if (weight == PM_ONE) {
+            EXPECT_GT(share, 1.05);
+        } else {
+            EXPECT_EQ(share, 1) << weight;
+        }
     }
 }
 

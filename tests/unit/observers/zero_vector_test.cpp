@@ -97,6 +97,9 @@ class Bench
         const pm_q_t link = fixed(v_dc / kB.v_V, 28);
         more.v_dc = &link;
         if (asked_[1] != 0) {
+            const uint32_t later = c.zero_vector.later;
+            taken[0] = taken[1];
+            taken[1] = asked_[1] < counts_ ? asked_[1] - later : 2 * counts_ - (asked_[1] - later);
             bench::give_sample(&codes, 0, bench::ab((sample(asked_[1]) + noise()) / kB.i_A));
         }
         obs_in_t in = seen();
@@ -104,7 +107,7 @@ class Bench
         observer_step(&state, &c, &in, &out);
         asked_[1] = asked_[0];
         asked_[0] = zero_vector_sample_at(&state.zero_vector);
-        if (++periods_ % 10 == 0) {
+        if (++periods_ % divider == 0) {
             observer_slow(&state, &c, &in, &out, weight);
         }
         return real(out.eps) / kDegree;
@@ -133,6 +136,8 @@ class Bench
     double noise_A = 0;   // of each current along either axis
     double carrier_V = 0; // along alpha, the sign of each period another
     bool swapped = false;
+    int divider = 10;           // periods in a call of 1 kHz
+    uint32_t taken[2] = {0, 0}; // distances from the centre of the last two samples, counts
 
   private:
     obs_in_t seen()
@@ -310,6 +315,47 @@ TEST(ZeroVector, APairOfATooShortZeroVectorIsLeftOut)
     EXPECT_LT(std::fabs(real(b.out.misfit)), 0.5);
     EXPECT_GT(b.settled_deg(400), 3);
     EXPECT_LT(b.state.zero_vector.x, x);
+}
+
+// The samples move in either half of a pair; until those of the new distance arrive nothing is taken for a pair.
+TEST(ZeroVector, NoPairHasTwoDistances)
+{
+    for (const int divider : {9, 10, 11}) {
+        Bench b(bench::kSpmLinear, params(), kHalf, {0, 2}, 0.1);
+        b.divider = divider;
+        b.settled_deg(200);
+        int moved = 0, pairs = 0;
+        for (int k = 0; k < 2000; ++k) {
+            b.v_dc = kVdc_V - 8 * std::sin(k * 0.01);
+            const uint32_t x = b.state.zero_vector.x;
+            const pm_q_t before = b.state.zero_vector.eps;
+            b.step();
+            if (b.state.zero_vector.eps != before && b.state.zero_vector.eps != 0) {
+                ++pairs;
+                ASSERT_EQ(b.taken[0], x) << divider << ' ' << k;
+                ASSERT_EQ(b.taken[1], x) << divider << ' ' << k;
+            }
+            moved += b.state.zero_vector.x != x ? 1 : 0;
+        }
+        EXPECT_GT(moved, 10) << divider;
+        EXPECT_GT(pairs, 200) << divider;
+    }
+}
+
+// Tied, it takes the flux for that of the machine that it was told of; free, for the one that it sees.
+TEST(ZeroVector, TheFluxIsLearntByTheOneThatLeads)
+{
+    Machine weak = bench::kSpmLinear;
+    weak.psi_m_Wb *= 0.9;
+    for (const pm_q_t weight : {0, PM_ONE}) {
+        Bench b(weak, params(), kHalf, {0, 2});
+        const pm_q_t told = b.state.zero_vector.emf.psi_ref;
+        for (int k = 0; k < 20000; ++k) {
+            b.step(weight);
+        }
+        const double share = b.state.zero_vector.emf.psi_ref / double(told);
+        EXPECT_NEAR(share, weight == 0 ? 1 : 0.9, 0.02);
+    }
 }
 
 TEST(ZeroVector, WithoutSamplesThereIsNoErrorSignal)
