@@ -171,7 +171,7 @@ pm_procedure_t three_phase_hf_find(three_phase_hf_t *self, const three_phase_hf_
     const pm_abc_t squares = {square_of(q[0]), square_of(q[1]), square_of(q[2])};
     const pm_ab_t y = pm_clarke(squares); /* 2 kappa e^{-j 2 theta} */
     const pm_q_t length = pm_hypot(y.alpha, y.beta);
-    self->found.margin = pulses_margin(length, pm_max(3 * pm_div(config->noise, i_p), 1));
+    self->found.margin = pulses_margin(length, pm_max(3 * pm_min(pm_div(config->noise, i_p), PM_ONE), 1));
     if (length < config->kappa / 2 || self->found.margin < PULSES_SURE) {
         return PM_FAILED_SALIENCY;
     }

@@ -6,10 +6,12 @@
 #include "firmware/math/root.h"
 
 #define HOLD_MS 500U
+#define REST_MS 1000U
 
 enum {
     SWEEP,
     LEVELS,
+    REST,
     SMALL_D,
     HOLD_1,
     SMALL_Q,
@@ -61,6 +63,8 @@ static bool is_wanted(uint8_t routines, uint32_t phase)
     switch (phase) {
     case LEVELS:
         return (routines & (uint8_t)COMMISSIONING_RESISTANCE) != 0U;
+    case REST: /* the levels give it otherwise */
+        return inductance && (routines & (uint8_t)COMMISSIONING_RESISTANCE) == 0U;
     case SMALL_D:
     case HOLD_1:
     case SMALL_Q:
@@ -142,6 +146,8 @@ static phase_result_t phase_slow(drive_t *drive)
         return inductance_slow(drive, true, false);
     case RATED_Q:
         return inductance_slow(drive, true, true);
+    case REST: /* the sweep's voltage, by whose current the resistance damps a rotor that swings */
+        return (phase_result_t){.done = drive->procedure.identify.ms > REST_MS};
     case HOLD_1:
     case HOLD_3:
         return hold(drive, true);

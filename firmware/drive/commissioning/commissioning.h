@@ -6,6 +6,7 @@
  *   sweep       voltage rises until the current flows; the vector turns the rotor onto phase A
  *   resistance  four currents, controlled slowly through the voltage:
  *               slope R, intercept 4/3 of the voltage lost in a leg; curvature: the capacitance of a leg
+ *   rest        where no resistance is measured, a second of the sweep's voltage: the rotor stops swinging
  *   L_d, L_q    square wave of +-V along each axis, without mean: change of flux over change of current
  *   rotation    the current vector turns and pulls the rotor along: up, two currents at speed, down
  *   L_q rated   square wave on q at rated current with the i_d of most torque per ampere:
