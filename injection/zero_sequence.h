@@ -124,8 +124,8 @@ static inline pm_ab_t zero_link(const zero_config_t *config, const injection_in_
     const pm_half_dir_t twice = pm_dir_sum(in->dir, in->dir);
     const int32_t alpha = pm_mulh_sub(pm_mulh(in->i.alpha, twice.cos), in->i.beta, twice.sin); /* Q26 */
     const int32_t beta = pm_mulh_add(pm_mulh(in->i.alpha, twice.sin), in->i.beta, twice.cos);
-    const int32_t square = pm_shl(pm_sat(pm_mulh(i.q, config->c_q), 26), 5);
-    const int32_t re = pm_mulh_add(pm_mulh_add(config->c_re, i.d, config->c_d), i.q, square);
+    const int32_t rise = pm_shl(pm_sat(pm_mulh(i.q, config->c_q), 26), 5);
+    const int32_t re = pm_mulh_add(pm_mulh_add(config->c_re, i.d, config->c_d), i.q, rise);
     const int32_t im = pm_mulh_add(config->c_im, i.q, config->c_cross);
     const pm_ab_t u = {pm_mulh_sub(pm_mulh(alpha, re), beta, im), pm_mulh_add(pm_mulh(alpha, im), beta, re)};
     return u;
