@@ -120,6 +120,12 @@ static void enter(drive_t *drive, uint8_t phase)
     }
 }
 
+/* On the sweep's voltage, by whose current the resistance damps a rotor that swings. */
+static phase_result_t rest(const drive_t *drive)
+{
+    return (phase_result_t){.done = drive->procedure.identify.ms > REST_MS};
+}
+
 /* The vector returns the rotor to phase A; then the rotor has time to come to rest. */
 static phase_result_t hold(drive_t *drive, bool full)
 {
@@ -146,8 +152,8 @@ static phase_result_t phase_slow(drive_t *drive)
         return inductance_slow(drive, true, false);
     case RATED_Q:
         return inductance_slow(drive, true, true);
-    case REST: /* the sweep's voltage, by whose current the resistance damps a rotor that swings */
-        return (phase_result_t){.done = drive->procedure.identify.ms > REST_MS};
+    case REST:
+        return rest(drive);
     case HOLD_1:
     case HOLD_3:
         return hold(drive, true);
