@@ -121,7 +121,7 @@ static void enter(drive_t *drive, uint8_t phase)
 }
 
 /* On the sweep's voltage, by whose current the resistance damps a rotor that swings. */
-static phase_result_t rest(const drive_t *drive)
+static phase_result_t come_to_rest(const drive_t *drive)
 {
     return (phase_result_t){.done = drive->procedure.identify.ms > REST_MS};
 }
@@ -153,7 +153,7 @@ static phase_result_t phase_slow(drive_t *drive)
     case RATED_Q:
         return inductance_slow(drive, true, true);
     case REST:
-        return rest(drive);
+        return come_to_rest(drive);
     case HOLD_1:
     case HOLD_3:
         return hold(drive, true);
