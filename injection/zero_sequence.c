@@ -19,8 +19,8 @@
 static void set_told(zero_t *self, const zero_config_t *config, const obs_in_t *in)
 {
     const pm_q_t i_q = in->i_dq.q;
-    const int32_t c_re =
-        pm_mulh_add(config->c_re, i_q / 2, pm_shl(pm_sat(pm_mulh(i_q / 2, config->c_q), 26), 5));
+    const pm_dq_t half = {0, i_q / 2};
+    const int32_t c_re = zero_link_re(config, half);
     const pm_q_t rise = pm_mul(pm_div(saliency_i_p(&config->saliency, i_q), config->saliency.i_p_0),
                                pm_div(c_re, config->c_re));
     const pm_q_t a = pm_clamp(rise, PM_Q(0.5), PM_Q(2.0)) / 8;

@@ -19,8 +19,8 @@
  *   measured  u_k = c(i_k) i_k e^{j 2 theta^_k},  g = (u_k - u_k-1) / T_s:  d = x + 1/2 Re g,  s = Im g
  *   told      the expression above at theta^ with A(i_q), kappa(i_q), theta_m(i_q) of the saliency map
  * The measured form knows c and nothing else: resistance, dead time, delay and load are in the
- * current as in the voltage. c of each sample and not of the load, as its slope shows in the carrier's answer: half of
- * what c moves by is a part that turns with 6 theta. Its basin is +-60 to +-75 degrees for kappa = 0.27, that of the told one +-90.
+ * current as in the voltage. c is that of each sample, not of the load: the carrier sees the slope of c i,
+ * which has a part that turns with 6 theta. Its basin is +-60 to +-75 degrees for kappa = 0.27, that of the told one +-90.
  *
  * The carrier has N periods, N even, and a swing of the opposite sign half of it later. With h = N / 2,
  *   d~ = d_k - d_k-h,  s~ = s_k - s_k-h     free of what moves slower: EMF, load
@@ -118,14 +118,20 @@ static inline pm_q_t zero_voltage(zero_t *self, const zero_config_t *config, con
     return pm_shl(pm_sat(x, 18), PM_Q_BITS - 18);
 }
 
-/* u of the present sample; i: half of the current, estimated frame. */
+/* dL_0(i) / T_s, Q20; i: half of the current, estimated frame. */
+static inline int32_t zero_link_re(const zero_config_t *config, pm_dq_t i)
+{
+    const int32_t rise = pm_shl(pm_sat(pm_mulh(i.q, config->c_q), 26), 5);
+    return pm_mulh_add(pm_mulh_add(config->c_re, i.d, config->c_d), i.q, rise);
+}
+
+/* u of the present sample. */
 static inline pm_ab_t zero_link(const zero_config_t *config, const injection_in_t *in, pm_dq_t i)
 {
     const pm_half_dir_t twice = pm_dir_sum(in->dir, in->dir);
     const int32_t alpha = pm_mulh_sub(pm_mulh(in->i.alpha, twice.cos), in->i.beta, twice.sin); /* Q26 */
     const int32_t beta = pm_mulh_add(pm_mulh(in->i.alpha, twice.sin), in->i.beta, twice.cos);
-    const int32_t rise = pm_shl(pm_sat(pm_mulh(i.q, config->c_q), 26), 5);
-    const int32_t re = pm_mulh_add(pm_mulh_add(config->c_re, i.d, config->c_d), i.q, rise);
+    const int32_t re = zero_link_re(config, i);
     const int32_t im = pm_mulh_add(config->c_im, i.q, config->c_cross);
     const pm_ab_t u = {pm_mulh_sub(pm_mulh(alpha, re), beta, im), pm_mulh_add(pm_mulh(alpha, im), beta, re)};
     return u;

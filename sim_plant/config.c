@@ -89,9 +89,8 @@ static const char *winding_fault(const plant_winding_t *w, double R_s_ohm)
     REQUIRE(isfinite(w->dL_0_d_1_A) && isfinite(w->dL_0_q_1_A2) && isfinite(w->L_c0_q_H_A),
             "winding.dL_0_d_1_A, dL_0_q_1_A2 and L_c0_q_H_A must be finite")
     REQUIRE(!open || (w->dL_0_d_1_A == 0.0 && w->dL_0_q_1_A2 == 0.0 && w->L_c0_q_H_A == 0.0),
-            "winding.dL_0_d_1_A, dL_0_q_1_A2 and L_c0_q_H_A are of a star: what moves with the currents of "
-            "an open "
-            "winding is the psi_0 of a flux map")
+            "winding.dL_0_d_1_A, dL_0_q_1_A2 and L_c0_q_H_A are of a star: in an open winding the psi_0 of a "
+            "flux map moves with the currents")
     REQUIRE(sound_harmonics(w->emf, PLANT_HARMONICS),
             "winding.emf must have finite values and orders to 1000")
     REQUIRE(sound_saliency(w->saliency),

@@ -6,8 +6,8 @@
  * is larger where the current adds to the flux of the magnet. At the neutral it is, of a rotating carrier,
  *   h_d = V_h dL_0 L_sa / (2 D) [1 + kappa cos(6 theta + theta_m)]      in phase with cos(2 theta + phi)
  * which goes by 1 / L_dh at 0, 60, ... degrees and by 1 / L_qh between; the carrier that turns back with -2 theta^ + 90 degrees
- * has none where it locks. dL_0 may change with the current, too, so that it was found once which of the two is larger: zero_falls; where that is not known, or
- * not the same at every position (zero_inductance.h), the configuration refuses.
+ * has none where it locks. dL_0 may change with the current, too, so that it was found once which of the two is larger: zero_falls.
+ * Where that is not known, or is not the same at every position (zero_inductance.h), the configuration refuses.
  * Of n values in each direction:
  *   D      = mean(h_d+) - mean(h_d-)         > 0: d of the estimated frame is the magnet's north
  *   sigma^2 = sigma_+^2 + sigma_-^2

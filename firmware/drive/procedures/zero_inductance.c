@@ -141,7 +141,7 @@ static pm_q_t share(int64_t x, int64_t y)
     return one == 0 ? 0 : (pm_q_t)pm_quotient(x, (int32_t)one);
 }
 
-/* Which way, if it is sure; across phase A, too, if it is. */
+/* Which way, if it is sure. Across phase A it may take that back; where nothing is seen there, the start's own margin refuses. */
 static void find_fall(drive_t *drive, bool across)
 {
     const zero_inductance_t *self = &drive->procedure.zero_inductance;
@@ -155,10 +155,8 @@ static void find_fall(drive_t *drive, bool across)
     if (!across) {
         r->margin = sure ? margin : 0;
         r->falls = !rises;
-    } else if (sure && r->falls == rises) {
-        r->margin = 0;
     } else {
-        /* the same way, or none: the start's own margin then refuses where it must */
+        r->margin = sure && r->falls == rises ? 0 : r->margin;
     }
 }
 

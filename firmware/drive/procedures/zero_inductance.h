@@ -38,8 +38,8 @@
  * The quotient is 1 / cos of what resistance and dead time turn the current by: without I the carrier passes zero, where dead
  * time takes most (|Y| 1.8 to 3.7 % less on a linear IPM-1000 at 70 and 35 V, S 0.5 %). D < 0 beyond five sigma:
  * zero_falls 1, with magnetising current; D > 0: 0. Below, the machine does not saturate: margin 0, and the start cannot tell
- * the poles by it (d_current.h). The same a quarter further on, where the answer goes by L_qh instead of L_dh: a machine
- * whose dL_0 falls more than the one inductance and less than the other has another sign there, found margin 0 as well.
+ * the poles by it (d_current.h). It is measured again a quarter further on, where the answer goes by 1 / L_qh: if it changes the
+ * other way there, no sign serves every position, and the margin is 0 as well.
  *
  * The rotor must be free and without load; it turns by up to half a turn and a quarter, electrical. 5.1 s. Each
  * period 170 instructions.

@@ -61,11 +61,11 @@ TEST(Block, TorqueModeTurnsTheFanAtTheSpeedOfItsTorque)
     }
 }
 
-TEST(Block, CommutatesByTheThirdHarmonicOfTheStarPoint)
+void commutates_by(int32_t crossings, void (*change)(plant_config_t &), double within_deg)
 {
     for (const double direction : {1.0, -1.0}) {
-        Fan x(1.0, star_point);
-        x.params().zero_reference = CROSSINGS_third_harmonic;
+        Fan x(1.0, change);
+        x.params().zero_reference = crossings;
         x.enable();
         x.speed_rel(0.4 * direction);
         x.run_s(1.3);
@@ -73,24 +73,18 @@ TEST(Block, CommutatesByTheThirdHarmonicOfTheStarPoint)
         ASSERT_EQ(x.drive().stage, STAGE_SIX_STEP);
         x.run_s(0.1);
         EXPECT_NEAR(x.omega_rel, 0.4 * direction, 0.02 * 0.4);
-        EXPECT_LT(x.worst_deg, kAngle_deg);
+        EXPECT_LT(x.worst_deg, within_deg);
     }
+}
+
+TEST(Block, CommutatesByTheThirdHarmonicOfTheStarPoint)
+{
+    commutates_by(CROSSINGS_third_harmonic, star_point, kAngle_deg);
 }
 
 TEST(Block, CommutatesByTheThirdHarmonicOfTheTerminals)
 {
-    for (const double direction : {1.0, -1.0}) {
-        Fan x;
-        x.params().zero_reference = CROSSINGS_virtual_third;
-        x.enable();
-        x.speed_rel(0.4 * direction);
-        x.run_s(1.3);
-        ASSERT_EQ(x.fault(), DRIVE_FAULT_NONE);
-        ASSERT_EQ(x.drive().stage, STAGE_SIX_STEP);
-        x.run_s(0.1);
-        EXPECT_NEAR(x.omega_rel, 0.4 * direction, 0.02 * 0.4);
-        EXPECT_LT(x.worst_deg, kVirtual_deg);
-    }
+    commutates_by(CROSSINGS_virtual_third, nullptr, kVirtual_deg);
 }
 
 // Told a trapezoid, a sine starts and shows none of its third harmonic. Twins: a trapezoid that is held shows nothing at all, and
