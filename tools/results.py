@@ -146,9 +146,14 @@ def read_record():
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
 
 
+def wanted_figures():
+    """How the names begin that the rows ask for."""
+    return tuple(ask["measured"] for asks in acceptance.read().values() for ask in asks if "measured" in ask)
+
+
 def figures_of(path):
     """Id -> value and bound that measured() wrote last, of what is asked for."""
-    wanted = tuple(ask["measured"] for asks in acceptance.read().values() for ask in asks if "measured" in ask)
+    wanted = wanted_figures()
     with path.open(encoding="utf-8") as file:
         return {row[0]: [float(row[1]), float(row[2])] for row in csv.reader(file) if row[0].startswith(wanted)}
 
@@ -261,12 +266,22 @@ def stale_figures(path):
         elif abs(value_now - value) > max(0.5 * abs(value), 0.05 * abs(bound)):
             yield f"{name}: {value_now:.3g}, recorded {value:.3g}"
     for name in sorted(now.keys() - recorded.keys()):
-        yield f"{name}: not in {FIGURES}"
+        yield f"{name}: not in {FIGURES}; tools/results --tests measures it"
+
+
+def unrecorded_figures():
+    """Of the tests' sources: what is asked for, by a name that is written out. The others the build's values show."""
+    recorded, wanted = read_figures(), wanted_figures()
+    for path in sorted((ROOT / "tests/unit").rglob("*_test.cpp")):
+        for name in re.findall(r'\bmeasured\("(\w+)",', path.read_text(encoding="utf-8")):
+            if name.startswith(wanted) and name not in recorded:
+                yield f"{name} of {path.relative_to(ROOT)}: not in {FIGURES}; tools/results --tests measures it"
 
 
 def stale(record, build):
     """What the page says and no longer is so."""
     folder = build / "scenario" if build else None
+    yield from unrecorded_figures()
     if build:
         yield from stale_figures(build / "measured.csv")
     for name in names():
@@ -307,7 +322,7 @@ def main():
     if options.check is not None:
         found = list(stale(record, Path(options.check) if options.check else None))
         if found:
-            sys.exit("\n".join(found) + "\ntools/results SCENARIO... measures them again")
+            sys.exit("\n".join(found) + "\ntools/results SCENARIO... measures scenarios again")
         return
     unknown = sorted(set(options.scenario) - set(names()))
     if unknown:
