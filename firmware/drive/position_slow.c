@@ -89,16 +89,30 @@ static void set_shown(position_t *self, pm_dq_t vector)
     (void)pm_lp1(&self->square, pm_mul(d, d) + pm_mul(q, q), K_MEAN);
 }
 
-/* The low-speed source keeps the lead. Below omega_low an offset of the channel may pass for the third harmonic. */
+/* Below omega_low an offset of the channel may pass for the third harmonic, and so may, at a reversal, what a filter holds of
+ * the speed before. */
+static bool is_below_third(const position_t *self, const position_config_t *config)
+{
+    return knows_third(config) && pm_abs(self->omega_mean) < config->omega_low;
+}
+
+/* The low-speed source keeps the lead. */
 static bool is_held(position_t *self, const position_config_t *config)
 {
-    const bool slow = pm_abs(self->omega_mean) < config->omega_low;
+    const bool slow = is_below_third(self, config);
     self->shown = slow ? 0 : self->shown;
     const bool held = knows_third(config) && self->inject && self->weight == 0 && self->shown < PM_ONE / 2;
     self->absent_ms = held && !slow ? (uint16_t)(self->absent_ms + 1U) : 0U;
     return held;
 }
 #else
+static bool is_below_third(const position_t *self, const position_config_t *config)
+{
+    (void)self;
+    (void)config;
+    return false;
+}
+
 static bool is_held(const position_t *self, const position_config_t *config)
 {
     (void)self;
@@ -189,7 +203,8 @@ static void set_quality(position_t *self, const position_config_t *config, const
     const bool in_mean = PM_CARRIES(NEEDS_NEUTRAL) != 0 && (config->traits & (uint8_t)SOURCE_IN_MEAN) != 0U;
     const pm_q_t low_eps = magnitude_after(&self->injection_eps, low.eps, in_mean ? K_MEAN_NOISE : K_NOISE);
     /* also while the observer is tied: an EMF that the position does not explain */
-    pm_q_t eps = magnitude_after(&self->observer_eps, seen->eps + mismatch_eps(&self->mismatch, i), K_NOISE);
+    const pm_q_t seen_eps = self->weight == 0 && is_below_third(self, config) ? 0 : seen->eps;
+    pm_q_t eps = magnitude_after(&self->observer_eps, seen_eps + mismatch_eps(&self->mismatch, i), K_NOISE);
     pm_q_t misfit = pm_abs(seen->misfit);
     if (self->weight == 0) {
         eps = pm_unit(eps, config->tied_share);

@@ -185,6 +185,33 @@ TEST(Position, AThirdHarmonicThatLeadsIsNotHeldBack)
     EXPECT_EQ(alone.absent_ms, 0);
 }
 
+// At a reversal a filter holds what it saw of the speed before: below speed_low it says nothing of the position while another source
+// leads. Row 128.
+TEST(Position, WhatAThirdHarmonicErrsByBelowSpeedLowCostsNoQuality)
+{
+    const struct {
+        uint8_t traits;
+        double omega;
+        bool counts;
+    } cases[] = {{SOURCE_THIRD_TURN, kLow / 2, false},
+                 {SOURCE_THIRD_TURN, -kLow / 2, false},
+                 {SOURCE_THIRD_TURN, 1.5 * kLow, true},
+                 {0, kLow / 2, true}};
+    for (const auto &at : cases) {
+        position_config_t c = config();
+        c.traits_high = at.traits;
+        c.observer.id = OBSERVER_third_sogi;
+        c.observer.third_sogi = {};
+        position_t self = started(c);
+        for (int ms = 0; ms < kSettle; ++ms) {
+            self.observer.third_sogi.third.last = {0, THIRD_Z_ONE / 2};
+            hold(self, c, at.omega, 1);
+        }
+        EXPECT_EQ(self.weight, 0);
+        EXPECT_EQ(self.quality < PM_ONE, at.counts) << at.omega;
+    }
+}
+
 // A quarter of what was told, from speed_low on, either direction; of the third harmonic alone.
 TEST(Position, AThirdHarmonicBelowAQuarterIsLacking)
 {
