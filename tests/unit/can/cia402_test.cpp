@@ -322,6 +322,18 @@ TEST(Cia402, HaltStopsAndStaysEnabled)
     EXPECT_EQ(x.out.velocity, 5000);
 }
 
+TEST(Cia402, StandstillIsABitOfTheVelocityModeAlone)
+{
+    for (const int mode : {CIA402_MODE_VELOCITY, CIA402_MODE_TORQUE}) {
+        Profile x;
+        x.put(OD_LIVE_MODE, mode);
+        x.reach(CIA402_OPERATION_ENABLED);
+        EXPECT_EQ((x.status() & 0x1000) != 0, mode == CIA402_MODE_VELOCITY) << mode;
+        x.in.velocity = 4000;
+        EXPECT_EQ(x.status() & 0x1000, 0) << mode;
+    }
+}
+
 TEST(Cia402, FaultIsLeftByTheRisingEdgeAfterItsCauseAlone)
 {
     for (const cia402_state_t state : {CIA402_SWITCH_ON_DISABLED, CIA402_SWITCHED_ON,

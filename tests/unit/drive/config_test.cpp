@@ -319,6 +319,7 @@ std::vector<Check> ipm_1000(const drive_config_t &c)
         {"v_dc_derate", c.protection.v_dc_derate, 28, 380 / V},
         {"offset_max", c.protection.offset_max, 15, 0.3 / I},
         {"omega_stall", c.protection.omega_stall, 28, 150 * P / W / 50},
+        {"i_sum", c.protection.i_sum, 28, 0.1},
         {"i_max", c.i_max, 28, 5 / I},
         {"i_d_light", c.i_d_light, 28, 0.2 / I},
         {"omega_max", c.omega_max, 28, 150 * P / W},
@@ -436,6 +437,8 @@ TEST(Config, IsTheFormulasForIpm1000)
     EXPECT_EQ(c.protection.lost_ms, 30);
     EXPECT_EQ(c.protection.temp_derate_dC, 900);
     EXPECT_EQ(c.protection.temp_trip_dC, 1100);
+    // a sine of the saliency map answers a quarter of its period and 1.5 periods of the PWM later
+    EXPECT_NEAR(c.saliency_map.sine.lag, 1.5 * c.saliency_map.sine.step + 0x40000000, 2);
 }
 
 // Limits that may be reached.

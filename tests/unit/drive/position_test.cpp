@@ -162,6 +162,28 @@ TEST(Position, WhatLooksLikeAThirdHarmonicBelowSpeedLowIsNone)
     EXPECT_EQ(self.absent_ms, 0);
 }
 
+// What shows it lies along d, and no sample counts more than twice of what was told.
+TEST(Position, WhatAThirdHarmonicShowsIsItsPartAlongD)
+{
+    const struct {
+        pm_dq_t z;
+        double shown;
+    } cases[] = {{{THIRD_Z_ONE / 2, 0}, 0.5}, {{0, THIRD_Z_ONE / 2}, 0}, {{3 * THIRD_Z_ONE, 0}, 2}};
+    for (const auto &at : cases) {
+        position_config_t c = config();
+        c.traits_high = SOURCE_THIRD_TURN;
+        c.observer.id = OBSERVER_third_sogi;
+        c.observer.third_sogi = {};
+        position_t self = started(c);
+        for (int ms = 0; ms < 20 * kSettle; ++ms) {
+            self.observer.third_sogi.third.last = at.z;
+            self.weight = 0;
+            hold(self, c, 1.5 * kLow, 1);
+        }
+        EXPECT_NEAR(real(self.shown), at.shown, 0.01);
+    }
+}
+
 // One that leads keeps the lead: what it no longer shows is for the quality.
 TEST(Position, AThirdHarmonicThatLeadsIsNotHeldBack)
 {

@@ -46,6 +46,14 @@ template <class Describe> MetricValue gather(const char *name, Describe describe
     return gather(expectation, describe, periods);
 }
 
+TEST(Metrics, WhatHasAUnitIsANumber)
+{
+    for (const MetricInfo &info : metric_infos()) {
+        EXPECT_EQ(info.is_word, info.unit.empty()) << info.name;
+        EXPECT_EQ(info.is_word, !info.words.empty()) << info.name;
+    }
+}
+
 TEST(Metrics, AngleErrorOfAWaveAboutAnOffset)
 {
     const auto wave = [](Sample &s, int k) {
