@@ -96,7 +96,28 @@ static void limit_imposed(drive_config_t *config)
 }
 #endif
 
-static void make_protection(maker_t *m, protection_config_t *c, pm_q_t most)
+static pm_q_t at_most_twice(maker_t *m, pm_num_t i_A, drive_param_id_t id)
+{
+    return fixed(m, least(pm_num_div(i_A, m->base.i), pm_num(2)), Q_BITS, id);
+}
+
+/* Square of a current that is borne for good, with a margin of 5 %. */
+static pm_q_t borne(pm_q_t i)
+{
+    const pm_q_t more = i + i / 20;
+    return pm_max(pm_mul(more, more), 1);
+}
+
+/* Where a carrier turns the currents' signs, what dead time takes of the voltage comes and goes faster than the integral of current
+ * control follows, and pushes the current by half of this. */
+static pm_q_t pushed(maker_t *m, pm_unit_t share)
+{
+    const pm_num_t k_p = mul3(angular(m, DRIVE_PARAM_current_bandwidth), si(m, DRIVE_PARAM_L_d),
+                              pm_num_ratio(share, PM_UNIT_MAX));
+    return at_most_twice(m, pm_num_div(dead_voltage(m), k_p), DRIVE_PARAM_dead_time);
+}
+
+static void make_protection(maker_t *m, protection_config_t *c, pm_unit_t share, pm_q_t most)
 {
     const drive_params_t *p = m->params;
     const pm_q_t i_trip = per_unit(m, DRIVE_PARAM_i_trip, m->base.i);
@@ -109,23 +130,21 @@ static void make_protection(maker_t *m, protection_config_t *c, pm_q_t most)
     c->i_sum = PM_Q(0.1);
     c->offset_max = fixed(m, pm_num_div(si(m, DRIVE_PARAM_offset_max), si(m, DRIVE_PARAM_i_full_scale)), 15,
                           DRIVE_PARAM_offset_max);
-    c->heat_max =
-        fixed(m, square(pm_num_mul(pm_num_ratio(21, 20), pm_num_div(si(m, DRIVE_PARAM_i_rated), m->base.i))),
-              Q_BITS, DRIVE_PARAM_i_rated);
+    c->heat_max = borne(pm_min(i_rated, 2 * PM_ONE));
     c->k_heat =
         fixed(m, pm_num_div(m->t_slow, si(m, DRIVE_PARAM_t_winding)), FRAC_BITS, DRIVE_PARAM_t_winding);
     /* where the bridge bears more than i_trip, it is not asked for as much */
-    const pm_num_t bridge = pm_num_div(si(m, DRIVE_PARAM_i_bridge), m->base.i);
-    c->bridge_heat_max = fixed(m, square(pm_num_mul(pm_num_ratio(21, 20), least(bridge, pm_num(2)))), Q_BITS,
-                               DRIVE_PARAM_i_bridge);
+    c->bridge_heat_max = borne(at_most_twice(m, si(m, DRIVE_PARAM_i_bridge), DRIVE_PARAM_i_bridge));
     c->k_bridge_heat =
         fixed(m, pm_num_div(m->t_slow, si(m, DRIVE_PARAM_t_bridge)), FRAC_BITS, DRIVE_PARAM_t_bridge);
     /* a current that dead time holds at zero is not one that does not conduct */
-    const pm_q_t zone = fixed(m, pm_num_div(m->comp_zone, m->base.i), Q_BITS, DRIVE_PARAM_comp_zone);
+    const pm_q_t zone = at_most_twice(m, m->comp_zone, DRIVE_PARAM_comp_zone);
     const pm_q_t noise = per_unit(m, DRIVE_PARAM_i_noise, m->base.i);
-    const pm_q_t hidden = pm_max(2 * pm_min(zone, PM_Q_MAX / 2), 8 * pm_min(noise, PM_Q_MAX / 8));
+    const pm_q_t hidden = pm_max(2 * zone, 8 * pm_min(noise, PM_Q_MAX / 8));
     const pm_q_t judged = pm_max(hidden, i_rated / 64);
     c->judged = pm_mul(judged, judged);
+    const pm_q_t with_carrier = pm_max(judged, pushed(m, share));
+    c->judged_carrier = pm_mul(with_carrier, with_carrier);
     c->temp_derate_dC = (int16_t)p->temp_derate;
     c->temp_trip_dC = (int16_t)p->temp_trip;
     c->omega_stall = speed(m, DRIVE_PARAM_speed_max) / 50;
@@ -272,7 +291,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     }
     make_open_loop(&m, &config->open_loop);
     PM_IN_IMAGE(torque_polarity, make_torque_polarity(&m, &config->torque_polarity);)
-    make_protection(&m, &config->protection, config->i_injection);
+    make_protection(&m, &config->protection, config->position.current_low, config->i_injection);
     make_fault_short(&m, &config->fault_short);
     PM_IN_IMAGE(six_step, make_block(&m, &config->block);)
     make_limits(&m, config);

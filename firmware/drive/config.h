@@ -47,9 +47,10 @@ typedef struct {
     pm_frac_t k_heat;       /* low-pass of the windings' heat, at 1 kHz */
     pm_q_t bridge_heat_max; /* the same of the bridge */
     pm_frac_t k_bridge_heat;
-    pm_q_t judged;      /* square of the least current whose legs are looked at: open_phase.h */
-    pm_q_t omega_stall; /* below: not turning */
-    pm_q_t i_stall;     /* current of a rotor that should turn then */
+    pm_q_t judged;         /* square of the least current whose legs are looked at: open_phase.h */
+    pm_q_t judged_carrier; /* the same while there is a carrier */
+    pm_q_t omega_stall;    /* below: not turning */
+    pm_q_t i_stall;        /* current of a rotor that should turn then */
     uint16_t stall_ms, lost_ms;
 } protection_config_t;
 

@@ -178,7 +178,8 @@ void protection_phases(drive_t *drive)
         return;
     }
     const pm_dir_t dir = pm_dir(drive->stage == STAGE_VECTOR ? drive->position.pll.theta : drive->theta_open);
-    if (open_phase_slow(&drive->open_phase, drive->config.protection.judged,
+    const protection_config_t *c = &drive->config.protection;
+    if (open_phase_slow(&drive->open_phase, drive->carrier ? c->judged_carrier : c->judged,
                         pm_park_inverse(drive->i_ref, dir), pm_park_inverse(drive->status.i, dir))) {
         drive_trip(drive, DRIVE_FAULT_OPEN_PHASE);
     }

@@ -463,6 +463,17 @@ TEST(Config, OpenPhaseIsJudgedAboveWhatIsNotKnown)
     noise[2].second = 0.05;
     EXPECT_NEAR(judged(zone), std::pow(0.6 * A, 2), 1e-6);
     EXPECT_NEAR(judged(noise), std::pow(0.4 * A, 2), 1e-6);
+    // with a carrier what dead time takes, over the gain of current control; at most two of the base
+    const auto with_carrier = [&](double dead_s) {
+        const drive_config_t c =
+            configure(changed({none[0], none[1], none[2], {DRIVE_PARAM_dead_time, dead_s}}));
+        const double gain = 2 * M_PI * 500 * 43e-3 * real(c.position.current_low, 31);
+        const double expected = std::pow(std::max(dead_s * 10e3 * 300 / gain * A, 4 * A / 64), 2);
+        EXPECT_NEAR(real(c.protection.judged_carrier), expected, 1e-6) << dead_s;
+        EXPECT_NEAR(real(c.protection.judged), std::pow(4 * A / 64, 2), 1e-6) << dead_s;
+    };
+    with_carrier(2e-6);
+    with_carrier(5e-6);
 }
 
 // What half of the lost voltage may turn a tied observer by counts 0.15 at most: IPM-1000 is sure of its EMF, a

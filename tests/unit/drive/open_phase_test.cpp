@@ -208,4 +208,24 @@ TEST(OpenPhase, OfTheDrive)
     }
 }
 
+// A carrier moves a small current by what dead time takes of the voltage: more of it is wanted before the legs are judged.
+TEST(OpenPhase, ACarrierHidesALittleMore)
+{
+    for (const bool carrier : {false, true}) {
+        direct::Drive x(direct::params(2));
+        x.start_current_mode();
+        const pm_dq_t i = x.d.i_ref;
+        const pm_q_t amplitude = pm_hypot(i.d, i.q);
+        x.d.config.protection.judged_carrier = pm_mul(2 * amplitude, 2 * amplitude);
+        open_phase_reset(&x.d.open_phase);
+        x.d.carrier = carrier;
+        x.d.theta_open = 0; // all of it in the first leg, and what flows a quarter of a turn ahead
+        x.d.status.i = {-i.q, i.d};
+        for (unsigned ms = 0; ms <= OPEN_PHASE_MS + 1U; ++ms) {
+            protection_phases(&x.d);
+        }
+        EXPECT_EQ(x.d.fault, carrier ? DRIVE_FAULT_NONE : DRIVE_FAULT_OPEN_PHASE);
+    }
+}
+
 } // namespace
