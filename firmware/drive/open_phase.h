@@ -6,8 +6,10 @@
  * direction takes 2 back, wanted or not, and so does each in which it is wanted there and carries anything.
  *
  * least: the square of i_rated / 64, of 8 i_noise, or of twice the zone in which dead time holds a current at zero
- * (modulator.h), whichever is more; with a carrier at least of (t_dead f_pwm v_dc) / (2 pi f_current L_d), which changes with the
- * signs that the carrier gives the currents, faster than the integral follows. Nothing is said where less flows, or less is wanted, or not half of what flows: it is
+ * (modulator.h), whichever is more. With a carrier also of what current control lets through of the voltage that dead time
+ * takes, as its sign follows that of the carrier faster than the integral does:
+ *   t_dead f_pwm v_dc / (2 pi f_current L_d)
+ * Nothing is said where less flows, or less is wanted, or not half of what flows: it is
  * not of this control then. With a wire off, A sin(delta) flows of A that is wanted delta beside the leg. So a wire is
  * found within a quarter of an electrical turn and 0.1 s from four times the least on, and later below and where turns
  * beat with 1 kHz, unless the position is lost before, which is a fault too. A switch is found once its direction is

@@ -208,7 +208,7 @@ TEST(Position, AThirdHarmonicThatLeadsIsNotHeldBack)
 }
 
 // At a reversal a filter holds what it saw of the speed before: below speed_low it says nothing of the position while another source
-// leads. Row 128.
+// leads. Row 129.
 TEST(Position, WhatAThirdHarmonicErrsByBelowSpeedLowCostsNoQuality)
 {
     const struct {
