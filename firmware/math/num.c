@@ -3,10 +3,10 @@
 enum { MANTISSA_BITS = 31, LONGEST_EXPONENT10 = 12 };
 
 /* magnitude 2^e with the sign, to 31 bits, rounded to nearest. */
-static pm_num_t make(bool negative, uint64_t magnitude, int32_t e)
+static pm_num_word_t make(bool negative, uint64_t magnitude, int32_t e)
 {
     if (magnitude == 0U) {
-        return (pm_num_t){0, 0};
+        return 0;
     }
     const int spare = __builtin_clzll(magnitude);
     uint64_t m = magnitude << spare; /* 2^63 ... 2^64 */
@@ -17,7 +17,7 @@ static pm_num_t make(bool negative, uint64_t magnitude, int32_t e)
         m >>= 1;
         e += 1;
     }
-    return (pm_num_t){.m = negative ? -(int32_t)m : (int32_t)m, .e = e};
+    return pm_num_word((pm_num_t){.m = negative ? -(int32_t)m : (int32_t)m, .e = e});
 }
 
 static uint64_t magnitude(int32_t x)
@@ -60,17 +60,17 @@ int64_t pm_quotient(int64_t num, int32_t den)
     return (int64_t)((num < 0) == (den < 0) ? size : 0U - size);
 }
 
-pm_num_t pm_num(int32_t value)
+pm_num_word_t pm_num_word_int(int32_t value)
 {
     return make(value < 0, magnitude(value), 0);
 }
 
 /* 10^n = 5^n 2^n, and 5^12 is still exact in a mantissa, so there is one rounding only. */
-pm_num_t pm_num_dec(int32_t value, int exponent10)
+pm_num_word_t pm_num_word_dec(int32_t value, int exponent10)
 {
     const int n = exponent10 < 0 ? -exponent10 : exponent10;
     if (n > LONGEST_EXPONENT10) {
-        return (pm_num_t){0, 0};
+        return 0;
     }
     int32_t power = 1;
     for (int i = 0; i < n; ++i) {
@@ -78,58 +78,62 @@ pm_num_t pm_num_dec(int32_t value, int exponent10)
     }
     pm_num_t scale = pm_num(power);
     scale.e += n;
-    return exponent10 < 0 ? pm_num_div(pm_num(value), scale) : pm_num_mul(pm_num(value), scale);
+    return pm_num_word(exponent10 < 0 ? pm_num_div(pm_num(value), scale) : pm_num_mul(pm_num(value), scale));
 }
 
-pm_num_t pm_num_ratio(int32_t num, int32_t den)
+pm_num_word_t pm_num_word_ratio(int32_t num, int32_t den)
 {
-    return pm_num_div(pm_num(num), pm_num(den));
+    return pm_num_word(pm_num_div(pm_num(num), pm_num(den)));
 }
 
-pm_num_t pm_num_neg(pm_num_t a)
+pm_num_word_t pm_num_word_add(pm_num_word_t a_word, pm_num_word_t b_word)
 {
-    return (pm_num_t){.m = -a.m, .e = a.e};
-}
-
-pm_num_t pm_num_add(pm_num_t a, pm_num_t b)
-{
+    const pm_num_t a = pm_num_of(a_word);
+    const pm_num_t b = pm_num_of(b_word);
     if (a.m == 0 || b.m == 0) {
-        return a.m == 0 ? b : a;
+        return a.m == 0 ? b_word : a_word;
     }
     const pm_num_t large = a.e >= b.e ? a : b;
     const pm_num_t small = a.e >= b.e ? b : a;
     const int32_t apart = large.e - small.e;
     if (apart > MANTISSA_BITS) { /* less than half a unit of the last place, which rounding may ignore */
-        return large;
+        return a.e >= b.e ? a_word : b_word;
     }
     const int64_t sum = (int64_t)large.m * (INT64_C(1) << apart) + small.m;
     return make(sum < 0, (uint64_t)(sum < 0 ? -sum : sum), small.e);
 }
 
-pm_num_t pm_num_sub(pm_num_t a, pm_num_t b)
+pm_num_word_t pm_num_word_sub(pm_num_word_t a_word, pm_num_word_t b_word)
 {
-    return pm_num_add(a, pm_num_neg(b));
+    const pm_num_t a = pm_num_of(a_word);
+    const pm_num_t b = pm_num_of(b_word);
+    return pm_num_word(pm_num_add(a, pm_num_neg(b)));
 }
 
-pm_num_t pm_num_mul(pm_num_t a, pm_num_t b)
+pm_num_word_t pm_num_word_mul(pm_num_word_t a_word, pm_num_word_t b_word)
 {
+    const pm_num_t a = pm_num_of(a_word);
+    const pm_num_t b = pm_num_of(b_word);
     return make((a.m < 0) != (b.m < 0), magnitude(a.m) * magnitude(b.m), a.e + b.e);
 }
 
-pm_num_t pm_num_div(pm_num_t a, pm_num_t b)
+pm_num_word_t pm_num_word_div(pm_num_word_t a_word, pm_num_word_t b_word)
 {
+    const pm_num_t a = pm_num_of(a_word);
+    const pm_num_t b = pm_num_of(b_word);
     if (a.m == 0 || b.m == 0) {
-        return (pm_num_t){0, 0};
+        return 0;
     }
     /* 33 or 34 bits of quotient: cutting it costs an eighth of a unit in the last place of 31. */
     return make((a.m < 0) != (b.m < 0), quotient(magnitude(a.m) << 33, (uint32_t)magnitude(b.m)),
                 a.e - b.e - 33);
 }
 
-pm_num_t pm_num_sqrt(pm_num_t a)
+pm_num_word_t pm_num_word_sqrt(pm_num_word_t a_word)
 {
+    const pm_num_t a = pm_num_of(a_word);
     if (a.m <= 0) {
-        return (pm_num_t){0, 0};
+        return 0;
     }
     /* An even exponent and 64 bits under the root leave 32 bits of result, found from the top. */
     const int32_t odd = a.e & 1;
@@ -146,14 +150,15 @@ pm_num_t pm_num_sqrt(pm_num_t a)
     return make(false, root, (a.e - odd) / 2 - 16);
 }
 
-int pm_num_cmp(pm_num_t a, pm_num_t b)
+int pm_num_word_cmp(pm_num_word_t a, pm_num_word_t b)
 {
-    const int32_t sign = pm_num_sub(a, b).m;
+    const int32_t sign = pm_num_sub(pm_num_of(a), pm_num_of(b)).m;
     return (sign > 0) - (sign < 0);
 }
 
-bool pm_num_to_fixed(pm_num_t a, int frac_bits, int32_t *out)
+bool pm_num_word_to_fixed(pm_num_word_t word, int frac_bits, int32_t *out)
 {
+    const pm_num_t a = pm_num_of(word);
     const int32_t shift = a.e + frac_bits;
     *out = 0;
     if (a.m == 0 || shift < -MANTISSA_BITS - 1) {
@@ -174,15 +179,16 @@ bool pm_num_to_fixed(pm_num_t a, int frac_bits, int32_t *out)
     return fits;
 }
 
-pm_num_t pm_num_from_fixed(int32_t x, int frac_bits)
+pm_num_word_t pm_num_word_from_fixed(int32_t x, int frac_bits)
 {
     pm_num_t r = pm_num(x);
     r.e -= r.m == 0 ? 0 : frac_bits;
-    return r;
+    return pm_num_word(r);
 }
 
-int32_t pm_num_times(int32_t value, pm_num_t unit, int frac_bits)
+int32_t pm_num_word_times(pm_num_word_t word, int32_t value, int frac_bits)
 {
+    const pm_num_t unit = pm_num_of(word);
     const int64_t product = (int64_t)value * unit.m;
     const int32_t shift = -unit.e - frac_bits;
     int64_t x = 0;

@@ -12,6 +12,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "firmware/math/compiler.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -21,24 +23,103 @@ typedef struct {
     int32_t e;
 } pm_num_t;
 
-pm_num_t pm_num(int32_t value);                     /* an integer */
-pm_num_t pm_num_dec(int32_t value, int exponent10); /* value x 10^exponent10, -12 <= exponent10 <= 12 */
-pm_num_t pm_num_ratio(int32_t num, int32_t den);    /* den == 0 gives 0 */
-pm_num_t pm_num_add(pm_num_t a, pm_num_t b);
-pm_num_t pm_num_sub(pm_num_t a, pm_num_t b);
-pm_num_t pm_num_mul(pm_num_t a, pm_num_t b);
-pm_num_t pm_num_div(pm_num_t a, pm_num_t b); /* b == 0 gives 0: check first */
-pm_num_t pm_num_sqrt(pm_num_t a);            /* a <= 0 gives 0 */
-pm_num_t pm_num_neg(pm_num_t a);
-int pm_num_cmp(pm_num_t a, pm_num_t b); /* -1, 0, 1 */
+/* A number as it is passed and returned: 64 bits go in registers, but a struct of two words is returned through
+ * memory (AAPCS), which takes ten bytes more for every operation. m is the lower word. */
+typedef uint64_t pm_num_word_t;
+
+PM_INLINE pm_num_word_t pm_num_word(pm_num_t x)
+{
+    return (uint64_t)(uint32_t)x.e << 32 | (uint32_t)x.m;
+}
+
+PM_INLINE pm_num_t pm_num_of(pm_num_word_t word)
+{
+    const pm_num_t x = {(int32_t)(uint32_t)word, (int32_t)(uint32_t)(word >> 32)};
+    return x;
+}
+
+pm_num_word_t pm_num_word_int(int32_t value);
+pm_num_word_t pm_num_word_dec(int32_t value, int exponent10);
+pm_num_word_t pm_num_word_ratio(int32_t num, int32_t den);
+pm_num_word_t pm_num_word_add(pm_num_word_t a, pm_num_word_t b);
+pm_num_word_t pm_num_word_sub(pm_num_word_t a, pm_num_word_t b);
+pm_num_word_t pm_num_word_mul(pm_num_word_t a, pm_num_word_t b);
+pm_num_word_t pm_num_word_div(pm_num_word_t a, pm_num_word_t b);
+pm_num_word_t pm_num_word_sqrt(pm_num_word_t a);
+pm_num_word_t pm_num_word_from_fixed(int32_t x, int frac_bits);
+int pm_num_word_cmp(pm_num_word_t a, pm_num_word_t b);
+bool pm_num_word_to_fixed(pm_num_word_t a, int frac_bits, int32_t *out);
+int32_t pm_num_word_times(pm_num_word_t unit, int32_t value, int frac_bits);
+
+PM_INLINE pm_num_t pm_num(int32_t value) /* an integer */
+{
+    return pm_num_of(pm_num_word_int(value));
+}
+
+/* value x 10^exponent10, -12 <= exponent10 <= 12 */
+PM_INLINE pm_num_t pm_num_dec(int32_t value, int exponent10)
+{
+    return pm_num_of(pm_num_word_dec(value, exponent10));
+}
+
+PM_INLINE pm_num_t pm_num_ratio(int32_t num, int32_t den) /* den == 0 gives 0 */
+{
+    return pm_num_of(pm_num_word_ratio(num, den));
+}
+
+PM_INLINE pm_num_t pm_num_add(pm_num_t a, pm_num_t b)
+{
+    return pm_num_of(pm_num_word_add(pm_num_word(a), pm_num_word(b)));
+}
+
+PM_INLINE pm_num_t pm_num_sub(pm_num_t a, pm_num_t b)
+{
+    return pm_num_of(pm_num_word_sub(pm_num_word(a), pm_num_word(b)));
+}
+
+PM_INLINE pm_num_t pm_num_mul(pm_num_t a, pm_num_t b)
+{
+    return pm_num_of(pm_num_word_mul(pm_num_word(a), pm_num_word(b)));
+}
+
+PM_INLINE pm_num_t pm_num_div(pm_num_t a, pm_num_t b) /* b == 0 gives 0: check first */
+{
+    return pm_num_of(pm_num_word_div(pm_num_word(a), pm_num_word(b)));
+}
+
+PM_INLINE pm_num_t pm_num_sqrt(pm_num_t a) /* a <= 0 gives 0 */
+{
+    return pm_num_of(pm_num_word_sqrt(pm_num_word(a)));
+}
+
+PM_INLINE pm_num_t pm_num_neg(pm_num_t a)
+{
+    const pm_num_t x = {-a.m, a.e};
+    return x;
+}
+
+PM_INLINE int pm_num_cmp(pm_num_t a, pm_num_t b) /* -1, 0, 1 */
+{
+    return pm_num_word_cmp(pm_num_word(a), pm_num_word(b));
+}
 
 /* value x 2^frac_bits rounded to nearest into *out; false (and *out saturated) when it does not fit. */
-bool pm_num_to_fixed(pm_num_t a, int frac_bits, int32_t *out);
-pm_num_t pm_num_from_fixed(int32_t x, int frac_bits);
+PM_INLINE bool pm_num_to_fixed(pm_num_t a, int frac_bits, int32_t *out)
+{
+    return pm_num_word_to_fixed(pm_num_word(a), frac_bits, out);
+}
+
+PM_INLINE pm_num_t pm_num_from_fixed(int32_t x, int frac_bits)
+{
+    return pm_num_of(pm_num_word_from_fixed(x, frac_bits));
+}
 
 /* value x unit x 2^frac_bits rounded to nearest, the largest of its sign where that does not fit. For values that
  * come while the drive runs: 40 instructions. */
-int32_t pm_num_times(int32_t value, pm_num_t unit, int frac_bits);
+PM_INLINE int32_t pm_num_times(int32_t value, pm_num_t unit, int frac_bits)
+{
+    return pm_num_word_times(pm_num_word(unit), value, frac_bits);
+}
 
 /* num / den toward zero, as C does; den == 0 gives 0. 70 instructions; the compiler's own division, for
  * divisors of 64 bits, would take 800 bytes. */

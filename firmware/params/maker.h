@@ -50,9 +50,15 @@ PM_INLINE void require(maker_t *m, uint32_t needs, drive_param_id_t id)
     }
 }
 
-static inline pm_num_t si(const maker_t *m, drive_param_id_t id)
+/* What follows passes and returns numbers as words, with the number first: in registers (num.h). */
+static inline pm_num_word_t si_word(const maker_t *m, drive_param_id_t id)
 {
-    return pm_num_dec(drive_param_get(m->params, id), drive_param_exp10[id]);
+    return pm_num_word_dec(drive_param_get(m->params, id), drive_param_exp10[id]);
+}
+
+PM_INLINE pm_num_t si(const maker_t *m, drive_param_id_t id)
+{
+    return pm_num_of(si_word(m, id));
 }
 
 /* On-time of a leg up to which a shunt below its low switch sees its current, Q20; all of it with shunts in the
@@ -64,47 +70,78 @@ static inline int32_t seen_on_time(const maker_t *m)
     return PM_SHARE_ONE - pm_mulh(blind, PM_FRAC(2e-9 * PM_SHARE_ONE));
 }
 
-static inline int32_t fixed(maker_t *m, pm_num_t x, int bits, drive_param_id_t blame)
+/* `target` is fixed_target(). */
+static inline int32_t fixed_word(pm_num_word_t x, maker_t *m, uint32_t target)
 {
     int32_t out;
-    if (!pm_num_to_fixed(x, bits, &out)) {
-        refuse(m, blame, "beyond its format: full scales or speed_trip too far off");
+    if (!pm_num_word_to_fixed(x, (int)(target & 0xFFU), &out)) {
+        refuse(m, target >> 8, "beyond its format: full scales or speed_trip too far off");
+    }
+    return out;
+}
+
+PM_INLINE uint32_t fixed_target(int bits, drive_param_id_t blame)
+{
+    return blame << 8 | (uint32_t)bits;
+}
+
+PM_INLINE int32_t fixed(maker_t *m, pm_num_t x, int bits, drive_param_id_t blame)
+{
+    return fixed_word(pm_num_word(x), m, fixed_target(bits, blame));
+}
+
+static inline int32_t gain_word(pm_num_word_t x, maker_t *m, uint32_t target)
+{
+    const int32_t out = fixed_word(x, m, target);
+    if (out <= 0) {
+        refuse(m, target >> 8, "gives a gain of zero with these bases");
     }
     return out;
 }
 
 /* A gain that must not round to nothing. */
-static inline int32_t gain(maker_t *m, pm_num_t x, int bits, drive_param_id_t blame)
+PM_INLINE int32_t gain(maker_t *m, pm_num_t x, int bits, drive_param_id_t blame)
 {
-    const int32_t out = fixed(m, x, bits, blame);
-    if (out <= 0) {
-        refuse(m, blame, "gives a gain of zero with these bases");
-    }
-    return out;
+    return gain_word(pm_num_word(x), m, fixed_target(bits, blame));
 }
 
-static inline pm_num_t mul3(pm_num_t a, pm_num_t b, pm_num_t c)
+PM_INLINE pm_num_t mul3(pm_num_t a, pm_num_t b, pm_num_t c)
 {
     return pm_num_mul(pm_num_mul(a, b), c);
 }
 
-static inline pm_num_t square(pm_num_t x)
+static inline pm_num_word_t square_word(pm_num_word_t x)
 {
-    return pm_num_mul(x, x);
+    return pm_num_word_mul(x, x);
 }
 
-static inline pm_num_t least(pm_num_t a, pm_num_t b)
+PM_INLINE pm_num_t square(pm_num_t x)
 {
-    return pm_num_cmp(a, b) < 0 ? a : b;
+    return pm_num_of(square_word(pm_num_word(x)));
+}
+
+static inline pm_num_word_t least_word(pm_num_word_t a, pm_num_word_t b)
+{
+    return pm_num_word_cmp(a, b) < 0 ? a : b;
+}
+
+PM_INLINE pm_num_t least(pm_num_t a, pm_num_t b)
+{
+    return pm_num_of(least_word(pm_num_word(a), pm_num_word(b)));
+}
+
+static inline pm_q_t per_unit_word(pm_num_word_t base, maker_t *m, drive_param_id_t id)
+{
+    return fixed_word(pm_num_word_div(si_word(m, id), base), m, fixed_target(Q_BITS, id));
 }
 
 /* A parameter over its base as a signal. */
-static inline pm_q_t per_unit(maker_t *m, drive_param_id_t id, pm_num_t base)
+PM_INLINE pm_q_t per_unit(maker_t *m, drive_param_id_t id, pm_num_t base)
 {
-    return fixed(m, pm_num_div(si(m, id), base), Q_BITS, id);
+    return per_unit_word(pm_num_word(base), m, id);
 }
 
-static inline pm_num_t pole_pairs(const maker_t *m)
+PM_INLINE pm_num_t pole_pairs(const maker_t *m)
 {
     return pm_num(m->params->pole_pairs);
 }
@@ -115,16 +152,27 @@ static inline pm_q_t speed(maker_t *m, drive_param_id_t id)
     return fixed(m, pm_num_div(pm_num_mul(si(m, id), pole_pairs(m)), m->base.omega), Q_BITS, id);
 }
 
-static inline pm_num_t angular(const maker_t *m, drive_param_id_t id)
+static inline pm_num_word_t angular_word(const maker_t *m, drive_param_id_t id)
 {
     const pm_num_t two_pi = {PM_NUM_TWO_PI_M, PM_NUM_TWO_PI_E};
-    return pm_num_mul(two_pi, si(m, id));
+    return pm_num_word_mul(pm_num_word(two_pi), si_word(m, id));
+}
+
+PM_INLINE pm_num_t angular(const maker_t *m, drive_param_id_t id)
+{
+    return pm_num_of(angular_word(m, id));
 }
 
 /* Voltage that dead time takes of a leg, beside the drops of its devices, V. */
-static inline pm_num_t dead_voltage(const maker_t *m)
+static inline pm_num_word_t dead_voltage_word(const maker_t *m)
 {
-    return mul3(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm), si(m, DRIVE_PARAM_v_dc_nominal));
+    return pm_num_word(
+        mul3(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm), si(m, DRIVE_PARAM_v_dc_nominal)));
+}
+
+PM_INLINE pm_num_t dead_voltage(const maker_t *m)
+{
+    return pm_num_of(dead_voltage_word(m));
 }
 
 #endif
