@@ -67,6 +67,29 @@ TEST(MathNum, IntegersAreExact)
     }
 }
 
+// The compiler makes what the functions would.
+TEST(MathNum, ConstantsAreTheSameBits)
+{
+    for (const int32_t x : corners()) {
+        if (x <= 0) {
+            continue;
+        }
+        EXPECT_EQ(pm_num_word(pm_num_constant(x)), pm_num_word_int(x)) << x;
+        for (const int32_t y : corners()) {
+            if (y > 0) {
+                EXPECT_EQ(pm_num_word(pm_num_constant_ratio(x, y)), pm_num_word_ratio(x, y)) << x << "/" << y;
+            }
+        }
+    }
+    Random random;
+    for (int i = 0; i < kCount; ++i) {
+        const int32_t x = random.any_size() & INT32_MAX, y = random.any_size() & INT32_MAX;
+        if (x > 0 && y > 0) {
+            ASSERT_EQ(pm_num_word(pm_num_constant_ratio(x, y)), pm_num_word_ratio(x, y)) << x << "/" << y;
+        }
+    }
+}
+
 // INT32_MIN and INT32_MAX have 31 significant bits as well; nothing is rounded there.
 TEST(MathNum, DecimalsAreRoundedOnce)
 {
