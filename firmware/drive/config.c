@@ -85,7 +85,6 @@ static void make_open_loop(maker_t *m, open_loop_config_t *c)
     c->sweep = PM_TURN(0.5) / (uint32_t)m->params->t_align;
 }
 
-#if PM_HAS(load_current)
 /* i_most, and i_open_loop no larger: config.h */
 static void limit_imposed(drive_config_t *config)
 {
@@ -94,7 +93,6 @@ static void limit_imposed(drive_config_t *config)
     c->i_most = pm_min(config->i_max, pm_div(machine->psi_m / 9 * 4, machine->L_q - machine->L_d));
     c->i = pm_min(c->i, c->i_most);
 }
-#endif
 
 static pm_q_t at_most_twice(maker_t *m, pm_num_t i_A, drive_param_id_t id)
 {
@@ -295,7 +293,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     make_fault_short(&m, &config->fault_short);
     PM_IN_IMAGE(six_step, make_block(&m, &config->block);)
     make_limits(&m, config);
-    PM_IN_IMAGE(load_current, limit_imposed(config);)
+    limit_imposed(config);
     make_units(&m, config);
     return m.result;
 }

@@ -61,7 +61,7 @@ typedef struct {
      *   psi_m = 9/4 (L_q - L_d) i
      * With 2 in place of 9/4 half of the active flux of a rotor on the vector, psi_m - (L_q - L_d) i, would be left, and no
      * hand-over would take place. */
-    PM_IN_IMAGE(load_current, pm_q_t i_most;)
+    pm_q_t i_most;
     pm_q_t i_slope;    /* per ms */
     pm_q_t slope;      /* of the speed, per ms */
     pm_frac_t k_swing; /* low-pass that knows swinging from steady turning, at 1 kHz */

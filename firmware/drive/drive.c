@@ -99,6 +99,7 @@ const drive_fault_record_t *drive_fault_record(const drive_t *drive)
 /* Current control by L_q may meet L_d where the angle is not that of the rotor, and swings from a ratio of three on. */
 static void prepare_current_control(drive_t *drive)
 {
+    const pm_machine_t *machine = &drive->config.machine;
     drive->regulator_config = drive->config.regulator;
     if (drive->carrier) {
         const pm_unit_t share = position_current_share(&drive->position, &drive->config.position);
@@ -107,17 +108,13 @@ static void prepare_current_control(drive_t *drive)
         }
 #if PM_HAS(lock)
         if (procedure_without_angle(drive)) {
-            const pm_machine_t *machine = &drive->config.machine;
             regulator_slow_down(&drive->regulator_config, pm_ratio(machine->L_d, machine->L_q));
         }
 #endif
     }
-#if PM_HAS(load_current)
-    const pm_machine_t *machine = &drive->config.machine;
     if (drive->stage == STAGE_OPEN_LOOP && machine->L_d < machine->L_q / 3) {
         regulator_slow_down(&drive->regulator_config, pm_ratio(3 * machine->L_d, machine->L_q));
     }
-#endif
 }
 
 PM_RARE void drive_prepare(drive_t *drive)

@@ -59,27 +59,20 @@ bool follow_slow(follow_t *self, const pm_machine_t *machine, const follow_in_t 
     (void)pm_lp1(&self->across, in->v.q - pm_mul(reactance, in->i), K_MEAN);
     const pm_q_t psi = m->psi_m - pm_mul(m->L_q - m->L_d, in->i) / 2;
     self->emf = pm_mul(pm_abs(in->omega), pm_max(psi, pm_half(m->psi_m)));
-    if (PM_HAS(load_current)) {
-        self->turned = pm_min(self->turned + in->turn, self->least);
-    }
+    self->turned = pm_min(self->turned + in->turn, self->least);
     if (pm_half(self->emf) <= pm_mul(self->R_doubt, in->i) + in->v_dc / 512) {
         self->emf = 0;
         self->ms = 0;
-        if (PM_HAS(load_current)) {
-            self->follows_ms = 0;
-            self->follows = false;
-        }
+        self->follows_ms = 0;
+        self->follows = false;
         return false;
     }
     if (!is_seen(self, in->omega)) {
-        self->follows_ms = PM_HAS(load_current) ? 0U : self->follows_ms;
+        self->follows_ms = 0;
         self->ms = (uint16_t)pm_min(self->ms + 1, FOLLOW_STANDS_MS);
-        return self->ms == FOLLOW_STANDS_MS && (!PM_HAS(load_current) || self->turned >= self->least);
+        return self->ms == FOLLOW_STANDS_MS && self->turned >= self->least;
     }
     self->ms = (uint16_t)pm_max(self->ms - 2, 0);
-    if (!PM_HAS(load_current)) {
-        return false;
-    }
     self->turned = self->ms != 0U ? self->turned : 0;
     self->follows_ms = (uint8_t)pm_min(self->follows_ms + 1, FOLLOW_FOLLOWS_MS);
     self->follows = self->follows || self->follows_ms == FOLLOW_FOLLOWS_MS;

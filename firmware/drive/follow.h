@@ -26,18 +26,16 @@
 #include <stdint.h>
 
 #include "firmware/drive/slip.h"
-#include "firmware/math/image.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
 /* For how long it must stand, twice what spoke for a rotor that follows taken off, and how far the vector must turn meanwhile:
- * friction F holds a rotor for 2 asin(F / i), and one that did not move in the
- * align until the vector comes round. Images without load_current wait for a longer time alone. */
-#define FOLLOW_STANDS_MS (PM_HAS(load_current) ? 60 : 300)
+ * friction F holds a rotor for 2 asin(F / i), and one that did not move in the align until the vector comes round. */
+#define FOLLOW_STANDS_MS 60
 #define FOLLOW_TURN      65536
-#define FOLLOW_STANDS    (PM_HAS(load_current) ? FOLLOW_TURN / 3 : 0)
+#define FOLLOW_STANDS    (FOLLOW_TURN / 3)
 
 #define FOLLOW_FOLLOWS_MS 30
 #define FOLLOW_REST_MS    100U /* rest from which on R is taken from it */

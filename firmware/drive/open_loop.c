@@ -14,6 +14,8 @@
 #define PER_TURN (INT32_MAX / (FOLLOW_TURN / 2))
 /* With more current, before the vector turns once more. */
 #define REST_MS 100U
+/* Of the vector, 2 ms: a movement of its own shows in the next voltage, as up to three times what would move it so. */
+#define K_YIELD PM_FRAC(0.4)
 /* From the lead of an observer on: the voltage of a step of the current is not that of the rotor. */
 #define SETTLE_MS 5U
 
@@ -23,10 +25,8 @@ static void begin(drive_t *drive)
     drive->emf_open = 0;
     drive->agree_ms = 0;
     drive->wait_ms = 0;
-    if (PM_HAS(load_current)) {
-        drive->rest_ms = 0;
-        drive->tried = false;
-    }
+    drive->rest_ms = 0;
+    drive->tried = false;
 }
 
 void open_loop_start(drive_t *drive)
@@ -64,13 +64,13 @@ static pm_q_t unexplained(const drive_t *drive, pm_ab_t v, pm_dq_t i)
 void open_loop_resume(drive_t *drive)
 {
     const pm_dq_t i = drive->status.i;
-    const pm_dq_t vector = PM_HAS(load_current) ? with_margin(drive, i) : i;
+    const pm_dq_t vector = with_margin(drive, i);
     const pm_angle_t turn = pm_atan2(vector.q, vector.d);
     const pm_dir_t dir = pm_dir(turn);
     const pm_ab_t v = {.alpha = pm_narrow(drive->voltage.v.d), .beta = pm_narrow(drive->voltage.v.q)};
     const pm_ab_t present = {.alpha = i.d, .beta = i.q};
     drive->i_open = pm_hypot(vector.d, vector.q);
-    drive->i_vector = PM_HAS(load_current) ? drive->i_open : drive->config.open_loop.i;
+    drive->i_vector = drive->i_open;
     drive->theta_open = drive->position.pll.theta + turn;
     drive->omega_ramp = drive->position.pll.omega;
     drive->omega_open = drive->omega_ramp;
@@ -79,9 +79,7 @@ void open_loop_resume(drive_t *drive)
     follow_resume(&drive->follow);
     begin(drive);
     drive->i_ref = (pm_dq_t){.d = drive->i_open, .q = 0};
-    if (PM_HAS(load_current)) {
-        drive->rest_ms = SETTLE_MS;
-    }
+    drive->rest_ms = SETTLE_MS;
     drive->emf_open = unexplained(drive, v, i);
 }
 
@@ -103,7 +101,9 @@ static void hand_over(drive_t *drive)
 
 void open_loop_release(drive_t *drive)
 {
-    if (PM_HAS(load_current) && drive->follow.follows) {
+    /* not that of the vector: what damps the rotor's swings is as noisy as the voltage */
+    drive->position.pll.omega = drive->omega_ramp;
+    if (drive->follow.follows) {
         const position_config_t *c = &drive->config.position;
         position_turn(&drive->position, c, 0U - follow_lag(&drive->follow, drive->omega_ramp), drive->i_ab);
         position_set_resistance(&drive->position, c, drive->follow.R);
@@ -153,9 +153,14 @@ static pm_q_t emf_of_speed(const drive_t *drive)
     const pm_machine_t *m = &drive->config.machine;
     const follow_t *f = &drive->follow;
     const pm_q_t i = drive->status.i.d;
-    const pm_ab_t e = {.alpha = pm_narrow(drive->voltage.v.q) - pm_mul(drive->omega_open, pm_mul(m->L_d, i)),
+    /* What the vector moves by in a millisecond moves the current across the rotor, where it meets L_q of a rotor that does not lag
+     * and less of one that does. */
+    const pm_q_t L_across = m->L_d + (m->L_q - m->L_d) / 4;
+    const pm_q_t reactive = pm_mul(drive->omega_ramp, pm_mul(m->L_d, i)) +
+                            pm_mul(drive->omega_open - drive->omega_ramp, pm_mul(L_across, i));
+    const pm_ab_t e = {.alpha = pm_narrow(drive->voltage.v.q) - reactive,
                        .beta = pm_narrow(drive->voltage.v.d) - pm_mul(f->R, i)};
-    if (!PM_HAS(load_current) || !is_fast(drive) || !f->follows) {
+    if (!is_fast(drive) || !f->follows) {
         return e.alpha;
     }
     return pm_park(e, pm_dir(follow_lag(f, drive->omega_ramp))).d;
@@ -175,7 +180,9 @@ static void damp(drive_t *drive)
     const pm_q_t emf = emf_of_speed(drive) - pm_mul(drive->omega_ramp, c->machine.psi_m);
     const pm_q_t seen = steady + pm_clamp(emf - steady, -v, v);
     const pm_q_t swing = seen - pm_lp1(&drive->emf_open, seen, c->open_loop.k_swing);
-    drive->omega_open = drive->omega_ramp - pm_small_gain(pm_small(swing), c->open_loop.per_swing);
+    const pm_q_t yields = -pm_small_gain(pm_small(swing), c->open_loop.per_swing);
+    pm_q_t moves = drive->omega_open - drive->omega_ramp;
+    drive->omega_open = drive->omega_ramp + pm_lp1(&moves, yields, K_YIELD);
 }
 
 void open_loop_hold(drive_t *drive)
@@ -188,27 +195,17 @@ void open_loop_hold(drive_t *drive)
     damp(drive);
 }
 
-static pm_q_t most_imposed(const drive_config_t *c)
-{
-#if PM_HAS(load_current)
-    return c->open_loop.i_most;
-#else
-    return c->i_max;
-#endif
-}
-
 /* Once more from standstill, with the most current that saliency lets it. A vector that the user gave, or that a rotor had followed, is not
  * tried again. */
 static void try_again(drive_t *drive)
 {
-    const bool may =
-        PM_HAS(load_current) && drive->command.mode != DRIVE_MODE_CURRENT && !drive->follow.follows;
+    const bool may = drive->command.mode != DRIVE_MODE_CURRENT && !drive->follow.follows;
     if (!may || drive->tried) {
         drive_trip(drive, DRIVE_FAULT_STALL);
         return;
     }
     drive->tried = true;
-    drive->i_vector = most_imposed(&drive->config);
+    drive->i_vector = drive->config.open_loop.i_most;
     drive->omega_ramp = 0;
     drive->rest_ms = REST_MS;
     drive->wait_ms = 0;
@@ -231,9 +228,9 @@ static void watch(drive_t *drive)
         try_again(drive);
         return;
     }
-    const int32_t load = PM_HAS(load_current) ? follow_load(&drive->follow) : 0;
+    const int32_t load = follow_load(&drive->follow);
     if (load > 0) {
-        drive->i_vector = pm_min(drive->i_vector + c->open_loop.i_slope, most_imposed(c));
+        drive->i_vector = pm_min(drive->i_vector + c->open_loop.i_slope, c->open_loop.i_most);
     } else if (load < 0) {
         drive->i_vector = pm_max(drive->i_vector - c->open_loop.i_slope / 8, c->open_loop.i);
     } else {
@@ -260,7 +257,7 @@ static void hand_over_in_time(drive_t *drive)
 
 void open_loop_rested(drive_t *drive)
 {
-    if (!PM_HAS(load_current) || !is_mean(drive)) {
+    if (!is_mean(drive)) {
         return;
     }
     const drive_config_t *c = &drive->config;
@@ -270,7 +267,7 @@ void open_loop_rested(drive_t *drive)
 
 static bool settles(const drive_t *drive)
 {
-    return PM_HAS(load_current) && drive->rest_ms > 0U && drive->follow.follows;
+    return drive->rest_ms > 0U && drive->follow.follows;
 }
 
 void open_loop_slow(drive_t *drive)
@@ -280,7 +277,7 @@ void open_loop_slow(drive_t *drive)
         return;
     }
     open_loop_hold(drive);
-    if (PM_HAS(load_current) && drive->rest_ms > 0U) {
+    if (drive->rest_ms > 0U) {
         drive->rest_ms--;
     } else {
         drive->omega_ramp =

@@ -27,7 +27,6 @@
 #define PM_WITHOUT_pulse_choice 1
 #define PM_WITHOUT_counted_carrier 1
 #define PM_WITHOUT_carrier_rest 1
-#define PM_WITHOUT_load_current 1
 #define PM_WITHOUT_injection_stages 1
 #define PM_WITHOUT_back_emf 1
 #define PM_WITHOUT_extended_emf 1

@@ -5,7 +5,7 @@
 
 /* clang-format off */
 #define PM_IMAGE_NAME "small"
-#define PM_IMAGE_TRACE_NUMBERS 3584U
+#define PM_IMAGE_TRACE_NUMBERS 3576U
 #define PM_CHANNELS 0x0000U
 
 #define PM_WITHOUT_deadbeat 1
@@ -31,7 +31,6 @@
 #define PM_WITHOUT_pulse_choice 1
 #define PM_WITHOUT_counted_carrier 1
 #define PM_WITHOUT_carrier_rest 1
-#define PM_WITHOUT_load_current 1
 #define PM_WITHOUT_neutral 1
 #define PM_WITHOUT_injection_stages 1
 #define PM_WITHOUT_back_emf 1

@@ -21,10 +21,8 @@ pm_procedure_t procedure_align_slow(drive_t *drive)
     open_loop_hold(drive);
     if (2U * self->ms <= c->align_ms) {
         drive->theta_open += c->sweep;
-    } else if (PM_HAS(load_current)) {
-        follow_rest(&drive->follow, pm_narrow_sat(drive->voltage.v.d));
     } else {
-        /* the image keeps R_s */
+        follow_rest(&drive->follow, pm_narrow_sat(drive->voltage.v.d));
     }
     return PM_RUNNING;
 }

@@ -176,6 +176,26 @@ TEST(OpenLoop, VectorYieldsToASwingingRotor)
     EXPECT_GT(x.d.omega_open, x.d.omega_ramp);
 }
 
+// A movement of the vector alone moves the current across a rotor that stands still, by L_q: with (L_q - L_d) i of 4/9 psi_m, the most
+// that i_most lets, and L_q another 15 % larger, that must die out, where the vector once turned to and fro by 5 degrees in each millisecond.
+TEST(OpenLoop, VectorDoesNotYieldToItsOwnMovement)
+{
+    Drive x = started();
+    slow(x, kAlign_ms);
+    const pm_machine_t &m = x.d.config.machine;
+    const double i = kMost, R = real(x.d.follow.R);
+    x.d.i_open = x.d.i_vector = bench::fixed(i, 28);
+    x.d.status.i = bench::dq({i, 0});
+    x.d.omega_ramp = 0;
+    x.d.omega_open = PM_Q(0.02);
+    for (int ms = 0; ms < 120; ++ms) {
+        const double across = real(x.d.omega_open) * 1.15 * real(m.L_q) * i;
+        x.d.voltage.v = {bench::fixed(R * i, PM_WIDE_BITS), bench::fixed(across, PM_WIDE_BITS)};
+        open_loop_hold(&x.d);
+    }
+    EXPECT_NEAR(real(x.d.omega_open), 0, 1e-4);
+}
+
 TEST(OpenLoop, CurrentModeTakesTheCurrentAskedForUpToTheLimit)
 {
     for (const double asked : {0.05, -0.1, 2.0}) {
@@ -249,6 +269,24 @@ TEST(OpenLoop, HandOverKeepsCurrentAndVoltage)
             EXPECT_NEAR(real(x.d.i_open), left, kVector) << n;
             EXPECT_NEAR(real(next.d.i_ref.d - plain.d.i_ref.d), left * 15 / 16, kVector) << n;
         }
+    }
+}
+
+// What damps swings of the rotor follows each sample of the voltage: an observer that began at the speed of one was lost.
+TEST(OpenLoop, AnObserverBeginsAtTheSpeedOfTheRamp)
+{
+    for (const double sign : {1.0, -1.0}) {
+        Drive x = started();
+        x.d.omega_target = PM_Q(0.5 * sign);
+        slow_with(x, kAlign_ms, 0);
+        while (std::abs(x.d.omega_ramp) < x.d.config.position.omega_high) {
+            slow_with(x, 1);
+            x.d.omega_open = 3 * x.d.omega_ramp;
+            drive_prepare(&x.d);
+            EXPECT_EQ(x.d.forced, std::abs(x.d.omega_ramp) < x.d.config.position.omega_high);
+            EXPECT_EQ(x.d.position.pll.omega, x.d.forced ? x.d.omega_open : x.d.omega_ramp);
+        }
+        EXPECT_FALSE(x.d.forced);
     }
 }
 
