@@ -81,7 +81,7 @@ static void sum_rail(bridge_t *b, const winding_t *w)
     const double *first = w->side[0][upper & 7u], *second = w->side[1][upper >> 3];
     double rail[OF_ALIKE];
     for (int a = 0; a < OF_ALIKE; a++) {
-        rail[a] = first[a] + second[a];
+        rail[a] = b->legs > 3 ? first[a] + second[a] : first[a];
     }
     memcpy(b->rail, rail, sizeof rail);
 }
@@ -93,7 +93,8 @@ static void sum_diodes(bridge_t *b, const winding_t *w)
     const double *low_1[] = {w->side[0][low & 7u], w->side[1][low >> 3]};
     double diode_V[OF_ALIKE];
     for (int a = 0; a < OF_ALIKE; a++) {
-        diode_V[a] = b->v_diode_V * (high_1[0][a] - low_1[0][a] + (high_1[1][a] - low_1[1][a]));
+        double first = high_1[0][a] - low_1[0][a];
+        diode_V[a] = b->v_diode_V * (b->legs > 3 ? first + (high_1[1][a] - low_1[1][a]) : first);
     }
     memcpy(b->diode_V, diode_V, sizeof diode_V);
 }

@@ -134,6 +134,7 @@ void circuit_init(circuit_t *c, const plant_config_t *config, double theta_e_rad
     mechanics_init(&c->mech, &config->mech);
     probe_init(&c->probe, &config->sensor, c->machine.winding.legs, c->machine.winding.sets);
     lags_init(&c->lags, &config->sensor, c->machine.winding.legs);
+    c->probing = probe_active(&c->probe) || lags_active(&c->lags);
     c->inv_i_scale_1_A = 1.0 / config->sensor.i_full_scale_A;
     double weak_Wb = 0.1 * config->machine.L_d0_H * config->sensor.i_full_scale_A;
     c->inv_u_scale = config->map != NULL ? c->inv_i_scale_1_A : 1.0 / fmax(config->machine.psi_m_Wb, weak_Wb);

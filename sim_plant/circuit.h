@@ -66,6 +66,7 @@ typedef struct {
     mechanics_t mech;
     probe_t probe;
     lags_t lags;
+    bool probing; /* one of these has a memory */
     point_t now;
     point_t next;  /* the end of a step, until that is taken */
     field_t field; /* of the present point, when a symmetrical machine knows it */
@@ -105,7 +106,13 @@ void circuit_switch(circuit_t *circuit, const gates_t *gates, unsigned legs);
 /* The same within_s ahead of that change, if nothing shows it: legs pass between a diode and the switch
  * across it, with the same drop, and their currents cannot come near zero until then. False: nothing was
  * done. */
-bool circuit_switch_early(circuit_t *circuit, const gates_t *gates, unsigned legs, double within_s);
+bool circuit_hand_over(circuit_t *circuit, const gates_t *gates, unsigned legs, double within_s);
+static inline bool circuit_switch_early(circuit_t *c, const gates_t *gates, unsigned legs, double within_s)
+{
+    const bridge_t *b = &c->bridge;
+    return b->v_diode_V == b->v_switch_V && (b->floating | b->swinging) == 0u &&
+           circuit_hand_over(c, gates, legs, within_s);
+}
 void circuit_wire(circuit_t *circuit, int leg, bool off);
 void circuit_short(circuit_t *circuit, int leg_a, int leg_b, double R_ohm);
 void circuit_sources(circuit_t *circuit, const double v_leg_V[]);
@@ -115,8 +122,8 @@ double circuit_advance(circuit_t *circuit, double duration_s);
 static inline double circuit_leg_A(const circuit_t *c, const point_t *p, int k)
 {
     const winding_t *w = &c->machine.winding;
-    double i_A = 0.0;
-    for (int a = 0; a < w->active; a++) {
+    double i_A = w->axis[k][0] * p->i_A[0] + w->axis[k][1] * p->i_A[1];
+    for (int a = 2; a < w->active; a++) {
         i_A += w->axis[k][a] * p->i_A[a];
     }
     return i_A;

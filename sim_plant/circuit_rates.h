@@ -38,8 +38,21 @@ void circuit_currents(const circuit_t *circuit, point_t *point);
 void circuit_take_state(circuit_t *circuit, const machine_state_t *state, const machine_point_t *machine);
 
 /* Energy of a leg's output capacitance at a voltage, and the voltage that it has. */
-double circuit_capacitor_J(const circuit_t *circuit, double v_V);
-double circuit_output_V(const circuit_t *circuit, int k);
+static inline double circuit_capacitor_J(const circuit_t *c, double v_V)
+{
+    return 0.5 * c->bridge.c_leg_F * v_V * v_V;
+}
+
+static inline double circuit_output_V(const circuit_t *c, int k)
+{
+    const bridge_t *b = &c->bridge;
+    if (b->leg[k] == LEG_SWINGING) {
+        return c->now.x[V_LEG(k)];
+    }
+    double tied_V = b->upper[k] * c->now.x[V_DC];
+    return bridge_is_diode(b, k) ? tied_V + (b->leg[k] == LEG_DIODE_HIGH ? b->v_diode_V : -b->v_diode_V)
+                                 : tied_V;
+}
 
 /* What follows from the legs; moves the windings onto zero current of the floating ones; after a jump of the
  * currents: the diodes that they now flow through. */

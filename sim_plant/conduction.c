@@ -78,7 +78,7 @@ void circuit_switch(circuit_t *c, const gates_t *gates, unsigned legs)
         }
     }
     circuit_summarise(c);
-    c->in_blocks = gates_in_blocks(gates);
+    c->in_blocks = gates->in_blocks;
 }
 
 static bool low_side(leg_t leg)
@@ -104,7 +104,7 @@ static bool keeps_rail(const circuit_t *c, int k, gate_t gate, double least_A)
 }
 
 /* Leg k passes between a switch and the diode across it. */
-static void hand_over(circuit_t *c, int k, leg_t leg)
+static void pass_over(circuit_t *c, int k, leg_t leg)
 {
     if (c->bridge.c_leg_F > 0.0 && c->bridge.v_diode_V != 0.0) {
         set_leg(c, k, leg);
@@ -113,12 +113,9 @@ static void hand_over(circuit_t *c, int k, leg_t leg)
     }
 }
 
-bool circuit_switch_early(circuit_t *c, const gates_t *gates, unsigned legs, double within_s)
+bool circuit_hand_over(circuit_t *c, const gates_t *gates, unsigned legs, double within_s)
 {
     bridge_t *b = &c->bridge;
-    if (b->v_diode_V != b->v_switch_V || (b->floating | b->swinging) != 0u) {
-        return false;
-    }
     double slope_A_s = SLOPE_MARGIN * c->machine.gamma_leg_1_H * fabs(c->now.x[V_DC]);
     double least_A = 2.0 * b->zone_A + slope_A_s * within_s;
     for (unsigned rest = legs; rest != 0u; rest &= rest - 1u) {
@@ -130,9 +127,9 @@ bool circuit_switch_early(circuit_t *c, const gates_t *gates, unsigned legs, dou
         int k = bridge_first(legs);
         bool low = low_side(b->leg[k]);
         if (gates_conducting(gates, k) == GATE_OFF) {
-            hand_over(c, k, low ? LEG_DIODE_LOW : LEG_DIODE_HIGH);
+            pass_over(c, k, low ? LEG_DIODE_LOW : LEG_DIODE_HIGH);
         } else {
-            hand_over(c, k, low ? LEG_LOW : LEG_HIGH);
+            pass_over(c, k, low ? LEG_LOW : LEG_HIGH);
         }
     }
     bridge_sum(b, &c->machine.winding);

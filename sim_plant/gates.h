@@ -29,6 +29,22 @@
 typedef enum { GATE_OFF, GATE_LOW, GATE_HIGH, GATE_BOTH } gate_t;
 
 typedef struct {
+    bool driven, to_drive;
+    plant_leg_state_t state, to_state;
+    double rise_s, fall_s; /* command edges of this period */
+    gate_t command;        /* before dead time */
+    gate_t last;           /* the last command that was not off, */
+    double clear_s;        /* and when the other switch was off for the dead time */
+    gate_t gate;           /* of healthy switches */
+    bool opening;          /* the conducting switch opens at off_s */
+    double off_s;
+    double on_s;                /* the commanded one closes, when gate != command */
+    double charge, charge_at_s; /* of the upper switch's capacitor, and when */
+    double next_s;              /* nothing happens to the leg before */
+    plant_leg_fault_t fault;
+} gates_leg_t;
+
+typedef struct {
     double period_s;
     double closing_s; /* dead time and turn-on delay */
     double turn_on_s;
@@ -39,23 +55,10 @@ typedef struct {
     int legs;
     double edge_s;  /* the last change of any gate */
     bool commanded; /* the last update, or gates_off(), had a command edge, those to and from off included */
-    double drive_s; /* when `driven` becomes `to_drive`, `state` `to_state` */
+    bool in_blocks; /* some legs are driven and others not, or one switch alone is: block commutation */
+    double drive_s; /* when `driven` becomes `to_drive`, `state` `to_state`; infinite once they have */
     double next_s;  /* nothing happens to any leg between the last update and this */
-    struct {
-        bool driven, to_drive;
-        plant_leg_state_t state, to_state;
-        double rise_s, fall_s; /* command edges of this period */
-        gate_t command;        /* before dead time */
-        gate_t last;           /* the last command that was not off, */
-        double clear_s;        /* and when the other switch was off for the dead time */
-        gate_t gate;           /* of healthy switches */
-        bool opening;          /* the conducting switch opens at off_s */
-        double off_s;
-        double on_s;                /* the commanded one closes, when gate != command */
-        double charge, charge_at_s; /* of the upper switch's capacitor, and when */
-        double next_s;              /* nothing happens to the leg before */
-        plant_leg_fault_t fault;
-    } leg[PLANT_LEGS];
+    gates_leg_t leg[PLANT_LEGS];
 } gates_t;
 
 void gates_init(gates_t *gates, const plant_inverter_t *inverter, int legs);
@@ -78,9 +81,6 @@ static inline gate_t gates_conducting(const gates_t *gates, int k)
 {
     return gates->leg[k].fault == PLANT_HEALTHY ? gates->leg[k].gate : gates_faulty(gates, k);
 }
-
-/* Whether some legs are driven and others not, or one switch alone is: block commutation. */
-bool gates_in_blocks(const gates_t *gates);
 
 /* The next instant after t at which gates_update() has something to do; T when nothing is left. */
 double gates_search_s(const gates_t *gates, double t_s);

@@ -127,24 +127,6 @@ void circuit_nodes_of(const circuit_t *c, const machine_state_t *state, const ma
     }
 }
 
-double circuit_capacitor_J(const circuit_t *c, double v_V)
-{
-    return 0.5 * c->bridge.c_leg_F * v_V * v_V;
-}
-
-/* Voltage of an output capacitance */
-double circuit_output_V(const circuit_t *c, int k)
-{
-    const bridge_t *b = &c->bridge;
-    double v_dc_V = c->now.x[V_DC];
-    if (b->leg[k] == LEG_SWINGING) {
-        return c->now.x[V_LEG(k)];
-    }
-    double diode_V =
-        b->leg[k] == LEG_DIODE_HIGH ? b->v_diode_V : (b->leg[k] == LEG_DIODE_LOW ? -b->v_diode_V : 0.0);
-    return b->upper[k] * v_dc_V + diode_V;
-}
-
 double circuit_field_of_J(const circuit_t *c, const machine_state_t *state, const machine_point_t *machine)
 {
     double energy_J = machine_energy_J(&c->machine, state, machine);

@@ -62,7 +62,9 @@ void probe_start_period(probe_t *probe, double period_s);
 /* A leg's commanded edge, ahead of the step that contains it. */
 static inline void probe_command_edge(probe_t *probe, double at_s)
 {
-    blanking_edge(&probe->blanking, at_s);
+    if (probe->blanking.length_s > 0.0) {
+        blanking_edge(&probe->blanking, at_s);
+    }
 }
 
 /* One step, from start_s after the start of the period, with the voltages of all PROBE_CHANNELS at its ends.

@@ -56,7 +56,7 @@ double steps_locate(const circuit_t *circuit, double h_late, steps_retake_t *ret
 /* Whether a board measures what has a memory. */
 static inline bool steps_probing(const circuit_t *c)
 {
-    return probe_active(&c->probe) || lags_active(&c->lags);
+    return c->probing;
 }
 
 /* Its channels, comparators and amplifiers over a step to that point. */
