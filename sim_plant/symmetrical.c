@@ -22,15 +22,16 @@
 /* Of d, where all is smooth: about what the embedded solution of a Runge-Kutta pair of this order misses. */
 #define PART 0.125
 
-INLINE double error_norm(const circuit_t *c, const rates_t *miss, shape_t shape, bool swings)
+/* motion_V: what of the miss is error, of speed and link */
+INLINE double error_norm(const circuit_t *c, const rates_t *miss, pair_t motion, shape_t shape, bool swings)
 {
-    double worst = fabs(miss->follow[MOTION][0]) / (fabs(c->now.x[OMEGA_MECH]) + 1.0);
-    double u = 0.0, v = fabs(miss->follow[MOTION][1]);
+    double worst = fabs(motion[0]) / (fabs(c->now.x[OMEGA_MECH]) + 1.0);
+    double u = 0.0, v = fabs(motion[1]);
     for (int set = 0; set < shape.sets; set++) {
         u = larger(u, larger(fabs(miss->flux_V[set][0]), fabs(miss->flux_V[set][1])));
     }
-    for (unsigned legs = c->bridge.swinging; swings && legs != 0u; legs &= legs - 1u) {
-        v = larger(v, fabs(miss->leg_V_s[bridge_first(legs)]));
+    for (int k = 0; swings && k < shape.legs; k++) {
+        v = larger(v, fabs(miss->leg_V_s[k / 3][k % 3]));
     }
     if (pairs(shape) > shape.sets) {
         worst = larger(worst, fabs(miss->flux_V[shape.sets][0]) * c->inv_i_scale_1_A);
@@ -50,10 +51,12 @@ INLINE void predict(const circuit_t *c, const start_t *s, double h, shape_t shap
     }
     if (swings) {
         swing_t moved;
-        swing_at(c, s, h, shape, &moved, rate);
-        for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
-            int k = bridge_first(legs);
-            x[V_LEG(k)] = c->now.x[V_LEG(k)] + h * moved.leg[k];
+        swing_at(s, h, shape, &moved, rate);
+        for (int g = 0; g < groups(shape); g++) {
+            trio_t v_V;
+            terminals_at(c->now.x, g, &v_V);
+            v_V += h * moved.leg[g];
+            terminals_put(x, g, &v_V);
         }
         pair_put(&x[FOLLOWER(VOLTS)], pair_at(&c->now.x[FOLLOWER(VOLTS)]) + both(h) * moved.volts);
         for (int p = 0; p < pairs(shape); p++) {
@@ -89,51 +92,53 @@ INLINE void find_miss(const circuit_t *c, const start_t *s, double h, const rate
 INLINE void rates_between(const circuit_t *c, const start_t *s, double h, shape_t shape, rates_t *rate)
 {
     double x[ELEMENTS];
-    field_t f = c->field;
+    field_t f;
     swing_t end;
     tied_t tied = s->tied;
     rotor_t rotor = frame_turn(c->now.rotor, h * (s->omega_e + 0.5 * h * s->omega_e_s));
     predict(c, s, h, shape, true, x, &f, &end);
     field_at(&c->machine, rotor, shape, &f);
-    rates_at(c, rotor, &f, x, shape, true, false, s->steady, &tied, rate);
+    rates_at(c, rotor, &f, x, shape, s->swings, false, s->steady, &tied, rate);
 }
 
 /* The same where terminals swing, of whose series these are the rates at the end: nearly all of the third
- * derivative is in it. Over a long step what follows takes Simpson's rule, with the rates in its middle. */
-INLINE void find_swing_miss(const circuit_t *c, const start_t *s, double h, const swing_t *rate,
-                            const rates_t *end, shape_t shape, rates_t *miss, rates_t *error)
+ * derivative is in it. Over a long step what follows takes Simpson's rule, with the rates in its middle.
+ * Returns what of the miss of speed and link is error. */
+INLINE pair_t find_swing_miss(const circuit_t *c, const start_t *s, double h, const swing_t *rate,
+                              const rates_t *end, shape_t shape, rates_t *miss)
 {
     const double fourth = 0.25 * h;
     find_miss(c, s, h, end, shape, false, miss);
     for (int p = 0; p < pairs(shape); p++) {
         miss->flux_V[p] = both(fourth) * (end->flux_V[p] - rate->flux[p]);
     }
-    for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
-        int k = bridge_first(legs);
-        miss->leg_V_s[k] = fourth * (end->leg_V_s[k] - rate->leg[k]);
+    for (int g = 0; g < groups(shape); g++) {
+        miss->leg_V_s[g] = fourth * (end->leg_V_s[g] - rate->leg[g]);
     }
     miss->follow[VOLTS] = both(fourth) * (end->follow[VOLTS] - rate->volts);
-    *error = *miss;
+    pair_t motion = miss->follow[MOTION];
     if (s->order == SWING_BRIEF) {
-        return;
+        return motion;
     }
     rates_t between;
     rates_between(c, s, 0.5 * h, shape, &between);
     for (int n = 0; n < VOLTS; n++) {
         pair_t mean = (s->rate.follow[n] + both(4.0) * between.follow[n] + end->follow[n]) * both(1.0 / 6.0);
         miss->follow[n] = both(h) * (mean - s->rate.follow[n] - both(0.5 * h) * s->bend.follow[n]);
-        error->follow[n] = miss->follow[n] - error->follow[n];
     }
+    return miss->follow[MOTION] - motion;
 }
 
-INLINE void add_miss(const circuit_t *c, const rates_t *miss, bool swings, double x[])
+INLINE void add_miss(const rates_t *miss, shape_t shape, bool swings, double x[])
 {
     for (int n = 0; n < FOLLOWERS; n++) {
         pair_put(&x[FOLLOWER(n)], pair_at(&x[FOLLOWER(n)]) + miss->follow[n]);
     }
-    for (unsigned legs = c->bridge.swinging; swings && legs != 0u; legs &= legs - 1u) {
-        int k = bridge_first(legs);
-        x[V_LEG(k)] += miss->leg_V_s[k];
+    for (int g = 0; swings && g < groups(shape); g++) {
+        trio_t v_V;
+        terminals_at(x, g, &v_V);
+        v_V += miss->leg_V_s[g];
+        terminals_put(x, g, &v_V);
     }
 }
 
@@ -154,7 +159,8 @@ INLINE void open_volts(const circuit_t *c, const start_t *s, double h, const fie
 INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape, bool swings, bool floats,
                    point_t *to, field_t *f)
 {
-    rates_t end, miss, wrong;
+    rates_t end = {.leg_V_s = {{0.0}}}, miss;
+    pair_t motion;
     swing_t swing;
     tied_t tied;
     double turn = h * (s->omega_e + 0.5 * h * (s->omega_e_s + h / 3.0 * s->omega_e_s2));
@@ -163,9 +169,9 @@ INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape
     for (int p = 0; p < pairs(shape); p++) {
         tied.switch_V[p] = s->tied.switch_V[p];
     }
-    for (int k = 0; k < shape.legs; k++) { /* for drop_part() */
-        tied.zones[k] = steady ? 0.0 : s->tied.zones[k];
-        tied.share[k] = steady ? 0.0 : s->tied.share[k];
+    for (int g = 0; g < groups(shape); g++) { /* for drop_part() */
+        tied.zones[g] = s->tied.zones[g];
+        tied.share[g] = s->tied.share[g];
     }
     to->rotor = frame_turn(c->now.rotor, turn);
     predict(c, s, h, shape, swings, to->x, f, &swing);
@@ -173,13 +179,14 @@ INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape
     if (floats) {
         two_phase_release(c, to->rotor, f);
     }
-    rates_at(c, to->rotor, f, to->x, shape, swings, floats, steady, &tied, &end);
+    rates_at(c, to->rotor, f, to->x, shape, swings ? s->swings : NULL, floats, steady, &tied, &end);
     if (swings) {
-        find_swing_miss(c, s, h, &swing, &end, shape, &miss, &wrong);
+        motion = find_swing_miss(c, s, h, &swing, &end, shape, &miss);
     } else {
         find_miss(c, s, h, &end, shape, floats, &miss);
+        motion = miss.follow[MOTION];
     }
-    add_miss(c, &miss, swings, to->x);
+    add_miss(&miss, shape, swings, to->x);
     to->x[THETA_E] = c->now.x[THETA_E] + turn;
     field_shift(&c->machine, to->rotor, shape, miss.flux_V, f);
     if (floats) {
@@ -194,25 +201,37 @@ INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape
     }
     to->torque_Nm = f->torque_Nm;
     part = steady ? part : drop_part(&s->tied, &tied, shape, part);
-    return part * error_norm(c, swings ? &wrong : &miss, shape, swings);
+    return part * error_norm(c, &miss, motion, shape, swings);
 }
 
-static void retake(const circuit_t *c, const void *start, double h, point_t *to)
+/* Compiled once more for processors with wider vectors: the same bits, as no product is contracted with a
+ * sum. */
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && !defined(__clang__) &&         \
+    !defined(__SANITIZE_ADDRESS__)
+#define WIDER __attribute__((target_clones("default", "avx2")))
+#else
+#define WIDER
+#endif
+
+/* The same for any shape, where a step is taken again: take_steps() has one call of step(), compiled into it. */
+WIDER static double step_again(const circuit_t *c, const start_t *s, double h, point_t *to, field_t *f)
 {
-    field_t f = c->field;
     bool swings = c->bridge.swinging != 0u;
     *to = c->now;
     switch (c->machine.winding.active) {
     case 2:
-        step(c, start, h, STAR, swings, c->bridge.floating != 0u, to, &f);
-        break;
+        return step(c, s, h, STAR, swings, c->bridge.floating != 0u, to, f);
     case 3:
-        step(c, start, h, OPEN, swings, false, to, &f);
-        break;
+        return step(c, s, h, OPEN, swings, false, to, f);
     default:
-        step(c, start, h, DOUBLE, swings, false, to, &f);
-        break;
+        return step(c, s, h, DOUBLE, swings, false, to, f);
     }
+}
+
+static void retake(const circuit_t *c, const void *start, double h, point_t *to)
+{
+    field_t f;
+    step_again(c, start, h, to, &f);
 }
 
 /* What the error of a step says about the next. */
@@ -237,8 +256,7 @@ INLINE void arrive(circuit_t *c, const point_t *to, shape_t shape, bool swings)
     for (int n = 0; n < FOLLOWERS; n++) {
         pair_put(&c->now.x[FOLLOWER(n)], pair_at(&to->x[FOLLOWER(n)]));
     }
-    for (unsigned legs = c->bridge.swinging; swings && legs != 0u; legs &= legs - 1u) {
-        int k = bridge_first(legs);
+    for (int k = 0; swings && k < shape.legs; k++) {
         c->now.x[V_LEG(k)] = to->x[V_LEG(k)];
     }
     for (int p = 0; p < pairs(shape); p++) {
@@ -267,18 +285,16 @@ INLINE double take_steps(circuit_t *c, double left_s, shape_t shape, bool swings
         bool smooth = zone == h;
         h = zone;
         h = h > 0.999 * left_s ? left_s : h; /* no sliver at the end */
-        bool again = true, located = false;
-        while (again) { /* one call of step(), which is compiled into it */
-            double error = step(c, &start, h, shape, swings, floats, to, &c->field);
-            again = !located && !(error <= 1.0) && h > 1e-9 * left_s; /* NaN too */
-            if (again) {
-                h = steps_shorter_s(h, error);
-                c->step_s = swings || !smooth ? c->step_s : h;
-            } else if (!located) {
-                control(c, h, error, swings);
-                again = located = steps_watching(c, to) && past_event(c, to, event);
-                h = located ? steps_locate(c, h, retake, &start, to) : h;
-            }
+        double error = step(c, &start, h, shape, swings, floats, to, &c->field);
+        while (!(error <= 1.0) && h > 1e-9 * left_s) { /* NaN too */
+            h = steps_shorter_s(h, error);
+            c->step_s = swings || !smooth ? c->step_s : h;
+            error = step_again(c, &start, h, to, &c->field);
+        }
+        control(c, h, error, swings);
+        if (steps_watching(c, to) && past_event(c, to, event)) {
+            h = steps_locate(c, h, retake, &start, to);
+            step_again(c, &start, h, to, &c->field);
         }
         if (steps_probing(c)) {
             steps_probe(c, to, h);
@@ -289,15 +305,6 @@ INLINE double take_steps(circuit_t *c, double left_s, shape_t shape, bool swings
     }
     return left_s;
 }
-
-/* Compiled once more for processors with wider vectors: the same bits, as no product is contracted with a
- * sum. */
-#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && !defined(__clang__) &&         \
-    !defined(__SANITIZE_ADDRESS__)
-#define WIDER __attribute__((target_clones("default", "avx2")))
-#else
-#define WIDER
-#endif
 
 WIDER double steps_symmetrical(circuit_t *c, double left_s, bool *event)
 {
@@ -324,8 +331,10 @@ INLINE void current_rates(const circuit_t *c, shape_t shape, double i_A_s[ACTIVE
     pair_t core_V[PLANT_SETS], moved_A_s[PAIRS];
     tied_t tied;
     double omega_e = c->machine.pole_pairs * c->now.x[OMEGA_MECH];
+    trio_t swings[PLANT_SETS];
     no_drops(shape, &tied);
-    rates_at(c, c->now.rotor, &c->field, c->now.x, shape, true, false, c->bridge.v_switch_V == 0.0, &tied,
+    find_swinging(&c->bridge, shape, swings);
+    rates_at(c, c->now.rotor, &c->field, c->now.x, shape, swings, false, c->bridge.v_switch_V == 0.0, &tied,
              &rate);
     field_rates(&c->machine, c->now.rotor, omega_e, shape, &c->field, rate.flux_V, core_V, moved_A_s);
     for (int p = 0; p < pairs(shape); p++) {

@@ -23,8 +23,8 @@
 INLINE double drop_part(const tied_t *from, const tied_t *to, shape_t shape, double part)
 {
     for (int k = 0; k < shape.legs; k++) {
-        if (from->share[k] != to->share[k]) {
-            double most = larger(fabs(from->zones[k]), fabs(to->zones[k]));
+        if (from->share[k / 3][k % 3] != to->share[k / 3][k % 3]) {
+            double most = larger(fabs(from->zones[k / 3][k % 3]), fabs(to->zones[k / 3][k % 3]));
             part = larger(part, most > 1.0 + ZONE_EDGE ? KINK : TURNING);
         }
     }
@@ -52,21 +52,37 @@ INLINE double turn_s(const circuit_t *c, double x, double speed, double h)
     return h;
 }
 
+/* Whether the drops of all closed switches are constant for so long; how fast their currents move, in units of
+ * the zone. */
+INLINE bool all_far(const circuit_t *c, shape_t shape, const start_t *s, double h, trio_t speed[])
+{
+    trio_mask_t near = {0};
+    for (int g = 0; g < groups(shape); g++) {
+        trio_t switched, x = s->tied.zones[g], end;
+        legs_at(c->bridge.inv_zone_1_A, g, &switched);
+        along_group(&c->machine.winding, shape, g, s->i_A_s, &speed[g]);
+        speed[g] *= switched;
+        end = x + speed[g] * h;
+        trio_mask_t above = (x > ZONE_FAR) & (end > ZONE_FAR), below = (x < -ZONE_FAR) & (end < -ZONE_FAR);
+        near |= ~(above | below) & (switched != 0.0);
+    }
+    return !trio_any(&near);
+}
+
 /* Steps end where the drop of a closed switch begins or ceases to turn over, and while it does are as long as
  * the error of that allows. */
 INLINE double zone_s(const circuit_t *c, start_t *s, shape_t shape, double h)
 {
     const bridge_t *b = &c->bridge;
-    s->steady = true;
-    for (int k = 0; k < shape.legs && b->v_switch_V != 0.0; k++) {
-        double x = s->tied.zones[k];
-        double speed = along(&c->machine.winding, shape, k, s->i_A_s) * b->inv_zone_1_A[k];
+    trio_t speeds[PLANT_SETS];
+    s->steady = b->v_switch_V == 0.0 || all_far(c, shape, s, h, speeds);
+    for (int k = 0; k < shape.legs && !s->steady; k++) {
+        double x = s->tied.zones[k / 3][k % 3], speed = speeds[k / 3][k % 3];
         double end = x + speed * h;
         if (b->inv_zone_1_A[k] == 0.0 || (x > ZONE_FAR && end > ZONE_FAR) ||
             (x < -ZONE_FAR && end < -ZONE_FAR)) {
             continue;
         }
-        s->steady = false;
         if (!(x >= 1.0 && end >= 1.0) && !(x <= -1.0 && end <= -1.0)) {
             h = turn_s(c, x, speed, h);
         }

@@ -19,24 +19,23 @@ enum { MOTION, POWER, LOSS, VOLTS, FOLLOWERS };
 /* Of the legs at a point */
 typedef struct {
     pair_t v_V[PAIRS], drop_V[PAIRS];
-    pair_t switch_V[PAIRS];     /* drops of closed switches, when there are any: */
-    double zones[PLANT_LEGS];   /* their currents in units of the zone, */
-    double share[PLANT_LEGS];   /* and shares of the drop */
-    bool turning;               /* some are within the zone */
-    double i_leg_A[PLANT_LEGS]; /* of swinging legs */
+    pair_t switch_V[PAIRS];   /* drops of closed switches, when there are any: */
+    trio_t zones[PLANT_SETS]; /* their currents in units of the zone, */
+    trio_t share[PLANT_SETS]; /* and shares of the drop */
+    bool turning;             /* some are within the zone */
     double i_dc_A;
 } tied_t;
 
 typedef struct {
     pair_t flux_V[PAIRS]; /* of the field's flux, */
     pair_t follow[FOLLOWERS];
-    double leg_V_s[PLANT_LEGS]; /* and of swinging terminals */
+    trio_t leg_V_s[PLANT_SETS]; /* and of swinging terminals */
 } rates_t;
 
 /* A derivative of what takes part in the swing of terminals with the windings. */
 typedef struct {
     pair_t flux[PAIRS], volts; /* of the field's flux, and of the integral of the voltage */
-    double leg[PLANT_LEGS];
+    trio_t leg[PLANT_SETS];
 } swing_t;
 
 #define SWING_ORDER      9         /* of their series, at most, */
@@ -52,35 +51,82 @@ typedef struct {
     pair_t core_V[PLANT_SETS], i_A_s[PAIRS];
     swing_t swing[SWING_ORDER + 1]; /* by order, from the first */
     tied_t tied;
-    pair_t slope_Wb, bend_Wb; /* of the magnet's harmonics, where legs float */
-    int order;                /* of the last of the swing */
-    bool steady;              /* no drop turns over in the step */
+    trio_t swings[PLANT_SETS]; /* 1: the leg does */
+    pair_t slope_Wb, bend_Wb;  /* of the magnet's harmonics, where legs float */
+    int order;                 /* of the last of the swing */
+    bool steady;               /* no drop turns over in the step */
 } start_t;
 
-/* Coordinates that leg k has a part in: of two stars those of its own set. */
-INLINE int leg_first(shape_t shape, int k)
+/* Legs are taken by threes. Coordinates that those of group g have a part in: of two stars their own set. */
+INLINE int groups(shape_t shape)
 {
-    return shape.sets > 1 && k >= 3 ? 1 : 0;
+    return shape.legs / 3;
 }
 
-INLINE int leg_end(shape_t shape, int k)
+INLINE int group_first(shape_t shape, int g)
 {
-    return shape.sets > 1 ? leg_first(shape, k) + 1 : pairs(shape);
+    return shape.sets > 1 ? g : 0;
+}
+
+INLINE int group_end(shape_t shape, int g)
+{
+    return shape.sets > 1 ? g + 1 : pairs(shape);
 }
 
 INLINE double along(const winding_t *w, shape_t shape, int k, const pair_t x[])
 {
     pair_t sum = {0.0};
-    for (int p = leg_first(shape, k); p < leg_end(shape, k); p++) {
+    for (int p = group_first(shape, k / 3); p < group_end(shape, k / 3); p++) {
         sum += pair_at(&w->axis[k][2 * p]) * x[p];
     }
     return total(sum);
 }
 
-INLINE void spread(const winding_t *w, shape_t shape, int k, double v_V, pair_t to_V[])
+/* The same of a group. */
+INLINE void along_group(const winding_t *w, shape_t shape, int g, const pair_t x[], trio_t *to)
 {
-    for (int p = leg_first(shape, k); p < leg_end(shape, k); p++) {
-        to_V[p] += pair_at(&w->share[k][2 * p]) * both(v_V);
+    trio_t first = {0.0}, second = {0.0}, axis;
+    for (int p = group_first(shape, g); p < group_end(shape, g); p++) {
+        memcpy(&axis, w->by_leg[g][2 * p], sizeof axis);
+        first += axis * x[p][0];
+        memcpy(&axis, w->by_leg[g][2 * p + 1], sizeof axis);
+        second += axis * x[p][1];
+    }
+    *to = first + second;
+}
+
+INLINE void spread_group(const winding_t *w, shape_t shape, int g, const trio_t *v_V, pair_t to_V[])
+{
+    for (int p = group_first(shape, g); p < group_end(shape, g); p++) {
+        for (int n = 0; n < 3; n++) {
+            to_V[p] += pair_at(&w->share[3 * g + n][2 * p]) * both((*v_V)[n]);
+        }
+    }
+}
+
+/* Of each leg of a group */
+INLINE void legs_at(const double x[], int g, trio_t *to)
+{
+    *to = (trio_t){x[3 * g], x[3 * g + 1], x[3 * g + 2], 0.0};
+}
+
+INLINE void terminals_at(const double x[], int g, trio_t *to)
+{
+    *to = (trio_t){x[V_LEG(3 * g)], x[V_LEG(3 * g + 1)], x[V_LEG(3 * g + 2)], 0.0};
+}
+
+INLINE void terminals_put(double x[], int g, const trio_t *from)
+{
+    for (int n = 0; n < 3; n++) {
+        x[V_LEG(3 * g + n)] = (*from)[n];
+    }
+}
+
+INLINE void find_swinging(const bridge_t *b, shape_t shape, trio_t swinging[])
+{
+    for (int g = 0; g < groups(shape); g++) {
+        unsigned legs = b->swinging >> (3 * g);
+        swinging[g] = (trio_t){legs & 1u, legs >> 1 & 1u, legs >> 2 & 1u, 0.0};
     }
 }
 
@@ -98,29 +144,51 @@ INLINE void no_drops(shape_t shape, tied_t *t)
     }
 }
 
+/* bridge_switch_share() of each leg, and whether one that switches is within the zone */
+INLINE bool switch_share(const trio_t *zone, const trio_t *switched, trio_t *share)
+{
+    const trio_t one = {1.0, 1.0, 1.0, 1.0}, minus = -one;
+    trio_mask_t above = *zone > one, below = *zone < minus;
+    trio_mask_t within = (*zone > minus) & (*zone < one) & (*switched != 0.0);
+    trio_t x;
+    trio_pick(&above, &one, zone, &x);
+    trio_pick(&below, &minus, &x, &x);
+    *share = x * (1.5 - 0.5 * x * x);
+    return trio_any(&within);
+}
+
 /* Drops of closed switches, which have one */
 INLINE void find_drops(const circuit_t *c, const field_t *f, shape_t shape, tied_t *t)
 {
     const bridge_t *b = &c->bridge;
     const winding_t *w = &c->machine.winding;
     no_drops(shape, t);
-    for (int k = 0; k < shape.legs; k++) {
-        t->zones[k] = along(w, shape, k, f->i_A) * b->inv_zone_1_A[k];
-        t->share[k] = bridge_switch_share(t->zones[k]);
-        t->turning = t->turning || (b->inv_zone_1_A[k] != 0.0 && fabs(t->zones[k]) < 1.0);
-        spread(w, shape, k, b->v_switch_V * t->share[k], t->switch_V);
+    for (int g = 0; g < groups(shape); g++) {
+        trio_t switched;
+        legs_at(b->inv_zone_1_A, g, &switched);
+        along_group(w, shape, g, f->i_A, &t->zones[g]);
+        t->zones[g] *= switched;
+        t->turning = switch_share(&t->zones[g], &switched, &t->share[g]) || t->turning;
+        trio_t drop_V = b->v_switch_V * t->share[g];
+        spread_group(w, shape, g, &drop_V, t->switch_V);
     }
 }
 
-/* Current of leg k into the resistors across the windings, under these voltages; or how it moves. */
-INLINE double resistor_A(const bridge_t *b, const winding_t *w, shape_t shape, int k, const pair_t v_V[])
+/* Currents of swinging legs: out of their capacitances; v_V: across the resistors, or how that moves. */
+INLINE void swing_rate(const bridge_t *b, const winding_t *w, shape_t shape, int g, const trio_t *swings,
+                       const trio_t *i_leg_A, const pair_t v_V[], trio_t *rate_V_s)
 {
-    return b->g_winding_S * along(w, shape, k, v_V);
+    *rate_V_s = -*i_leg_A * b->inv_c_leg_1_F;
+    if (b->g_winding_S > 0.0) {
+        trio_t resistor_V;
+        along_group(w, shape, g, v_V, &resistor_V);
+        *rate_V_s -= b->g_winding_S * resistor_V * *swings * b->inv_c_leg_1_F;
+    }
 }
 
-/* steady: drops of closed switches are known already. */
-INLINE void tied_at(const circuit_t *c, const field_t *f, const double x[], shape_t shape, bool swings,
-                    bool steady, tied_t *t)
+/* steady: drops of closed switches are known already. i_leg_A: of swinging legs. */
+INLINE void tied_at(const circuit_t *c, const field_t *f, const double x[], shape_t shape,
+                    const trio_t swings[], bool steady, tied_t *t, trio_t i_leg_A[])
 {
     const bridge_t *b = &c->bridge;
     const winding_t *w = &c->machine.winding;
@@ -132,11 +200,15 @@ INLINE void tied_at(const circuit_t *c, const field_t *f, const double x[], shap
         t->drop_V[p] = both(b->r_series_ohm) * f->i_A[p] - pair_at(&b->diode_V[2 * p]) + t->switch_V[p];
         i_dc_A += weights(shape, p) * pair_at(&b->rail[2 * p]) * f->i_A[p];
     }
-    for (unsigned legs = b->swinging; swings && legs != 0u; legs &= legs - 1u) {
-        int k = bridge_first(legs);
-        t->i_leg_A[k] = along(w, shape, k, f->i_A);
-        spread(w, shape, k, x[V_LEG(k)], swing_V);
-        spread(w, shape, k, -b->r_on_ohm * t->i_leg_A[k], t->drop_V);
+    for (int g = 0; swings && g < groups(shape); g++) {
+        trio_t v_V, drop_V;
+        along_group(w, shape, g, f->i_A, &i_leg_A[g]);
+        i_leg_A[g] *= swings[g];
+        terminals_at(x, g, &v_V);
+        v_V *= swings[g];
+        drop_V = -b->r_on_ohm * i_leg_A[g];
+        spread_group(w, shape, g, &v_V, swing_V);
+        spread_group(w, shape, g, &drop_V, t->drop_V);
     }
     for (int p = 0; p < pairs(shape); p++) {
         t->v_V[p] = pair_at(&b->rail[2 * p]) * both(x[V_DC]) + pair_at(&b->source_V[2 * p]) - t->drop_V[p];
@@ -145,9 +217,9 @@ INLINE void tied_at(const circuit_t *c, const field_t *f, const double x[], shap
     t->i_dc_A = total(i_dc_A);
 }
 
-/* floats: legs of a star do, as in all that follows. */
+/* swings: which legs do, NULL: none; floats: legs of a star do, as in all that follows. */
 INLINE void rates_at(const circuit_t *c, rotor_t rotor, const field_t *f, const double x[], shape_t shape,
-                     bool swings, bool floats, bool steady, tied_t *t, rates_t *rate)
+                     const trio_t swings[], bool floats, bool steady, tied_t *t, rates_t *rate)
 {
     const machine_t *m = &c->machine;
     const bridge_t *b = &c->bridge;
@@ -155,7 +227,8 @@ INLINE void rates_at(const circuit_t *c, rotor_t rotor, const field_t *f, const 
     double omega_e = m->pole_pairs * omega;
     const winding_t *w = &m->winding;
     pair_t in_W = {0.0}, copper = {0.0}, device_W = {0.0}, resistor_W = {0.0};
-    tied_at(c, f, x, shape, swings, steady, t);
+    trio_t i_leg_A[PLANT_SETS] = {{0.0}};
+    tied_at(c, f, x, shape, swings, steady, t, i_leg_A);
     for (int p = 0; p < pairs(shape); p++) {
         pair_t power = weights(shape, p) * f->i_A[p];
         pair_t rest_V = t->v_V[p] - both(m->R_s_ohm) * f->i_A[p] - both(omega_e) * f->slope_Wb[p];
@@ -176,12 +249,8 @@ INLINE void rates_at(const circuit_t *c, rotor_t rotor, const field_t *f, const 
         resistor_W += power * t->v_V[p];
         device_W += power * t->drop_V[p];
     }
-    for (unsigned legs = b->swinging; swings && legs != 0u; legs &= legs - 1u) {
-        int k = bridge_first(legs);
-        rate->leg_V_s[k] = -t->i_leg_A[k] * b->inv_c_leg_1_F;
-        if (b->g_winding_S > 0.0) {
-            rate->leg_V_s[k] -= resistor_A(b, w, shape, k, t->v_V) * b->inv_c_leg_1_F;
-        }
+    for (int g = 0; swings && g < groups(shape); g++) {
+        swing_rate(b, w, shape, g, &swings[g], &i_leg_A[g], t->v_V, &rate->leg_V_s[g]);
     }
     rate->follow[MOTION] =
         (pair_t){mechanics_rate(&c->mech, omega, f->torque_Nm), dclink_plain_rate(&c->link, v_dc, t->i_dc_A)};
@@ -194,6 +263,26 @@ INLINE void rates_at(const circuit_t *c, rotor_t rotor, const field_t *f, const 
     rate->follow[VOLTS] = t->v_V[0];
 }
 
+/* Drops of switches within the zone move with their currents. */
+INLINE void turn_drops(const circuit_t *c, const pair_t i_A_s[], shape_t shape, const tied_t *t,
+                       pair_t drop_V_s[])
+{
+    const bridge_t *b = &c->bridge;
+    const winding_t *w = &c->machine.winding;
+    for (int g = 0; g < groups(shape); g++) {
+        trio_t moves_A_s, slope = {0.0};
+        along_group(w, shape, g, i_A_s, &moves_A_s);
+        for (int n = 0; n < 3; n++) {
+            double x = t->zones[g][n];
+            if (x > -1.0 && x < 1.0) {
+                slope[n] = b->v_switch_V * 1.5 * (1.0 - x * x) * b->inv_zone_1_A[3 * g + n];
+            }
+        }
+        slope *= moves_A_s;
+        spread_group(w, shape, g, &slope, drop_V_s);
+    }
+}
+
 /* How voltages of the legs move with the currents. */
 INLINE void tied_bends(const circuit_t *c, const pair_t i_A_s[], shape_t shape, bool swings, start_t *s,
                        pair_t drop_V_s[], pair_t v_V_s[])
@@ -201,30 +290,27 @@ INLINE void tied_bends(const circuit_t *c, const pair_t i_A_s[], shape_t shape, 
     const bridge_t *b = &c->bridge;
     const winding_t *w = &c->machine.winding;
     pair_t swing_V_s[PAIRS] = {{0.0}};
+    trio_t moves_A_s[PLANT_SETS];
     for (int p = 0; p < pairs(shape); p++) {
         drop_V_s[p] = both(b->r_series_ohm) * i_A_s[p];
     }
-    for (int k = 0; k < shape.legs && s->tied.turning; k++) {
-        double x = s->tied.zones[k];
-        if (x > -1.0 && x < 1.0) {
-            double slope = b->v_switch_V * 1.5 * (1.0 - x * x) * b->inv_zone_1_A[k];
-            spread(w, shape, k, slope * along(w, shape, k, i_A_s), drop_V_s);
-        }
+    if (s->tied.turning) {
+        turn_drops(c, i_A_s, shape, &s->tied, drop_V_s);
     }
-    for (unsigned legs = b->swinging; swings && legs != 0u; legs &= legs - 1u) {
-        int k = bridge_first(legs);
-        double moves_A_s = along(w, shape, k, i_A_s);
-        s->bend.leg_V_s[k] = -moves_A_s * b->inv_c_leg_1_F;
-        spread(w, shape, k, s->rate.leg_V_s[k], swing_V_s);
-        spread(w, shape, k, -b->r_on_ohm * moves_A_s, drop_V_s);
+    for (int g = 0; swings && g < groups(shape); g++) {
+        trio_t drop_V;
+        along_group(w, shape, g, i_A_s, &moves_A_s[g]);
+        moves_A_s[g] *= s->swings[g];
+        drop_V = -b->r_on_ohm * moves_A_s[g];
+        spread_group(w, shape, g, &s->rate.leg_V_s[g], swing_V_s);
+        spread_group(w, shape, g, &drop_V, drop_V_s);
     }
     for (int p = 0; p < pairs(shape); p++) {
         v_V_s[p] = pair_at(&b->rail[2 * p]) * both(s->rate.follow[MOTION][1]) - drop_V_s[p];
         v_V_s[p] = swings ? v_V_s[p] + swing_V_s[p] : v_V_s[p];
     }
-    for (unsigned legs = b->swinging; swings && b->g_winding_S > 0.0 && legs != 0u; legs &= legs - 1u) {
-        int k = bridge_first(legs);
-        s->bend.leg_V_s[k] -= resistor_A(b, w, shape, k, v_V_s) * b->inv_c_leg_1_F;
+    for (int g = 0; swings && g < groups(shape); g++) {
+        swing_rate(b, w, shape, g, &s->swings[g], &moves_A_s[g], v_V_s, &s->bend.leg_V_s[g]);
     }
 }
 
@@ -303,8 +389,11 @@ INLINE void begin(const circuit_t *c, shape_t shape, bool swings, bool floats, s
     }
     s->omega_e = c->machine.pole_pairs * c->now.x[OMEGA_MECH];
     no_drops(shape, &s->tied);
-    rates_at(c, c->now.rotor, &c->field, c->now.x, shape, swings, floats, c->bridge.v_switch_V == 0.0,
-             &s->tied, &s->rate);
+    if (swings) {
+        find_swinging(&c->bridge, shape, s->swings);
+    }
+    rates_at(c, c->now.rotor, &c->field, c->now.x, shape, swings ? s->swings : NULL, floats,
+             c->bridge.v_switch_V == 0.0, &s->tied, &s->rate);
     field_rates(&c->machine, c->now.rotor, s->omega_e, shape, &c->field, s->rate.flux_V, s->core_V, s->i_A_s);
     bends_at(c, s->i_A_s, shape, swings, floats, s);
     s->order = 0;

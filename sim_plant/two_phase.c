@@ -26,7 +26,7 @@ void circuit_two_phase_at(const circuit_t *c, const point_t *p, double v_leg_V[P
     pair_t core_V[PLANT_SETS], moved_A_s[PAIRS];
     field_from_cores(&c->machine, p->rotor, STAR, &p->x[U], 0.0, &f);
     no_drops(STAR, &tied);
-    rates_at(c, p->rotor, &f, p->x, STAR, false, true, c->bridge.v_switch_V == 0.0, &tied, &rate);
+    rates_at(c, p->rotor, &f, p->x, STAR, NULL, true, c->bridge.v_switch_V == 0.0, &tied, &rate);
     field_rates(&c->machine, p->rotor, omega_e, STAR, &f, rate.flux_V, core_V, moved_A_s);
     pair_put(i_A_s, moved_A_s[0]);
     terminals(c, p, tied.v_V[0], v_leg_V);

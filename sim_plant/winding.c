@@ -83,6 +83,15 @@ static void sum_sides(winding_t *w)
     }
 }
 
+static void order_by_leg(winding_t *w)
+{
+    for (int leg = 0; leg < w->legs; leg++) {
+        for (int a = 0; a < ACTIVE; a++) {
+            w->by_leg[leg / 3][a][leg % 3] = w->axis[leg][a];
+        }
+    }
+}
+
 /* Takes the active part of everything. */
 static void pack(winding_t *w)
 {
@@ -106,6 +115,7 @@ static void pack(winding_t *w)
         }
     }
     sum_sides(w);
+    order_by_leg(w);
     pack_flux(w);
     pack_inductance(w);
 }

@@ -76,6 +76,8 @@ typedef struct {
     double weight[ACTIVE];
     double axis[PLANT_LEGS][ACTIVE];  /* i_leg = axis . i */
     double share[PLANT_LEGS][ACTIVE]; /* v = share' v_leg */
+    /* axis by coordinate, of legs 3 g + n; the fourth is nothing */
+    double by_leg[PLANT_SETS][ACTIVE][4];
     double R_ohm[ACTIVE][ACTIVE];
     bool even;        /* R is a multiple of one */
     bool symmetrical; /* all phases are alike but for their magnets, and sets linked by these alone: */
