@@ -52,11 +52,18 @@ static double draw_lsb(const plant_sensor_t *sensor, noise_t *noise)
     return sensor->bits > 0 && sensor->noise_lsb > 0.0 ? sensor->noise_lsb * noise_gaussian(noise) : 0.0;
 }
 
+/* round() of what is positive and small, without its call */
+static unsigned nearest(double x)
+{
+    unsigned below = (unsigned)x;
+    return x - below >= 0.5 ? below + 1u : below;
+}
+
 /* lsb: the value in converter steps above code zero */
 static uint16_t code(int bits, double lsb)
 {
     unsigned top = (1u << bits) - 1u;
-    unsigned steps = lsb >= top ? top : lsb > 0.0 ? (unsigned)round(lsb) : 0u;
+    unsigned steps = lsb >= top ? top : lsb > 0.0 ? nearest(lsb) : 0u;
     return (uint16_t)(steps << (CODE_BITS - bits));
 }
 
