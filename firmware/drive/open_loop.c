@@ -14,7 +14,8 @@
 #define PER_TURN (INT32_MAX / (FOLLOW_TURN / 2))
 /* With more current, before the vector turns once more. */
 #define REST_MS 100U
-/* Of the vector, 2 ms: a movement of its own shows in the next voltage, as up to three times what would move it so. */
+/* With which the vector yields, 2 ms: at once, it would answer its own movement, which the next voltage may show as a swing three
+ * times as large. */
 #define K_YIELD PM_FRAC(0.4)
 /* From the lead of an observer on: the voltage of a step of the current is not that of the rotor. */
 #define SETTLE_MS 5U
