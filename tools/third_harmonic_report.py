@@ -107,8 +107,9 @@ TAKE = """## Which to take
   the last speed.
 
 Injection hands over right in 120 of 120 starts (`tests/scenario/third_start.yaml`), an imposed vector (`start_method` 2) with the hand-over at
-3 to 8 % of speed in 144 of 144 without load (`third_open_loop.yaml`). Against friction of half of the vector's torque 21 of 24 hold with
-the hand-over at 6 to 8 %; at 3 to 4 %, where `active_flux` holds 5 of 8, all 24 are lost, with a fault.
+5 to 10 % of speed in 960 of 960 without load (`third_open_loop.yaml`), at 3 to 8 % in 957 of 960, those lost by crossings. Against friction
+of half of the vector's torque 21 of 24 hold with the hand-over at 6 to 8 %; at 3 to 4 %, where `active_flux` holds 5 of 8, all 24
+are lost, with a fault.
 
 All three must know psi_3 and dL_0 under load: dL_0 told 0 costs 4.8 degrees at half load, psi_3 20 % wrong 1.1. None uses R, L_q, L_d or
 psi_m, to the last bit (`tests/unit/observers/third_test.cpp`). Where they are lost at L_q -40 %, told as L_d, it is the start: pulses
