@@ -48,8 +48,8 @@ pm_num_word_t pm_num_word_div(pm_num_word_t a, pm_num_word_t b);
 pm_num_word_t pm_num_word_sqrt(pm_num_word_t a);
 pm_num_word_t pm_num_word_from_fixed(int32_t x, int frac_bits);
 int pm_num_word_cmp(pm_num_word_t a, pm_num_word_t b);
-bool pm_num_word_to_fixed(pm_num_word_t a, int frac_bits, int32_t *out);
-int32_t pm_num_word_times(pm_num_word_t unit, int32_t value, int frac_bits);
+bool pm_num_word_to_fixed(pm_num_word_t word, int frac_bits, int32_t *out);
+int32_t pm_num_word_times(pm_num_word_t word, int32_t value, int frac_bits);
 
 /* A constant is made by the compiler, with the bits that pm_num_word_int() and pm_num_word_ratio() give: it is loaded
  * where it is needed, where a call would have all other numbers moved out of its way. 0 < value, num, den. */
