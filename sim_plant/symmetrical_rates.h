@@ -45,16 +45,16 @@ typedef struct {
 
 /* A start of steps: where it is, and first and second derivatives. */
 typedef struct {
-    pair_t flux[PAIRS], core_Wb[PLANT_SETS]; /* of the field */
     rates_t rate, bend;
-    double omega_e, omega_e_s, omega_e_s2;
-    pair_t core_V[PLANT_SETS], i_A_s[PAIRS];
     swing_t swing[SWING_ORDER + 1]; /* by order, from the first */
     tied_t tied;
-    trio_t swings[PLANT_SETS]; /* 1: the leg does */
-    pair_t slope_Wb, bend_Wb;  /* of the magnet's harmonics, where legs float */
-    int order;                 /* of the last of the swing */
-    bool steady;               /* no drop turns over in the step */
+    trio_t swings[PLANT_SETS];               /* 1: the leg does */
+    pair_t flux[PAIRS], core_Wb[PLANT_SETS]; /* of the field */
+    pair_t core_V[PLANT_SETS], i_A_s[PAIRS];
+    pair_t slope_Wb, bend_Wb; /* of the magnet's harmonics, where legs float */
+    double omega_e, omega_e_s, omega_e_s2;
+    int order;   /* of the last of the swing */
+    bool steady; /* no drop turns over in the step */
 } start_t;
 
 /* Legs are taken by threes. Coordinates that those of group g have a part in: of two stars their own set. */
