@@ -33,10 +33,6 @@
 #define FIELD_NEAR   3e-5 /* of the machine's flux: a correction whose square is nothing */
 
 typedef double pair_t __attribute__((vector_size(16)));
-/* Of three legs, the fourth is nothing. Never an argument by value: how that is passed depends on the
- * processor. */
-typedef double trio_t __attribute__((vector_size(32)));
-typedef int64_t trio_mask_t __attribute__((vector_size(32)));
 
 typedef struct {
     pair_t flux[PAIRS]; /* linkages by set in stationary coordinates, Wb; of a zero sequence its current, A */
@@ -68,16 +64,6 @@ INLINE pair_t pair_at(const double x[])
 INLINE void pair_put(double x[], pair_t pair)
 {
     memcpy(x, &pair, sizeof pair);
-}
-
-INLINE void trio_pick(const trio_mask_t *where, const trio_t *there, const trio_t *elsewhere, trio_t *to)
-{
-    *to = (trio_t)((*where & (trio_mask_t)*there) | (~*where & (trio_mask_t)*elsewhere));
-}
-
-INLINE bool trio_any(const trio_mask_t *mask)
-{
-    return ((*mask)[0] | (*mask)[1] | (*mask)[2]) != 0;
 }
 
 INLINE double total(pair_t x)
