@@ -6,7 +6,8 @@
  *   |i| = |w| psi_m tau / L_q                                   while tau is small against L / R and a turn
  *   angle of i = theta -+ (90 degrees + delta),  tan delta = s tan(|w| c),   - forwards, + backwards
  *   c = tau / 2 / (1 + y/3 - x/6 + 0.04 x y),  x = R tau / L_q,  y = R tau / L_d
- * theta belongs to the end of the pulse. What devices drop along the current is added as i_drop = V_drop tau / L_q in each leg.
+ * theta belongs to the end of the pulse. What the devices took is given back: V_drop tau / L_q in each leg, of which what lies along d,
+ * once theta is known, is s times as much.
  *
  * The first pulse is a period long; on boards that have PWM on one switch and different halves of a period, a 64th of one,
  * at its end. A pulse twice or four times as long follows while it cannot carry more than about 40 % of rated current, is not

@@ -42,8 +42,9 @@ WHY = {
                     "follows 0.12 rad behind",
     "flux_bandwidth": "follows 0.8 of rated torque within 0.18 rad, well short of the 0.3 that count as lost; 25 to 120 Hz",
     "flux_gain": "half where the machine saturates or is salient; damping costs nothing elsewhere",
-    "speed_low": "with injection 15 % of rated speed; without 4 %, and half of speed_high",
-    "speed_high": "with injection 27 % of rated speed; without 8 %, and an EMF above what a leg loses and R i is off by",
+    "speed_low": "with injection 15 % of rated speed, or so much of speed_high; without 4 %, and half of speed_high",
+    "speed_high": "with injection 27 % of rated speed, and an EMF 2.5 times what a leg loses; without 8 %, and one above that and what "
+                  "R i is off by",
     "i_d_light": "a tenth of rated, a fifth at most: light load stays out of what dead time does to small currents, where a wire that "
                  "is off is not seen",
     "i_fw_max": "half of rated",
@@ -166,11 +167,12 @@ def _reluctance(x):
 
 
 def _hand_over(x, i_open, leads, tolerance):
-    """speed_low and speed_high. Without injection the EMF must stand out from what R and dead time are not known to:
-    an error of R by the tolerance turns the estimate by 0.3 rad at most."""
+    """speed_low and speed_high. The EMF must stand out from what dead time is not known to, which under a carrier is more; without
+    injection from R too: an error by the tolerance turns the estimate by 0.3 rad at most."""
     rated = 0.8 * x["speed_max"]
     if leads:
-        return 0.15 * rated, 0.27 * rated
+        high = min(max(0.27 * rated, 2.5 * _lost(x) / (x["psi_m"] * x["pole_pairs"])), SPEED_MOST * rated)
+        return high * 0.15 / 0.27, high
     seen = (_lost(x) + tolerance / 0.3 * x["R_s"] * i_open) / (x["psi_m"] * x["pole_pairs"])
     high = min(max(HAND_OVER * rated, seen), SPEED_MOST * rated)
     return max(0.04 * rated, 0.5 * high), high
