@@ -15,7 +15,7 @@ from pathlib import Path
 
 import acceptance
 
-METHOD = re.compile(r'^PM_METHOD\((\d+), "(.*?)", "(.*?)", (\w+), "(.*?)", "(.*?)"\)', re.MULTILINE)
+METHOD = re.compile(r'^PM_METHOD\((\d+), "(.*?)", "(.*?)", [A-Z_ |]+, (\w+), "(.*?)", "(.*?)"\)', re.MULTILINE)
 CLAIM = re.compile(r'- \{row: (\d+), parameter: (?:""|(\w+)), proof: ([\w/]+)\}')
 CLAIMS = "observers/*.yaml", "injection/**/*.yaml", "bldc/**/*.yaml", "firmware/control/*.yaml", "firmware/drive/**/*.yaml"
 CLAIMED = "tools/pmsim/methods_of_lists.def"

@@ -6,9 +6,9 @@ import unittest
 from pathlib import Path
 
 TOOL = Path(__file__).resolve().parents[2] / "tools/book_map.py"
-METHODS = """PM_METHOD(12, "2.2.1", "Flux linkage", IMPLEMENTED, "observer", "spm")
-PM_METHOD(13, "2.2.2", "Active flux", IMPLEMENTED, "", "observers/active")
-PM_METHOD(14, "2.3.1", "Back-EMF", NOT_YET, "", "")
+METHODS = """PM_METHOD(12, "2.2.1", "Flux linkage", FUNDAMENTAL, IMPLEMENTED, "observer", "spm")
+PM_METHOD(13, "2.2.2", "Active flux", FUNDAMENTAL | MODEL, IMPLEMENTED, "", "observers/active")
+PM_METHOD(14, "2.3.1", "Back-EMF", FUNDAMENTAL, NOT_YET, "", "")
 """
 SCENARIO = """duration_s: 4
 cases:

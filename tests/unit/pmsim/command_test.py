@@ -46,6 +46,9 @@ def check_help():
 
 def check_tables():
     assert "152 implemented" in expect_exit(0, "methods").stdout
+    assert len(expect_exit(0, "methods", "--class", "pwm").stdout.splitlines()) == 3  # head, row 48, sum
+    assert "persistent" in expect_exit(0, "methods", "--classes").stdout
+    expect_exit(2, "methods", "--class", "none")
     assert "flux_bandwidth" in expect_exit(0, "params").stdout
     assert "angle_error_mean_deg" in expect_exit(0, "metrics").stdout
 
