@@ -15,6 +15,10 @@ void gates_init(gates_t *gates, const plant_inverter_t *inverter, int legs)
         .timer_counts = inverter->timer_counts,
         .legs = legs,
     };
+    for (int k = 0; k < legs; k++) {
+        gates->leg[k].off_s = HUGE_VAL;
+        gates->leg[k].on_s = HUGE_VAL;
+    }
     if (gates->charge_s > 0.0) {
         gates->fall_1_s = (1.0 - inverter->bootstrap_lockout) / inverter->bootstrap_hold_s;
     }
@@ -40,30 +44,41 @@ void gates_load(gates_t *gates, const plant_pwm_t *pwm)
     gates_drive(gates, pwm->driven, pwm->state, pwm->driven_after_s);
 }
 
+/* Of a leg that is to be driven otherwise from time t on */
+static double drive_due_s(const gates_leg_t *leg, double t_s)
+{
+    return leg->driven != leg->to_drive || leg->state != leg->to_state ? t_s : HUGE_VAL;
+}
+
 void gates_drive(gates_t *gates, const bool driven[], const plant_leg_state_t state[], double t_s)
 {
-    gates->drive_s = t_s;
-    gates->next_s = -1.0;
     for (int k = 0; k < gates->legs; k++) {
-        gates->leg[k].to_drive = driven[k];
-        gates->leg[k].to_state = state ? state[k] : gates->leg[k].to_state;
-        gates->leg[k].next_s = -1.0;
+        gates_leg_t *leg = &gates->leg[k];
+        leg->to_drive = driven[k];
+        leg->to_state = state ? state[k] : leg->to_state;
+        leg->drive_s = drive_due_s(leg, t_s);
+        leg->edge_s = -1.0;
+        leg->next_s = -1.0;
     }
 }
 
 void gates_off(gates_t *gates)
 {
-    gates->next_s = -1.0;
+    gates->next_s = gates->period_s;
     gates->commanded = false;
     gates->in_blocks = false;
     for (int k = 0; k < gates->legs; k++) {
-        gates->commanded = gates->commanded || gates->leg[k].command != GATE_OFF;
-        gates->leg[k].driven = false;
-        gates->leg[k].to_drive = false;
-        gates->leg[k].command = GATE_OFF;
-        gates->leg[k].gate = GATE_OFF;
-        gates->leg[k].opening = false;
-        gates->leg[k].next_s = -1.0;
+        gates_leg_t *leg = &gates->leg[k];
+        gates->commanded = gates->commanded || leg->command != GATE_OFF;
+        leg->driven = false;
+        leg->to_drive = false;
+        leg->command = GATE_OFF;
+        leg->gate = GATE_OFF;
+        leg->drive_s = drive_due_s(leg, leg->drive_s);
+        leg->edge_s = HUGE_VAL;
+        leg->off_s = HUGE_VAL;
+        leg->on_s = HUGE_VAL;
+        leg->next_s = -1.0;
     }
 }
 
@@ -92,13 +107,22 @@ static gate_t command_at(const gates_leg_t *leg, double late_s)
     }
 }
 
+/* The next command edge after that time, also one that leaves the command as it is. */
+static double edge_after_s(const gates_leg_t *leg, double late_s)
+{
+    if (!leg->driven) {
+        return HUGE_VAL;
+    }
+    return leg->rise_s > late_s ? leg->rise_s : leg->fall_s > late_s ? leg->fall_s : HUGE_VAL;
+}
+
 /* When a switch that is commanded at time t closes. */
 static double closing_at_s(const gates_t *gates, gates_leg_t *leg, gate_t command, double t_s)
 {
     plant_leg_state_t state = leg->state;
     bool alone = state == PLANT_LEG_UPPER || state == PLANT_LEG_LOWER || state == PLANT_LEG_LOWER_INVERTED;
     if (command == GATE_OFF) {
-        return t_s + gates->closing_s;
+        return HUGE_VAL;
     }
     if (!alone || command != leg->last) {
         leg->last = command;
@@ -108,7 +132,7 @@ static double closing_at_s(const gates_t *gates, gates_leg_t *leg, gate_t comman
         return leg->clear_s;
     }
     double on_s = fmax(t_s + gates->turn_on_s, leg->clear_s);
-    return leg->opening ? fmax(on_s, leg->off_s) : on_s;
+    return leg->off_s < HUGE_VAL ? fmax(on_s, leg->off_s) : on_s;
 }
 
 /* Of the bootstrap capacitor at time t; the gate has not changed since charge_at_s. */
@@ -144,39 +168,22 @@ static void charge_leg(const gates_t *gates, gates_leg_t *leg, double t_s)
 static void close_switch(const gates_t *gates, gates_leg_t *leg)
 {
     bool locked = gates->charge_s > 0.0 && leg->charge <= gates->lockout;
-    if (leg->command == GATE_HIGH && locked) {
-        leg->on_s = HUGE_VAL;
-    } else {
+    leg->on_s = HUGE_VAL;
+    if (leg->command != GATE_HIGH || !locked) {
         leg->gate = leg->command;
     }
 }
 
-/* Whether a leg is driven otherwise from drive_s on */
-static bool drive_changes(const gates_leg_t *leg)
+/* fmin() without its care for NaN, which costs a call */
+static double sooner(double x_s, double y_s)
 {
-    return leg->driven != leg->to_drive || leg->state != leg->to_state;
+    return x_s < y_s ? x_s : y_s;
 }
 
-/* The next instant after that one at which something happens to a leg. */
-static double leg_next_s(const gates_t *gates, const gates_leg_t *leg, double after_s)
+static double leg_next_s(const gates_t *gates, const gates_leg_t *leg)
 {
-    double next_s = HUGE_VAL;
-    if (leg->driven && leg->rise_s > after_s) {
-        next_s = leg->rise_s;
-    }
-    if (leg->driven && leg->fall_s > after_s && leg->fall_s < next_s) {
-        next_s = leg->fall_s;
-    }
-    if (gates->drive_s < next_s && drive_changes(leg)) {
-        next_s = gates->drive_s;
-    }
-    if (leg->opening && leg->off_s < next_s) {
-        next_s = leg->off_s;
-    }
-    if (leg->gate != leg->command && leg->on_s < next_s) {
-        next_s = leg->on_s;
-    }
-    return gates->charge_s > 0.0 ? fmin(lockout_s(gates, leg), next_s) : next_s;
+    double next_s = sooner(sooner(leg->drive_s, leg->edge_s), sooner(leg->off_s, leg->on_s));
+    return gates->charge_s > 0.0 ? sooner(lockout_s(gates, leg), next_s) : next_s;
 }
 
 static void find_blocks(gates_t *gates)
@@ -193,16 +200,23 @@ static void drive_leg(gates_t *gates, gates_leg_t *leg)
 {
     leg->driven = leg->to_drive;
     leg->state = leg->to_state;
+    leg->drive_s = HUGE_VAL;
+    leg->edge_s = -1.0;
     find_blocks(gates);
 }
 
-static void command_leg(gates_t *gates, gates_leg_t *leg, gate_t command, gate_t before, double t_s)
+static void command_leg(gates_t *gates, gates_leg_t *leg, double t_s)
 {
+    double late_s = t_s + gates->coincident_s;
+    gate_t command = command_at(leg, late_s);
+    leg->edge_s = edge_after_s(leg, late_s);
+    if (command == leg->command) {
+        return;
+    }
     gates->commanded = true;
     leg->command = command;
     leg->on_s = closing_at_s(gates, leg, command, t_s);
-    if (before != GATE_OFF && !leg->opening) {
-        leg->opening = true;
+    if (leg->gate != GATE_OFF && leg->off_s == HUGE_VAL) {
         leg->off_s = t_s + gates->turn_off_s;
     }
 }
@@ -214,21 +228,20 @@ static bool update_leg(gates_t *gates, gates_leg_t *leg, double t_s)
     if (gates->charge_s > 0.0) {
         charge_leg(gates, leg, t_s);
     }
-    if (late_s >= gates->drive_s && drive_changes(leg)) {
+    if (late_s >= leg->drive_s) {
         drive_leg(gates, leg);
     }
-    gate_t command = command_at(leg, late_s);
-    if (command != leg->command) {
-        command_leg(gates, leg, command, before, t_s);
+    if (late_s >= leg->edge_s) {
+        command_leg(gates, leg, t_s);
     }
-    if (leg->opening && late_s >= leg->off_s) {
-        leg->opening = false;
+    if (late_s >= leg->off_s) {
+        leg->off_s = HUGE_VAL;
         leg->gate = GATE_OFF;
     }
-    if (!leg->opening && leg->gate != command && late_s >= leg->on_s) {
+    if (late_s >= leg->on_s) {
         close_switch(gates, leg);
     }
-    leg->next_s = leg_next_s(gates, leg, late_s);
+    leg->next_s = leg_next_s(gates, leg);
     return leg->gate != before;
 }
 
@@ -243,12 +256,9 @@ unsigned gates_update(gates_t *gates, double t_s)
         if (leg->next_s <= late_s && update_leg(gates, leg, t_s)) {
             changed |= 1u << k;
         }
-        next_s = leg->next_s < next_s ? leg->next_s : next_s;
+        next_s = sooner(leg->next_s, next_s);
     }
     gates->next_s = next_s;
-    if (late_s >= gates->drive_s) {
-        gates->drive_s = HUGE_VAL; /* is done */
-    }
     if (changed != 0u) {
         gates->edge_s = t_s;
     }
@@ -278,16 +288,4 @@ gate_t gates_faulty(const gates_t *gates, int k)
         break;
     }
     return upper ? (lower ? GATE_BOTH : GATE_HIGH) : (lower ? GATE_LOW : GATE_OFF);
-}
-
-double gates_search_s(const gates_t *gates, double t_s)
-{
-    double next_s = gates->period_s;
-    double after_s = t_s + gates->coincident_s;
-    for (int k = 0; k < gates->legs; k++) {
-        double leg_s = gates->leg[k].next_s;
-        leg_s = leg_s > after_s ? leg_s : leg_next_s(gates, &gates->leg[k], after_s);
-        next_s = leg_s < next_s ? leg_s : next_s;
-    }
-    return next_s;
 }

@@ -36,12 +36,14 @@ typedef struct {
     gate_t last;           /* the last command that was not off, */
     double clear_s;        /* and when the other switch was off for the dead time */
     gate_t gate;           /* of healthy switches */
-    bool opening;          /* the conducting switch opens at off_s */
-    double off_s;
-    double on_s;                /* the commanded one closes, when gate != command */
-    double charge, charge_at_s; /* of the upper switch's capacitor, and when */
-    double next_s;              /* nothing happens to the leg before */
     plant_leg_fault_t fault;
+    double charge, charge_at_s; /* of the upper switch's capacitor, and when */
+    /* What happens next, and when; infinite: it does not. */
+    double drive_s; /* `driven` becomes `to_drive`, `state` `to_state` */
+    double edge_s;  /* rise or fall; -1: the command is to be looked at */
+    double off_s;   /* the conducting switch opens */
+    double on_s;    /* the commanded one closes */
+    double next_s;  /* the first of these, or of the capacitor's lock-out; -1: at the next update */
 } gates_leg_t;
 
 typedef struct {
@@ -56,7 +58,6 @@ typedef struct {
     double edge_s;  /* the last change of any gate */
     bool commanded; /* the last update, or gates_off(), had a command edge, those to and from off included */
     bool in_blocks; /* some legs are driven and others not, or one switch alone is: block commutation */
-    double drive_s; /* when `driven` becomes `to_drive`, `state` `to_state`; infinite once they have */
     double next_s;  /* nothing happens to any leg between the last update and this */
     gates_leg_t leg[PLANT_LEGS];
 } gates_t;
@@ -82,11 +83,10 @@ static inline gate_t gates_conducting(const gates_t *gates, int k)
     return gates->leg[k].fault == PLANT_HEALTHY ? gates->leg[k].gate : gates_faulty(gates, k);
 }
 
-/* The next instant after t at which gates_update() has something to do; T when nothing is left. */
-double gates_search_s(const gates_t *gates, double t_s);
-static inline double gates_next_s(const gates_t *gates, double t_s)
+/* The next instant at which gates_update() has something to do, after the last one; T when nothing is left. */
+static inline double gates_next_s(const gates_t *gates)
 {
-    return gates->next_s > t_s + gates->coincident_s ? gates->next_s : gates_search_s(gates, t_s);
+    return gates->next_s;
 }
 
 #endif

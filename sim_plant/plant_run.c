@@ -78,7 +78,7 @@ static void run_closed(plant_t *plant, double t_s)
     unsigned changed = update_gates(plant, next_s);
     while (plant->t_s < t_s) {
         while (next_s < t_s && commutate(plant, changed, next_s)) {
-            next_s = gates_next_s(gates, next_s);
+            next_s = gates_next_s(gates);
             changed = next_s < t_s ? update_gates(plant, next_s) : 0u;
         }
         advance_until(plant, next_s < t_s ? next_s : t_s);

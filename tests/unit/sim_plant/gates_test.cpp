@@ -49,7 +49,7 @@ class Gates : public testing::Test
         }
         gates_load(&gates, &pwm);
         std::vector<Change> changes;
-        for (double t = 0.0; t < T; t = gates_next_s(&gates, t)) {
+        for (double t = 0.0; t < T; t = gates_next_s(&gates)) {
             gate_t before = gates.leg[0].gate;
             gates_update(&gates, t);
             if (gates.leg[0].gate != before) {
@@ -205,7 +205,7 @@ TEST_F(Gates, TripOpensAll)
     for (const auto &leg : gates.leg) {
         EXPECT_EQ(leg.gate, GATE_OFF);
     }
-    EXPECT_EQ(gates_next_s(&gates, 0.0), gates.period_s);
+    EXPECT_EQ(gates_next_s(&gates), gates.period_s);
 }
 
 // Switches that follow their signals late, the opening one less so than the closing one.
@@ -263,7 +263,7 @@ TEST_F(SlowSwitches, TripDoesNotWaitForThem)
     run(counts, counts);
     gates_off(&gates);
     EXPECT_EQ(gates.leg[0].gate, GATE_OFF);
-    EXPECT_EQ(gates_next_s(&gates, 0.0), gates.period_s);
+    EXPECT_EQ(gates_next_s(&gates), gates.period_s);
 }
 
 class SixLegs : public Gates
@@ -286,7 +286,7 @@ TEST_F(SixLegs, EachFollowsItsOwnCompareValues)
             changes[k].clear();
         }
         gates_load(&gates, &pwm);
-        for (double t = 0.0; t < T; t = gates_next_s(&gates, t)) {
+        for (double t = 0.0; t < T; t = gates_next_s(&gates)) {
             gate_t before[PLANT_LEGS];
             for (int k = 0; k < PLANT_LEGS; k++) {
                 before[k] = gates.leg[k].gate;
@@ -345,7 +345,7 @@ TEST_F(SixLegs, NeverOverlapNorMissAnInstant)
                     ASSERT_GE(start + t - opened[k], 2.7e-6 - 1.1e-6 - 2.0 * gates.coincident_s) << k;
                 }
             }
-            double next = gates_next_s(&gates, t);
+            double next = gates_next_s(&gates);
             ASSERT_GT(next, t);
             if (next - t > 3.0 * gates.coincident_s) {
                 ASSERT_FALSE(gates_update(&gates, 0.5 * (t + next))) << period << " after " << t;
@@ -404,7 +404,7 @@ TEST_F(Gates, StateChangesWithinThePeriod)
     const plant_leg_state_t high[PLANT_LEGS] = {PLANT_LEG_HIGH};
     gates_drive(&gates, driven, high, 30e-6);
     std::vector<Change> changes;
-    for (double t = 0.0; t < T; t = gates_next_s(&gates, t)) {
+    for (double t = 0.0; t < T; t = gates_next_s(&gates)) {
         gate_t before = gates.leg[0].gate;
         gates_update(&gates, t);
         if (gates.leg[0].gate != before) {
@@ -432,7 +432,7 @@ TEST_F(SixLegs, StatesNeverOverlap)
         pwm.driven_after_s = random() % 3 == 0 ? 1e-9 * static_cast<double>(random() % 100000) : 0.0;
         gates_load(&gates, &pwm);
         double start = period * T;
-        for (double t = 0.0; t < T; t = gates_next_s(&gates, t)) {
+        for (double t = 0.0; t < T; t = gates_next_s(&gates)) {
             gate_t before[PLANT_LEGS];
             for (int k = 0; k < PLANT_LEGS; k++) {
                 before[k] = gates.leg[k].gate;
@@ -497,7 +497,7 @@ TEST_F(Gates, CoincidentEdgesAreOneEvent)
     run(500, 500); // all three legs alike
     gates_load(&gates, &pwm);
     int events = 0;
-    for (double t = 0.0; t < T; t = gates_next_s(&gates, t)) {
+    for (double t = 0.0; t < T; t = gates_next_s(&gates)) {
         gates_update(&gates, t);
         events++;
     }
