@@ -2,6 +2,15 @@
 
 #include <math.h>
 
+const gate_t gates_conduct[][GATE_HIGH + 1] = {
+    [PLANT_HEALTHY] = {[GATE_LOW] = GATE_LOW, [GATE_HIGH] = GATE_HIGH},
+    [PLANT_UPPER_OPEN] = {[GATE_LOW] = GATE_LOW},
+    [PLANT_LOWER_OPEN] = {[GATE_HIGH] = GATE_HIGH},
+    [PLANT_UPPER_SHORT] = {[GATE_OFF] = GATE_HIGH, [GATE_LOW] = GATE_BOTH, [GATE_HIGH] = GATE_HIGH},
+    [PLANT_LOWER_SHORT] = {[GATE_OFF] = GATE_LOW, [GATE_LOW] = GATE_LOW, [GATE_HIGH] = GATE_BOTH},
+    [PLANT_WIRE_OPEN] = {[GATE_LOW] = GATE_LOW, [GATE_HIGH] = GATE_HIGH},
+};
+
 void gates_init(gates_t *gates, const plant_inverter_t *inverter, int legs)
 {
     *gates = (gates_t){
@@ -263,29 +272,4 @@ unsigned gates_update(gates_t *gates, double t_s)
         gates->edge_s = t_s;
     }
     return changed;
-}
-
-gate_t gates_faulty(const gates_t *gates, int k)
-{
-    gate_t gate = gates->leg[k].gate;
-    bool upper = gate == GATE_HIGH;
-    bool lower = gate == GATE_LOW;
-    switch (gates->leg[k].fault) {
-    case PLANT_UPPER_OPEN:
-        upper = false;
-        break;
-    case PLANT_LOWER_OPEN:
-        lower = false;
-        break;
-    case PLANT_UPPER_SHORT:
-        upper = true;
-        break;
-    case PLANT_LOWER_SHORT:
-        lower = true;
-        break;
-    case PLANT_HEALTHY:
-    case PLANT_WIRE_OPEN:
-        break;
-    }
-    return upper ? (lower ? GATE_BOTH : GATE_HIGH) : (lower ? GATE_LOW : GATE_OFF);
 }

@@ -76,11 +76,11 @@ void gates_drive(gates_t *gates, const bool driven[], const plant_leg_state_t st
 /* Brings the gates to time t; the legs of which one has changed, bit k for leg k. */
 unsigned gates_update(gates_t *gates, double t_s);
 
-/* What conducts in leg k, with its fault. */
-gate_t gates_faulty(const gates_t *gates, int k);
+/* What conducts in leg k, by its fault and its gate. */
+extern const gate_t gates_conduct[][GATE_HIGH + 1];
 static inline gate_t gates_conducting(const gates_t *gates, int k)
 {
-    return gates->leg[k].fault == PLANT_HEALTHY ? gates->leg[k].gate : gates_faulty(gates, k);
+    return gates_conduct[gates->leg[k].fault][gates->leg[k].gate];
 }
 
 /* The next instant at which gates_update() has something to do, after the last one; T when nothing is left. */
