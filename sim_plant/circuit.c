@@ -59,11 +59,19 @@ static void find_calm(circuit_t *c)
     c->calm_swing_s = c->calm / (fastest_1_s + SWING_SHARE * (swing_1_s + damping));
 }
 
+/* What follows from machine, shaft and link as they are. */
+static void choose_steps(circuit_t *c)
+{
+    c->closed_form = c->machine.symmetrical && c->machine.winding.branch < 0 && mechanics_plain(&c->mech) &&
+                     dclink_plain(&c->link);
+    find_calm(c);
+}
+
 void circuit_align(circuit_t *c)
 {
     double theta = c->now.x[THETA_E];
     c->now.rotor = (rotor_t){cos(theta), sin(theta)};
-    find_calm(c);
+    choose_steps(c);
 }
 
 static void refresh(circuit_t *c)
@@ -114,7 +122,7 @@ void circuit_short(circuit_t *c, int leg_a, int leg_b, double R_ohm)
         axis[leg_b] = -1.0;
     }
     machine_set_branch(&c->machine, axis, R_ohm);
-    find_calm(c);
+    choose_steps(c);
     for (int a = 2 * c->machine.winding.sets + (c->machine.winding.zero >= 0); a < ACTIVE; a++) {
         c->now.x[U + a] = 0.0;
     }

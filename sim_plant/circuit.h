@@ -71,8 +71,9 @@ typedef struct {
     point_t next;  /* the end of a step, until that is taken */
     field_t field; /* of the present point, when a symmetrical machine knows it */
     bool field_known;
-    bool in_blocks; /* the legs commutate in blocks (gates.h) */
-    int events;     /* since the end of a segment */
+    bool closed_form; /* machine, shaft and link are of those that steps_symmetrical() can do */
+    bool in_blocks;   /* the legs commutate in blocks (gates.h) */
+    int events;       /* since the end of a segment */
     double t_s;
     double period_start_s;
     double low_since_s[PLANT_LEGS];  /* when switch or diode of the negative rail began to conduct */

@@ -102,16 +102,14 @@ static inline mechanics_motion_t circuit_motion(const circuit_t *c, const point_
  * time and a bridge that is off take the general way. */
 static inline bool circuit_two_phase(const circuit_t *c)
 {
-    return c->in_blocks && c->bridge.floating != 0u && c->bridge.swinging == 0u && c->machine.symmetrical &&
-           c->machine.winding.active == 2 && c->machine.winding.branch < 0 && c->bridge.both == 0u &&
-           mechanics_plain(&c->mech) && dclink_plain(&c->link);
+    return c->in_blocks && c->closed_form && c->bridge.floating != 0u &&
+           (c->bridge.swinging | c->bridge.both) == 0u && c->machine.winding.active == 2;
 }
 
 /* What steps_symmetrical() can do: every leg tied or swinging, or that; and nothing that needs the time. */
 static inline bool circuit_symmetrical(const circuit_t *c)
 {
-    return c->machine.symmetrical && c->machine.winding.branch < 0 && c->bridge.floating == 0u &&
-           c->bridge.both == 0u && mechanics_plain(&c->mech) && dclink_plain(&c->link);
+    return c->closed_form && (c->bridge.floating | c->bridge.both) == 0u;
 }
 
 #endif
