@@ -16,34 +16,30 @@ enum { UPPER, BY_HIGH_DIODE, BY_LOW_DIODE, SWINGS, FLOATS, SHORTS, GIVEN };
 #define KIND(byte) ((uint64_t)1 << (8 * (byte)))
 #define ALL(byte)  ((uint64_t)63 << (8 * (byte)))
 
-/* What each kind of leg is */
-typedef struct {
-    uint64_t kinds; /* of leg 0 */
-    double upper;
-    double switched;
-} facts_t;
-
-static const facts_t facts[] = {
+const bridge_kind_t bridge_kinds[] = {
     [LEG_FLOATING] = {.kinds = KIND(FLOATS)},
     [LEG_SWINGING] = {.kinds = KIND(SWINGS)},
-    [LEG_LOW] = {.switched = 1.0},
-    [LEG_HIGH] = {.kinds = KIND(UPPER), .switched = 1.0, .upper = 1.0},
+    [LEG_LOW] = {.rail = GATE_LOW, .switched = 1.0},
+    [LEG_HIGH] = {.kinds = KIND(UPPER), .rail = GATE_HIGH, .switched = 1.0, .upper = 1.0},
     [LEG_BOTH] = {.kinds = KIND(SHORTS), .upper = 0.5},
-    [LEG_DIODE_LOW] = {.kinds = KIND(BY_LOW_DIODE)},
-    [LEG_DIODE_HIGH] = {.kinds = KIND(UPPER) | KIND(BY_HIGH_DIODE), .upper = 1.0},
+    [LEG_DIODE_LOW] = {.kinds = KIND(BY_LOW_DIODE), .rail = GATE_LOW, .diode = -1.0},
+    [LEG_DIODE_HIGH] = {.kinds = KIND(UPPER) | KIND(BY_HIGH_DIODE),
+                        .rail = GATE_HIGH,
+                        .upper = 1.0,
+                        .diode = 1.0},
     [LEG_SOURCE] = {.kinds = KIND(GIVEN)},
 };
 
 static unsigned legs_of(const bridge_t *b, int kind)
 {
-    return (unsigned)(b->kinds >> (8 * kind)) & 63u;
+    return (uint8_t)(b->kinds >> (8 * kind));
 }
 
 static void count(bridge_t *b)
 {
     b->kinds = 0u;
     for (int k = 0; k < b->legs; k++) {
-        const facts_t *is = &facts[b->leg[k]];
+        const bridge_kind_t *is = &bridge_kinds[b->leg[k]];
         b->kinds |= is->kinds << k;
         b->inv_zone_1_A[k] = is->switched * b->switched_1_A;
         b->upper[k] = is->upper;
@@ -109,17 +105,8 @@ static void sum_sources(bridge_t *b, const winding_t *w)
     }
 }
 
-void bridge_put(bridge_t *b, int k, leg_t leg)
-{
-    const facts_t *was = &facts[b->leg[k]], *is = &facts[leg];
-    b->leg[k] = leg;
-    b->kinds ^= (was->kinds ^ is->kinds) << k;
-    b->inv_zone_1_A[k] = is->switched * b->switched_1_A;
-    b->upper[k] = is->upper;
-}
-
-/* What few circuits have. */
-static void sum_rare(bridge_t *b, const winding_t *w)
+/* What few circuits have; by itself, as bridge_sum() is called at every edge. */
+static __attribute__((noinline)) void sum_rare(bridge_t *b, const winding_t *w)
 {
     bool sources = legs_of(b, GIVEN) != 0u;
     b->both = legs_of(b, SHORTS);

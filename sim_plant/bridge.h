@@ -54,14 +54,32 @@ typedef struct {
     double g_through_S;              /* of legs with both switches closed */
 } bridge_t;
 
+/* What each kind of leg is */
+typedef struct {
+    uint64_t kinds; /* of leg 0, as in bridge_t */
+    gate_t rail;    /* whose switch or diode conducts alone, if one does */
+    double upper;
+    double switched; /* 1: by a switch */
+    double diode;    /* drop of its diode beyond the rail, in units of v_diode */
+} bridge_kind_t;
+
+extern const bridge_kind_t bridge_kinds[];
+
 void bridge_init(bridge_t *bridge, const plant_config_t *config, int legs);
 
 /* Brings up to date what follows from leg[]. */
 void bridge_summarise(bridge_t *bridge, const winding_t *winding);
 
 /* The same for those who change legs by bridge_put() alone: once after some of these. */
-void bridge_put(bridge_t *bridge, int k, leg_t leg);
 void bridge_sum(bridge_t *bridge, const winding_t *winding);
+static inline void bridge_put(bridge_t *b, int k, leg_t leg)
+{
+    const bridge_kind_t *was = &bridge_kinds[b->leg[k]], *is = &bridge_kinds[leg];
+    b->leg[k] = leg;
+    b->kinds ^= (was->kinds ^ is->kinds) << k;
+    b->inv_zone_1_A[k] = is->switched * b->switched_1_A;
+    b->upper[k] = is->upper;
+}
 
 /* Leg k after a change of its gate; i_A is its current. */
 leg_t bridge_commutated(const bridge_t *bridge, int k, gate_t gate, double i_A);

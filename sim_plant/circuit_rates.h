@@ -49,9 +49,8 @@ static inline double circuit_output_V(const circuit_t *c, int k)
     if (b->leg[k] == LEG_SWINGING) {
         return c->now.x[V_LEG(k)];
     }
-    double tied_V = b->upper[k] * c->now.x[V_DC];
-    return bridge_is_diode(b, k) ? tied_V + (b->leg[k] == LEG_DIODE_HIGH ? b->v_diode_V : -b->v_diode_V)
-                                 : tied_V;
+    const bridge_kind_t *is = &bridge_kinds[b->leg[k]];
+    return is->upper * c->now.x[V_DC] + is->diode * b->v_diode_V;
 }
 
 /* What follows from the legs; moves the windings onto zero current of the floating ones; after a jump of the

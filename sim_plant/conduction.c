@@ -7,20 +7,12 @@
 #define SLOPE_MARGIN  4.0   /* of v_dc / L of a leg against the others: EMF, saturation */
 #define SMALL_CURRENT 1e-12 /* of the converter's full scale: nothing, for a floating leg */
 
-/* Leg k becomes another kind. What its capacitance holds more or less afterwards has come from the link if
- * the upper rail has it now, and the rest is lost in the switch. */
-static void set_leg(circuit_t *c, int k, leg_t leg)
+/* The output capacitance of leg k, which has become another kind, from that voltage on. What it holds more or
+ * less afterwards has come from the link if the upper rail has it now, and the rest is lost in the switch. */
+static void charge_output(circuit_t *c, int k, double before_V)
 {
-    bridge_t *b = &c->bridge;
-    double before_V = b->c_leg_F > 0.0 ? circuit_output_V(c, k) : 0.0;
-    if ((leg == LEG_LOW || leg == LEG_DIODE_LOW) && b->leg[k] != LEG_LOW && b->leg[k] != LEG_DIODE_LOW) {
-        c->low_since_s[k] = c->t_s;
-    }
-    bridge_put(b, k, leg);
-    if (b->c_leg_F == 0.0) {
-        return;
-    }
-    if (leg == LEG_SWINGING) {
+    const bridge_t *b = &c->bridge;
+    if (b->leg[k] == LEG_SWINGING) {
         c->now.x[V_LEG(k)] = before_V;
         return;
     }
@@ -30,6 +22,20 @@ static void set_leg(circuit_t *c, int k, leg_t leg)
     c->jump_in_J += in_J;
     c->jump_device_J += in_J + circuit_capacitor_J(c, before_V) - circuit_capacitor_J(c, after_V);
     c->now.x[V_DC] -= charge_C * c->link.inv_C_1_F;
+}
+
+/* Leg k becomes another kind. */
+static void set_leg(circuit_t *c, int k, leg_t leg)
+{
+    bridge_t *b = &c->bridge;
+    double before_V = circuit_output_V(c, k);
+    if (bridge_kinds[leg].rail == GATE_LOW && bridge_kinds[b->leg[k]].rail != GATE_LOW) {
+        c->low_since_s[k] = c->t_s;
+    }
+    bridge_put(b, k, leg);
+    if (b->c_leg_F > 0.0) {
+        charge_output(c, k, before_V);
+    }
 }
 
 /* Diodes of one rail alone, one or several, have no path back, so they carry nothing. Output capacitances are
@@ -81,58 +87,47 @@ void circuit_switch(circuit_t *c, const gates_t *gates, unsigned legs)
     c->in_blocks = gates->in_blocks;
 }
 
-static bool low_side(leg_t leg)
-{
-    return leg == LEG_LOW || leg == LEG_DIODE_LOW;
-}
-
-static bool high_side(leg_t leg)
-{
-    return leg == LEG_HIGH || leg == LEG_DIODE_HIGH;
-}
-
 /* Whether leg k stays at the rail that it is at with that gate, as more than a least current can flow through
  * the diode there. */
 static bool keeps_rail(const circuit_t *c, int k, gate_t gate, double least_A)
 {
-    leg_t leg = c->bridge.leg[k];
-    if (low_side(leg)) {
-        return (gate == GATE_OFF || gate == GATE_LOW) && circuit_leg_A(c, &c->now, k) >= least_A;
+    gate_t rail = bridge_kinds[c->bridge.leg[k]].rail;
+    if (rail == GATE_OFF || (gate != GATE_OFF && gate != rail)) {
+        return false;
     }
-    return high_side(leg) && (gate == GATE_OFF || gate == GATE_HIGH) &&
-           circuit_leg_A(c, &c->now, k) <= -least_A;
+    double i_A = circuit_leg_A(c, &c->now, k);
+    return rail == GATE_LOW ? i_A >= least_A : i_A <= -least_A;
 }
 
-/* Leg k passes between a switch and the diode across it. */
-static void pass_over(circuit_t *c, int k, leg_t leg)
+/* Whether all legs of the mask do, for that long. */
+static bool keep_rails(const circuit_t *c, const gates_t *gates, unsigned legs, double within_s)
 {
-    if (c->bridge.c_leg_F > 0.0 && c->bridge.v_diode_V != 0.0) {
-        set_leg(c, k, leg);
-    } else {
-        bridge_put(&c->bridge, k, leg);
+    double slope_A_s = SLOPE_MARGIN * c->machine.gamma_leg_1_H * fabs(c->now.x[V_DC]);
+    double least_A = 2.0 * c->bridge.zone_A + slope_A_s * within_s;
+    for (; legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        if (!keeps_rail(c, k, gates_conducting(gates, k), least_A)) {
+            return false;
+        }
     }
+    return true;
 }
 
 bool circuit_hand_over(circuit_t *c, const gates_t *gates, unsigned legs, double within_s)
 {
-    bridge_t *b = &c->bridge;
-    double slope_A_s = SLOPE_MARGIN * c->machine.gamma_leg_1_H * fabs(c->now.x[V_DC]);
-    double least_A = 2.0 * b->zone_A + slope_A_s * within_s;
-    for (unsigned rest = legs; rest != 0u; rest &= rest - 1u) {
-        if (!keeps_rail(c, bridge_first(rest), gates_conducting(gates, bridge_first(rest)), least_A)) {
-            return false;
-        }
+    if (!keep_rails(c, gates, legs, within_s)) {
+        return false;
     }
     for (; legs != 0u; legs &= legs - 1u) {
         int k = bridge_first(legs);
-        bool low = low_side(b->leg[k]);
+        bool low = bridge_kinds[c->bridge.leg[k]].rail == GATE_LOW;
         if (gates_conducting(gates, k) == GATE_OFF) {
-            pass_over(c, k, low ? LEG_DIODE_LOW : LEG_DIODE_HIGH);
+            set_leg(c, k, low ? LEG_DIODE_LOW : LEG_DIODE_HIGH);
         } else {
-            pass_over(c, k, low ? LEG_LOW : LEG_HIGH);
+            set_leg(c, k, low ? LEG_LOW : LEG_HIGH);
         }
     }
-    bridge_sum(b, &c->machine.winding);
+    bridge_sum(&c->bridge, &c->machine.winding);
     return true;
 }
 
