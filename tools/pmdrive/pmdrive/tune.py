@@ -40,7 +40,8 @@ WHY = {
                        "saliency adds to the torque; a gain that the drive's format has",
     "acceleration": "0.3 of rated torque, over what saliency adds to it; at most what the slower position loop "
                     "follows 0.12 rad behind",
-    "flux_bandwidth": "follows 0.8 of rated torque within 0.18 rad, well short of the 0.3 that count as lost; 25 to 120 Hz",
+    "flux_bandwidth": "follows 0.8 of rated torque within 0.18 rad, well short of the 0.3 that count as lost; 25 to 120 Hz; a tenth of "
+                      "current_bandwidth where saturation is what slows that",
     "flux_gain": "half where the machine saturates or is salient; damping costs nothing elsewhere",
     "speed_low": "with injection 15 % of rated speed, or so much of speed_high; without 4 %, and half of speed_high",
     "speed_high": "with injection 27 % of rated speed, and an EMF 2.5 times what a leg loses; without 8 %, and one above that and what "
@@ -226,14 +227,17 @@ def values(x, bandwidth=None, tolerance=MEASURED):
     torque = 1.5 * x["pole_pairs"] * x["psi_m"] * x["i_rated"]
     jerk = torque / x["J"]  # rad/s2 at rated torque
     v_injection, leads = _injection(x, tolerance)
-    position_Hz = min(max(math.sqrt(0.8 / 0.18 * jerk * x["pole_pairs"]) / (2 * math.pi), 25.0), 120.0)
+    saturated = highest * x["L_qh_rated"] / x["L_q"]
+    current = bandwidth or min(x["f_pwm"] / 20, saturated, 1500.0, _reach(x))
+    quick = saturated / 10 if saturated < x["f_pwm"] / 20 else 120.0  # the frame turns slower than current control in it can follow
+    position_Hz = min(max(min(math.sqrt(0.8 / 0.18 * jerk * x["pole_pairs"]) / (2 * math.pi), quick), 25.0), 120.0)
     slower = min(position_Hz, INJECTION_HZ) if leads else position_Hz
     behind = LAG * (2 * math.pi * slower) ** 2 / x["pole_pairs"]
     ripple = x["v_dc_nominal"] / (x["L_d"] * x["f_pwm"])  # of the current by the pulses: light load must be beyond it
     i_open = _open_loop(x)
     low, high = _hand_over(x, i_open, leads, tolerance)
     out = {
-        "current_bandwidth": bandwidth or min(x["f_pwm"] / 20, highest * x["L_qh_rated"] / x["L_q"], 1500.0, _reach(x)),
+        "current_bandwidth": current,
         "injection_bandwidth": INJECTION_HZ,
         "speed_bandwidth": min(max(6 * jerk / rated_speed / (2 * math.pi), 2.0),
                                INJECTION_HZ / 3.5 / _reluctance(x) if leads else max(10.0, position_Hz / 6), _stiffest(x)),
