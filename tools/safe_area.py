@@ -38,12 +38,25 @@ def drive_of(machine):
     return d
 
 
+class Everywhere:
+    """An answer of two or three periods has no window, and no second loop."""
+
+    def run(self, i_q):
+        return True, 0.0, 0.0
+
+    def boundary(self, most, way=1):
+        return most
+
+
 def holds(machine, changes, gain=1.0):
-    """carrier.Holds for a machine file of the energy form."""
+    """carrier.Holds for a machine file of the energy form, by the direction. With the inverter for a carrier that stands, whose axis may
+    be one of little current."""
     d = {**drive_of(machine), **changes}
+    if d["injection"] not in carrier.NAMES:
+        return lambda way: Everywhere()
     omega = SPEED * float(machine["rated"]["speed_rated_rad_s"]) * d["pole_pairs"]
     return lambda way: carrier.Holds(d, lambda a, b: tune.current(machine, a, b)[0], lambda a, b: tune.flux(machine, a, b)[0],
-                                     float(machine["electrical"]["R_s_ohm"]), way * omega, gain)
+                                     float(machine["electrical"]["R_s_ohm"]), way * omega, gain, d["injection"] == carrier.STATIONARY)
 
 
 def current_of(machine, torque):
@@ -86,7 +99,7 @@ def lines(runs, most):
 
 
 def plot(found, drawn, most, path):
-    figure, axes = plt.subplots(2, 2, figsize=(11, 8), sharey=True)
+    figure, axes = plt.subplots(3, 3, figsize=(15, 11), sharey=True)
     for axis, (group, runs) in zip(axes.flat, found.items()):
         for held, colour, word in ((True, "#4c9f70", "held"), (False, "#c8553d", "lost")):
             for way, mark in ((1, "o"), (-1, "s")):
@@ -102,8 +115,8 @@ def plot(found, drawn, most, path):
         axis.grid(True, alpha=0.3)
     for axis in axes[:, 0]:
         axis.set_ylabel("i_q at most torque per ampere, A")
-    axes[0, 0].legend(fontsize=7)
-    figure.tight_layout()
+    figure.tight_layout(rect=(0, 0.03, 1, 1))
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="lower center", ncol=8, fontsize=8)
     figure.savefig(path, dpi=110, metadata={"Software": None})
     plt.close(figure)
 
@@ -121,7 +134,8 @@ What ends operation here is not the converter. Noise and quantisation move the p
 second loop: while the fundamental current changes, the window over the carrier passes it at f_h; the position loop turns the frame
 with that; and the fundamental current in a frame that trembles at f_h looks like the answer to the carrier. Its gain goes with
 (i_f / I_n)^2 and with the bandwidth over f_h squared, so the remedies are a slower loop, more voltage, or a higher carrier, in this
-order of their price. A rotating carrier sees all of the current, a pulsating one only i_d and lambda i_q; a square wave has no window.
+order of their price. A rotating carrier and one that stands see all of the current, a pulsating one only i_d and lambda i_q. Sources that
+answer within two or three periods, square waves, INFORM and PWM excitation, have no window: they are predicted to hold everywhere.
 """
 
 

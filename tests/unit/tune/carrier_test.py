@@ -35,7 +35,7 @@ def holds(x, way=1, gain=1.0, **changes):
     d = parameters(x, **changes)
     omega = SPEED * float(x["rated"]["speed_rated_rad_s"]) * d["pole_pairs"]
     return carrier.Holds(d, lambda a, b: tune.current(x, a, b)[0], lambda a, b: tune.flux(x, a, b)[0],
-                         float(x["electrical"]["R_s_ohm"]), way * omega, gain)
+                         float(x["electrical"]["R_s_ohm"]), way * omega, gain, changes["injection"] == carrier.STATIONARY)
 
 
 class Carrier(unittest.TestCase):

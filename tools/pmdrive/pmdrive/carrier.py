@@ -6,18 +6,20 @@ while it changes, at omega_h +- nu; the position loop turns the frame with that,
 trembles at omega_h looks like the answer to the carrier. This second loop grows with the square of i_f / I_n and of the bandwidth
 over f_h. So the loop is run, a sample a period, as the drive has it: position loop, window, current control, delay of 1.5 periods,
 cross-coupling by the parabolas of injection/saliency.h, speed control; on the machine by its fluxes and its inertia, without converter,
-and without the inverter unless it is asked for. Holds.run() begins 5 degrees off and ends within 2 degrees of a position or does not.
+and without the inverter unless it is asked for. Holds.run() begins 5 degrees off and ends within LOST of a position or does not.
 """
 import cmath
 import math
 
-SQUARE, ROTATING, PULSATING = 0, 1, 4  # numbers of injection/injections.def
-NAMES = {SQUARE: "pulsating_square", ROTATING: "rotating_sine", PULSATING: "pulsating_sine"}
+SQUARE, ROTATING, PULSATING, STATIONARY = 0, 1, 4, 5  # numbers of injection/injections.def
+NAMES = {SQUARE: "pulsating_square", ROTATING: "rotating_sine", PULSATING: "pulsating_sine", STATIONARY: "stationary_sine"}
+SEQUENCES = (ROTATING, STATIONARY)  # their answer is I_n e^{j 2 theta}
 ZETA = 0.9
 GAIN_RISE = 2.5
 KICK = math.radians(5)
 STAR = [cmath.exp(2j * math.pi * x / 3) for x in range(3)]
-LOST = math.radians(2)   # that a held position swings by at the end at most
+LOST = {SQUARE: math.radians(2), ROTATING: math.radians(2), PULSATING: math.radians(2),
+        STATIONARY: math.radians(4)}  # that a held position swings by at the end at most; a carrier that stands does by 3 for dead time
 OFF = math.radians(15)   # and is away at most
 SETTLE_S, SEEN_S = 1.0, 0.2
 
@@ -41,6 +43,12 @@ def slope_across(L, F):
 def slope_sequence(L, F):
     L_d, L_q, L_dq = L
     return 2 * F * math.hypot((L_q - L_d) / 2, L_dq) / (L_d * L_q - L_dq ** 2)
+
+
+def common(L, F):
+    """I_p, the same for all positions."""
+    L_d, L_q, L_dq = L
+    return F * (L_d + L_q) / 2 / (L_d * L_q - L_dq ** 2)
 
 
 def parabola(half, full, rated):
@@ -80,8 +88,9 @@ class Known:
     def __init__(self, d):
         zero, rated = (d["L_d"], d["L_q"], 0.0), (d["L_dh_rated"], d["L_qh_rated"], d["L_dqh_rated"])
         F, i = flux_of(d), d["i_rated"]
-        slope = slope_sequence if d["injection"] == ROTATING else slope_across
-        self.i_p = F / 2 * (1 / d["L_d"] + 1 / d["L_q"])
+        slope = slope_sequence if d["injection"] in SEQUENCES else slope_across
+        self.i_p = common(zero, F)
+        self.i_p_2 = (common(rated, F) - self.i_p) / i ** 2
         self.F, self.slope_0 = F, slope(zero, F)
         slope_r = slope(rated, F)
         self.sees = self.slope_0 > 0 and slope_r > 0
@@ -113,7 +122,7 @@ def noise_deg(d, noise_lsb=0.5, bits=12, slope=None):
     step = 2 * d["i_full_scale"] / 2 ** bits
     slope = Known(d).slope_0 if slope is None else slope
     sigma2 = (2 / 3) * (noise_lsb ** 2 + 1 / 12)          # of alpha or beta, of three legs, LSB^2
-    weight = {SQUARE: 4.0, ROTATING: 1.0, PULSATING: 2.0}[d["injection"]]
+    weight = {SQUARE: 4.0, ROTATING: 1.0, PULSATING: 2.0, STATIONARY: 2.0}[d["injection"]]
     # low frequencies of h: the square's second difference has gain 2 there; of a sine demodulated with 2 sin, 2 of the power;
     # a sequence takes both axes with half of it each
     return math.degrees(step / slope * math.sqrt(sigma2 * weight * noise_band_Hz(d) / d["f_pwm"]))
@@ -188,6 +197,8 @@ class Holds:
         turn_of = [cmath.exp(1j * (n * a - 1.5 * a - math.pi / 2)) for n in range(N)]
         turn = self.turned(0j, i_ref)
         cosine = sine = 0j
+        stands = d["injection"] == STATIONARY  # along alpha
+        i_p, delta, tau = k.i_p, 0.0, (N - 1) / 2 * T
         errors = []
         for n in range(round(SETTLE_S / T)):
             rotor = cmath.exp(1j * theta)
@@ -208,10 +219,12 @@ class Holds:
                 eps = (x.imag + lam * x.real) * k.gain(i_f.imag)
                 carrier = d["v_injection"] * sign
             else:
+                e = turn_of[at]
+                if stands:
+                    i_hat = (i_s - i_p * (e * cmath.exp(-1j * delta)).real) / frame
                 change = i_hat - buffer[at]
                 buffer[at] = i_hat
                 total += change
-                e = turn_of[at]
                 cosine += change * e.real
                 sine += change * e.imag
                 i_f = total / N
@@ -220,6 +233,15 @@ class Holds:
                     delta = max(-0.7, min(0.7, math.atan2(s.real, c.real)))
                     x = 2 * (c * math.cos(delta) + s * math.sin(delta))
                     eps = (x.imag + k.of(k.lam, i_f.imag) * x.real) * k.gain(i_f.imag)
+                    carrier = d["v_injection"] * math.cos(at * a)
+                elif stands:
+                    y = 2 * (c * math.cos(delta) + s * math.sin(delta))
+                    if n % slow == 0 and n > N:
+                        whole = [i_p * part + 2 * (x * frame).real for part, x in ((math.cos(delta), c), (math.sin(delta), s))]
+                        delta = max(-0.7, min(0.7, math.atan2(whole[1], whole[0])))
+                        i_p = (k.i_p + k.i_p_2 * i_f.imag ** 2) * math.cos(delta)
+                        turn = cmath.exp(1j * (omega_hat * tau - 2 * k.of(k.turn, i_f.imag)))
+                    eps = (y / frame * turn).imag * k.gain(i_f.imag)
                     carrier = d["v_injection"] * math.cos(at * a)
                 else:
                     negative, positive = c + 1j * s, c - 1j * s
@@ -246,14 +268,14 @@ class Holds:
                 i_ref = complex(i_d_of(d, i_q_ref), i_q_ref)
             lost = self.taken(i_s, i_f * frame) if self.lost_V else 0.0
             psi_s += T * (v_acting - self.R * i_s - lost)
-            v_acting = (v + carrier) * ahead
+            v_acting = v * ahead + carrier * (1.0 if stands else ahead)
             theta += omega * T
             theta_hat += w * T
             if n * T > SETTLE_S - SEEN_S:
                 errors.append(error)
         mean = sum(errors) / len(errors)
         swing = max(abs(e - mean) for e in errors)
-        return swing < LOST and abs(mean) < OFF, mean, max(map(abs, errors))
+        return swing < LOST[d["injection"]] and abs(mean) < OFF, mean, max(map(abs, errors))
 
     def boundary(self, most, way=1, step=0.05):
         """The current up to which it holds, the field turning with omega and the load against it: A; `most` where it holds there."""
