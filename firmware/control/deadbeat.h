@@ -1,7 +1,7 @@
 /* Deadbeat current control with a modulated voltage (METHODS.md 12.5.2, continuous set; the finite one:
  * finite_set.h).
  *
- * The voltage commanded a period ago acts until k+1; the model says where it takes the current:
+ * The voltage commanded a period ago acts until k+1; winding_model.h says where it takes the current:
  *   i_d' = i_d + T_s/L_d (v_d - R i_d + omega L_q i_q)
  *   i_q' = i_q + T_s/L_q (v_q - R i_q - omega (L_d i_d + psi_m))
  * and which voltage takes it to its reference within the period after:
@@ -22,7 +22,7 @@
 #ifndef CONTROL_DEADBEAT_H
 #define CONTROL_DEADBEAT_H
 
-#include "firmware/control/regulation.h"
+#include "firmware/control/winding_model.h"
 #include "firmware/math/pi.h"
 
 #ifdef __cplusplus
@@ -30,10 +30,8 @@ extern "C" {
 #endif
 
 typedef struct {
-    pm_q_t R; /* per-unit */
-    pm_q_t L_d, L_q, psi_m;
-    pm_q_t per_L_d, per_L_q; /* T_s / L */
-    int32_t k_d, k_q;        /* L / T_s, and share of it, Q25 */
+    winding_model_t model;
+    int32_t k_d, k_q; /* L / T_s, and share of it, Q25 */
 } deadbeat_config_t;
 
 typedef struct {

@@ -17,12 +17,12 @@ static void make_axis(maker_t *m, drive_param_id_t L, int32_t *k, pm_q_t *per_L)
 
 void make_deadbeat(maker_t *m, deadbeat_config_t *c)
 {
-    make_axis(m, DRIVE_PARAM_L_d, &c->k_d, &c->per_L_d);
-    make_axis(m, DRIVE_PARAM_L_q, &c->k_q, &c->per_L_q);
-    c->R = per_unit(m, DRIVE_PARAM_R_s, m->impedance);
-    c->L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
-    c->L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);
-    c->psi_m = per_unit(m, DRIVE_PARAM_psi_m, m->base.psi);
+    make_axis(m, DRIVE_PARAM_L_d, &c->k_d, &c->model.per_L_d);
+    make_axis(m, DRIVE_PARAM_L_q, &c->k_q, &c->model.per_L_q);
+    c->model.R = per_unit(m, DRIVE_PARAM_R_s, m->impedance);
+    c->model.L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
+    c->model.L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);
+    c->model.psi_m = per_unit(m, DRIVE_PARAM_psi_m, m->base.psi);
 }
 
 /* That of a first-order response with a time constant of one period. */

@@ -2,69 +2,30 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <string>
-#include <vector>
 
-#include "firmware/math/legs.h"
-#include "firmware/params/parameters.h"
-#include "tests/contract/observers.h"
-#include "tests/contract/winding.h"
+#include "tests/unit/control/switching.h"
 #include "tests/unit/math/samples.h"
 
 namespace
 {
 
-using bench::Base;
 using bench::Complex;
 using bench::fixed;
-using bench::kJ;
-using bench::Machine;
 using bench::real;
-using bench::Winding;
+using switching::all_states;
+using switching::moved;
 
-const Machine kMachine = bench::kIpmLinear;
-const Base kBase = {450, 8, 540, 50e-6};
-constexpr double kLink = 300.0 / 450;
+const switching::Bench kBench = switching::ipm();
+const double kLink = kBench.link();
 
 regulator_config_t config(double L_share = 1)
 {
-    drive_params_t p = bench::parameters(kMachine, kBase);
-    p.regulator = REGULATOR_finite_set;
-    p.start_method = 2;
-    p.i_max = 4500;
-    p.i_trip = 6000;
-    for (int32_t *L : {&p.L_d, &p.L_q, &p.L_dh_rated, &p.L_qh_rated, &p.L_q_rated}) {
-        *L = static_cast<int32_t>(std::lround(*L * L_share));
-    }
-    drive_config_t c = {};
-    const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
-    EXPECT_TRUE(r.ok) << r.reason;
-    return c.regulator;
+    return switching::config(switching::parameters(kBench, REGULATOR_finite_set, L_share));
 }
 
 Complex voltage_of(uint16_t legs)
 {
-    double v[3];
-    for (uint32_t leg = 0; leg < 3; ++leg) {
-        EXPECT_TRUE(pm_leg(legs, leg) == PM_LEG_HIGH || pm_leg(legs, leg) == PM_LEG_LOW);
-        v[leg] = pm_leg(legs, leg) == PM_LEG_HIGH ? kLink : 0;
-    }
-    return {(2 * v[0] - v[1] - v[2]) / 3, (v[1] - v[2]) / std::sqrt(3.0)};
-}
-
-int moved(uint16_t a, uint16_t b)
-{
-    int n = 0;
-    for (uint32_t leg = 0; leg < 3; ++leg) {
-        n += pm_leg(a, leg) != pm_leg(b, leg) ? 1 : 0;
-    }
-    return n;
-}
-
-uint16_t all_states(int n)
-{
-    const auto state = [n](int bit) { return (n >> bit & 1) != 0 ? PM_LEG_HIGH : PM_LEG_LOW; };
-    return pm_legs_of(state(0), state(1), state(2));
+    return switching::voltage_of(legs, kLink);
 }
 
 TEST(FiniteSet, TakesTheNearestOfAllStates)
@@ -79,12 +40,8 @@ TEST(FiniteSet, TakesTheNearestOfAllStates)
         self.finite_set.legs = before;
         const double angle = random.within(-4, 4);
         const Complex ref = {random.within(-0.04, 0.04), random.within(-0.04, 0.04)};
-        const regulator_in_t in = {{0, 0},
-                                   bench::dq(ref),
-                                   0,
-                                   PM_ONE,
-                                   {fixed(std::cos(angle), 30), fixed(std::sin(angle), 30)},
-                                   fixed(kLink, 28)};
+        const regulator_in_t in = {
+            {0, 0}, bench::dq(ref), 0, PM_ONE, switching::half_direction(angle), fixed(kLink, 28)};
         deadbeat_t model = {};
         regulator_out_t wanted = {}, out = {};
         regulator_in_t wide = in;
@@ -119,27 +76,12 @@ TEST(FiniteSet, TakesTheNearestOfAllStates)
 // rms of the ripple about the mean of i_q, A, at 30 % of speed and 2 A.
 double ripple_A(const regulator_config_t &c)
 {
-    const double omega = 0.3 * 314.2 / kBase.omega_rad_s;
-    Winding winding(kMachine, kBase, omega);
-    regulator_t self;
-    regulator_reset(&self, &c, bench::dq(kJ * omega * kMachine.psi_m_Wb / kBase.psi_Wb()), {0, 0},
-                    fixed(omega, 28));
-    double theta = 0, sum = 0, squares = 0;
+    switching::Loop loop(kBench, c, kBench.omega());
+    double sum = 0, squares = 0;
     const int settle = 2000, periods = 8000;
     for (int k = 0; k < settle + periods; ++k) {
-        const double ahead = theta + 1.5 * omega * kBase.omega_rad_s * kBase.period_s;
-        const regulator_in_t in = {bench::dq(winding.i()),
-                                   bench::dq({0, 2 / kBase.i_A}),
-                                   fixed(omega, 28),
-                                   PM_ONE,
-                                   {fixed(std::cos(ahead), 30), fixed(std::sin(ahead), 30)},
-                                   fixed(kLink, 28)};
-        regulator_out_t out = {};
-        regulator_step(&self, &c, &in, &out);
-        winding.run({real(out.v.d, 22), real(out.v.q, 22)});
-        theta = std::remainder(theta + omega * kBase.omega_rad_s * kBase.period_s, 2 * bench::kPi);
+        const double i = loop.run({0, 2}).imag();
         if (k >= settle) {
-            const double i = winding.i().imag() * kBase.i_A;
             sum += i;
             squares += i * i;
         }
@@ -191,8 +133,7 @@ TEST(FiniteSet, SaysWhenTheLinkDoesNotSuffice)
 
 TEST(FiniteSet, IsRefusedWithInjection)
 {
-    drive_params_t p = bench::parameters(kMachine, kBase);
-    p.regulator = REGULATOR_finite_set;
+    drive_params_t p = switching::parameters(kBench, REGULATOR_finite_set);
     p.start_method = 1;
     drive_config_t c = {};
     const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);

@@ -16,8 +16,8 @@ inline Names must_be_positive(const deadbeat_config_t &c)
 {
     return {{"deadbeat k_d", c.k_d},
             {"deadbeat k_q", c.k_q},
-            {"deadbeat per_L_d", c.per_L_d},
-            {"deadbeat per_L_q", c.per_L_q}};
+            {"deadbeat per_L_d", c.model.per_L_d},
+            {"deadbeat per_L_q", c.model.per_L_q}};
 }
 
 inline Names must_be_positive(const finite_set_config_t &c)
