@@ -41,6 +41,14 @@ enum {
 #undef PM_METHOD
 };
 
+/* How many of them give switch states. */
+enum {
+    REGULATORS_SWITCH = 0
+#define PM_METHOD(name, help, traits, needs) PM_IN_IMAGE(name, +(int)((traits)&REGULATOR_SWITCHES))
+#include "firmware/control/regulators.def"
+#undef PM_METHOD
+};
+
 typedef struct {
     regulator_id_t id;
     union {
@@ -57,6 +65,13 @@ typedef union {
 } regulator_t;
 
 uint32_t regulator_traits(regulator_id_t id); /* REGULATOR_... */
+
+/* Its voltage is that of a state, not the one that the current needs. */
+static inline bool regulator_switches(regulator_id_t id)
+{
+    return REGULATORS_SWITCH > 0 && (regulator_traits(id) & (uint32_t)REGULATOR_SWITCHES) != 0U;
+}
+
 void regulator_reset(regulator_t *self, const regulator_config_t *config, pm_dq_t v, pm_dq_t i, pm_q_t omega);
 void regulator_slow_down(regulator_config_t *config, pm_unit_t share);
 

@@ -129,17 +129,6 @@ bool open_loop_ramps(const drive_t *drive)
     return drive->omega_ramp != wanted_speed(drive);
 }
 
-/* The voltage of a period is the one that the current needs, not that of a switch state. */
-static bool is_mean(const drive_t *drive)
-{
-#if PM_HAS(finite_set)
-    return (regulator_traits(drive->config.regulator.id) & (uint32_t)REGULATOR_SWITCHES) == 0U;
-#else
-    (void)drive;
-    return true;
-#endif
-}
-
 /* Too fast for a rotor that swings to stand. */
 static bool is_fast(const drive_t *drive)
 {
@@ -172,7 +161,7 @@ static pm_q_t emf_of_speed(const drive_t *drive)
 static void damp(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
-    if (!is_mean(drive)) {
+    if (regulator_switches(c->regulator.id)) { /* what is below needs the voltage of the mean */
         drive->omega_open = drive->omega_ramp;
         return;
     }
@@ -217,7 +206,7 @@ static void try_again(drive_t *drive)
 static void watch(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
-    if (!is_mean(drive)) {
+    if (regulator_switches(c->regulator.id)) { /* what is below needs the voltage of the mean */
         return;
     }
     const follow_in_t in = {.omega = drive->omega_ramp,
@@ -258,7 +247,7 @@ static void hand_over_in_time(drive_t *drive)
 
 void open_loop_rested(drive_t *drive)
 {
-    if (!is_mean(drive)) {
+    if (regulator_switches(drive->config.regulator.id)) {
         return;
     }
     const drive_config_t *c = &drive->config;
