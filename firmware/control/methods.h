@@ -4,6 +4,7 @@
 
 #include "firmware/control/deadbeat.h"
 #include "firmware/control/finite_set.h"
+#include "firmware/control/predictive.h"
 #include "firmware/control/synchronous_pi.h"
 
 #endif

@@ -9,6 +9,7 @@
 #define PM_CHANNELS 0x0000U
 
 #define PM_WITHOUT_finite_set 1
+#define PM_WITHOUT_predictive 1
 #define PM_WITHOUT_six_step 1
 #define PM_WITHOUT_saliency_map 1
 #define PM_WITHOUT_secondary_voltage 1

@@ -25,4 +25,11 @@ inline Names must_be_positive(const finite_set_config_t &c)
     return must_be_positive(c.deadbeat);
 }
 
+inline Names must_be_positive(const predictive_config_t &c)
+{
+    return {{"predictive per_L_d", c.model.per_L_d},
+            {"predictive per_L_q", c.model.per_L_q},
+            {"predictive share", c.share}};
+}
+
 } // namespace gains
