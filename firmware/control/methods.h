@@ -3,6 +3,7 @@
 #define CONTROL_METHODS_H
 
 #include "firmware/control/deadbeat.h"
+#include "firmware/control/direct_torque.h"
 #include "firmware/control/finite_set.h"
 #include "firmware/control/predictive.h"
 #include "firmware/control/synchronous_pi.h"

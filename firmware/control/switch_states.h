@@ -1,5 +1,5 @@
 /* The eight states of three legs that are held high or low: what regulators choose from that give a state instead of a
- * voltage (finite_set.h, predictive.h).
+ * voltage (finite_set.h, predictive.h, direct_torque.h).
  *
  *   e_n = unit vector at n 60 degrees of the stator, n = 0 ... 5, called sectors
  *   state of sector n:  v = 2/3 v_dc e_n

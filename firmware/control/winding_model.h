@@ -1,4 +1,4 @@
-/* The winding over a period: what predictive regulators (deadbeat.h, predictive.h) know of it.
+/* The winding over a period: what predictive regulators (deadbeat.h, predictive.h, direct_torque.h) know of it.
  *
  *   against_d = R i_d - omega L_q i_q                      voltage that holds the current
  *   against_q = R i_q + omega (L_d i_d + psi_m)

@@ -10,6 +10,7 @@
 
 #define PM_WITHOUT_finite_set 1
 #define PM_WITHOUT_predictive 1
+#define PM_WITHOUT_direct_torque 1
 #define PM_WITHOUT_six_step 1
 #define PM_WITHOUT_saliency_map 1
 #define PM_WITHOUT_secondary_voltage 1

@@ -11,6 +11,7 @@
 #define PM_WITHOUT_deadbeat 1
 #define PM_WITHOUT_finite_set 1
 #define PM_WITHOUT_predictive 1
+#define PM_WITHOUT_direct_torque 1
 #define PM_WITHOUT_six_step 1
 #define PM_WITHOUT_four_pulses 1
 #define PM_WITHOUT_basic_pulses 1

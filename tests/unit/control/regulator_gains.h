@@ -32,4 +32,13 @@ inline Names must_be_positive(const predictive_config_t &c)
             {"predictive share", c.share}};
 }
 
+inline Names must_be_positive(const direct_torque_config_t &c)
+{
+    return {{"direct_torque per_period", c.per_period},
+            {"direct_torque k_drift", c.k_drift},
+            {"direct_torque torque_band", c.torque_band},
+            {"direct_torque per_L_d", c.model.per_L_d},
+            {"direct_torque per_L_q", c.model.per_L_q}};
+}
+
 } // namespace gains

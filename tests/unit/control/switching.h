@@ -114,8 +114,8 @@ class Loop
         regulator_reset(&self_, &config_, bench::dq(emf), {0, 0}, bench::fixed(omega, 28));
     }
 
-    // A period towards a current, all in A.
-    Complex run(Complex i_ref)
+    // A period towards a current, all in A; what was chosen may be changed before it acts.
+    template <typename Change> Complex run(Complex i_ref, Change change)
     {
         const double turn = omega_ * bench_.base.omega_rad_s * bench_.base.period_s;
         const regulator_in_t in = {bench::dq(winding_.i()),
@@ -126,19 +126,20 @@ class Loop
                                    bench::fixed(bench_.link(), 28)};
         regulator_out_t out = {};
         regulator_step(&self_, &config_, &in, &out);
+        change(self_, out);
         winding_.run({bench::real(out.v.d, 22), bench::real(out.v.q, 22)});
         theta_ = std::remainder(theta_ + turn, 2 * bench::kPi);
         return i();
     }
 
+    Complex run(Complex i_ref)
+    {
+        return run(i_ref, [](regulator_t &, regulator_out_t &) {});
+    }
+
     Complex i() const
     {
         return winding_.i() * bench_.base.i_A;
-    }
-
-    regulator_t &state()
-    {
-        return self_;
     }
 
   private:
