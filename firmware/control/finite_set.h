@@ -12,7 +12,7 @@
  * by V_dc T_s / L, more with wrong inductances: for 20 kHz and more, and windings of some millihenry. An
  * injected voltage would be lost in the choice, so it is refused with injection.
  *
- * Cost: 100 instructions a period more than the PI. Range and errors: deadbeat.h. Functions as regulator.h
+ * Cost: 120 instructions a period more than the PI. Range and errors: deadbeat.h. Functions as regulator.h
  * says. Tests: tests/unit/control/finite_set_test.cpp, tests/contract/regulator_contract_test.cpp,
  * tests/scenario/finite_set.yaml. */
 #ifndef CONTROL_FINITE_SET_H

@@ -18,7 +18,7 @@
  * and more, no injection. Slowed, the reference is brought to `share` of its distance from i'. limited: the voltage that would
  * reach the reference exceeds the link's along an axis.
  *
- * Cost: COST instructions a period more than the PI. Range: deadbeat.h. Functions as regulator.h says.
+ * Cost: 300 instructions a period more than the PI. Range: deadbeat.h. Functions as regulator.h says.
  * Tests: tests/unit/control/predictive_test.cpp, tests/contract/regulator_contract_test.cpp,
  * tests/scenario/predictive.yaml, predictive_step.yaml, twin_predictive.yaml. */
 #ifndef CONTROL_PREDICTIVE_H

@@ -5,7 +5,7 @@
  *   state of sector n:  v = 2/3 v_dc e_n
  *   two zero states, all legs low or all high:  v = 0
  *
- * Cost in instructions: switch_voltage() 25, switch_nearest() 25. Tests: tests/unit/control/finite_set_test.cpp. */
+ * Cost: 28 instructions for switch_voltage(). Tests: tests/unit/control/finite_set_test.cpp. */
 #ifndef CONTROL_SWITCH_STATES_H
 #define CONTROL_SWITCH_STATES_H
 

@@ -41,9 +41,11 @@ static inline pm_dq_t winding_against(const winding_model_t *c, pm_dq_t i, pm_q_
 static inline pm_dq_t winding_after(const winding_model_t *c, pm_dq_t v, pm_dq_t i, pm_q_t omega)
 {
     const pm_dq_t against = winding_against(c, i, omega);
+    const pm_q_t change_d = pm_mul_sat(c->per_L_d, pm_sub_sat(v.d, against.d));
+    const pm_q_t change_q = pm_mul_sat(c->per_L_q, pm_sub_sat(v.q, against.q));
     pm_dq_t after;
-    after.d = pm_add_sat(i.d, pm_mul_sat(c->per_L_d, pm_sub_sat(v.d, against.d)));
-    after.q = pm_add_sat(i.q, pm_mul_sat(c->per_L_q, pm_sub_sat(v.q, against.q)));
+    after.d = pm_add_sat(i.d, change_d);
+    after.q = pm_add_sat(i.q, change_q);
     return after;
 }
 
