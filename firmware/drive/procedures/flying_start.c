@@ -159,7 +159,7 @@ static pm_angle_t angle_of(const flying_start_config_t *c, pm_ab_t i, uint32_t s
     const pm_ab_t taken = pm_clarke((pm_abc_t){
         .a = against(c, legs.a, drop), .b = against(c, legs.b, drop), .c = against(c, legs.c, drop)});
     pm_angle_t angle = pm_atan2(i.beta + taken.beta, i.alpha + taken.alpha);
-    for (int round = 0; round < 2; round++) {
+    for (int round = 0; round < 2 && known->ratio != PM_ONE; round++) {
         const pm_dir_t rotor = pm_dir(angle + known->behind - known->half);
         const pm_dq_t along = pm_park(taken, rotor);
         const pm_ab_t whole =
@@ -208,6 +208,14 @@ static void read_pulses(const flying_start_t *self, const flying_start_config_t 
     r->turn = turn;
 }
 
+/* The first and the last alone, between which the turns are known: 1 kHz has not the time for all. */
+static void read_ends(const flying_start_t *self, const flying_start_config_t *c, uint32_t seen, reading_t *r)
+{
+    const pm_angle_t first = angle_of(c, self->pulse[0].i, seen, r);
+    r->angle = angle_of(c, self->pulse[self->count - 1U].i, seen, r);
+    r->turn += pm_angle_diff(r->angle - first, (uint32_t)r->turn * r->periods) / (int32_t)r->periods;
+}
+
 /* By what is known of the pulses how d lies. */
 static void find_behind(const flying_start_config_t *c, const pm_machine_t *machine, uint32_t seen,
                         reading_t *p)
@@ -232,7 +240,7 @@ pm_procedure_t flying_start_find(flying_start_t *self, const flying_start_config
     }
     find_behind(c, machine, seen, &r);
     r.ratio = pm_div(machine->L_q, machine->L_d);
-    read_pulses(self, c, seen, &r);
+    read_ends(self, c, seen, &r);
     find_behind(c, machine, seen, &r);
     self->theta = r.angle + r.behind;
     self->omega = pm_div(r.turn, pm_omega_to_angle(PM_ONE, k_theta));

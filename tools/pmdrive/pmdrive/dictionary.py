@@ -234,8 +234,8 @@ ENTRIES = (
  "overmodulation: 1.1547 is the hexagon's corner"), "1.3.2.1 #4"),
     Entry(0x2200, 14, "predictive_delay", "control", "i32", "live", "1", 0, 0, 0, 1, 1, False, True, "application", "none", {0: 'sampled current taken for that of the next period', 1: 'predicted by what acts until then'}, ('whether the predictive regulator compensates the delay of a period; 0: #7 of '
  'the book'), "12.5.1 #145"),
-    Entry(0x2200, 15, "torque_band", "control", "i32", "live", "1", -3, 0, 5, 500, 50, False, True, "application", "none", {}, ('direct torque control: hysteresis of the torque either way, of 1.5 '
- 'pole_pairs psi_m i_rated'), "1.3.2.3 #6"),
+    Entry(0x2200, 15, "torque_band", "control", "i32", "live", "1", -3, 0, 5, 500, 50, False, True, "application", "none", {}, ('direct torque control: hysteresis of the torque either way, of 1.5 p psi_m '
+ 'i_rated'), "1.3.2.3 #6"),
     Entry(0x2300, 0, "position.count", "position", "u8", "const", "", 0, 0, None, None, 21, False, False, "none", "none", {}, 'highest sub-index', ""),
     Entry(0x2300, 1, "start_method", "position", "i32", "off", "1", 0, 0, 0, 3, 0, False, True, "application", "none", {}, ('0: by saliency; 1: pulses, injection; 2: align, open-loop start; 3: align, '
  'injection'), "5.9 #69"),
