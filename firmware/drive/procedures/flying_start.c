@@ -144,8 +144,8 @@ typedef struct {
     pm_angle_t angle;  /* and the current of the last */
 } reading_t;
 
-/* Against a leg's current; within the noise the devices conduct nothing. */
-static pm_q_t against(const flying_start_config_t *c, pm_q_t i, pm_q_t drop)
+/* By the device of a leg, with the sign of its current; within the noise it conducts nothing. */
+static pm_q_t taken_by(const flying_start_config_t *c, pm_q_t i, pm_q_t drop)
 {
     const pm_q_t more = pm_abs(i) < THERE * c->noise ? 0 : drop;
     return i < 0 ? -more : more;
@@ -157,7 +157,7 @@ static pm_angle_t angle_of(const flying_start_config_t *c, pm_ab_t i, uint32_t s
     const pm_abc_t legs = pm_clarke_inverse(i);
     const pm_q_t drop = times(c->drop, seen);
     const pm_ab_t taken = pm_clarke((pm_abc_t){
-        .a = against(c, legs.a, drop), .b = against(c, legs.b, drop), .c = against(c, legs.c, drop)});
+        .a = taken_by(c, legs.a, drop), .b = taken_by(c, legs.b, drop), .c = taken_by(c, legs.c, drop)});
     pm_angle_t angle = pm_atan2(i.beta + taken.beta, i.alpha + taken.alpha);
     for (int round = 0; round < 2 && known->ratio != PM_ONE; round++) {
         const pm_dir_t rotor = pm_dir(angle + known->behind - known->half);
