@@ -134,16 +134,6 @@ pm_procedure_t flying_start_step(flying_start_t *self, const flying_start_config
     return PM_RUNNING;
 }
 
-/* What is known of the pulses: first nothing. */
-typedef struct {
-    pm_q_t ratio;      /* L_q / L_d */
-    pm_angle_t behind; /* from a current to d, at the end of its pulse */
-    pm_angle_t half;   /* that the rotor has turned since the middle of it */
-    uint32_t periods;  /* from the first pulse to the last, */
-    int32_t turn;      /* in one of them, */
-    pm_angle_t angle;  /* and the current of the last */
-} reading_t;
-
 /* By the device of a leg, with the sign of its current; within the noise it conducts nothing. */
 static pm_q_t taken_by(const flying_start_config_t *c, pm_q_t i, pm_q_t drop)
 {
@@ -152,7 +142,8 @@ static pm_q_t taken_by(const flying_start_config_t *c, pm_q_t i, pm_q_t drop)
 }
 
 /* With what the devices took: along d, L_q / L_d times as much. */
-static pm_angle_t angle_of(const flying_start_config_t *c, pm_ab_t i, uint32_t seen, const reading_t *known)
+static pm_angle_t angle_of(const flying_start_config_t *c, pm_ab_t i, uint32_t seen,
+                           const flying_start_reading_t *known)
 {
     const pm_abc_t legs = pm_clarke_inverse(i);
     const pm_q_t drop = times(c->drop, seen);
@@ -196,7 +187,7 @@ static bool is_still(const flying_start_config_t *c, pm_q_t i, int32_t turn, uin
 
 /* Each angle tells how many turns lie before the next. */
 static void read_pulses(const flying_start_t *self, const flying_start_config_t *c, uint32_t seen,
-                        reading_t *r)
+                        flying_start_reading_t *r)
 {
     const pm_angle_t first = angle_of(c, self->pulse[0].i, seen, r);
     int32_t turn = 0;
@@ -208,8 +199,9 @@ static void read_pulses(const flying_start_t *self, const flying_start_config_t 
     r->turn = turn;
 }
 
-/* The first and the last alone, between which the turns are known: 1 kHz has not the time for all. */
-static void read_ends(const flying_start_t *self, const flying_start_config_t *c, uint32_t seen, reading_t *r)
+/* The first and the last alone, between which the turns are known. */
+static void read_ends(const flying_start_t *self, const flying_start_config_t *c, uint32_t seen,
+                      flying_start_reading_t *r)
 {
     const pm_angle_t first = angle_of(c, self->pulse[0].i, seen, r);
     r->angle = angle_of(c, self->pulse[self->count - 1U].i, seen, r);
@@ -218,7 +210,7 @@ static void read_ends(const flying_start_t *self, const flying_start_config_t *c
 
 /* By what is known of the pulses how d lies. */
 static void find_behind(const flying_start_config_t *c, const pm_machine_t *machine, uint32_t seen,
-                        reading_t *p)
+                        flying_start_reading_t *p)
 {
     const pm_angle_t behind = PM_TURN(0.25) + delta_of(c, machine, p->turn, seen);
     p->behind = p->turn > 0 ? behind : (pm_angle_t)(0U - behind);
@@ -232,18 +224,22 @@ pm_procedure_t flying_start_find(flying_start_t *self, const flying_start_config
         return PM_FAILED_NOT_TURNING;
     }
     const uint32_t seen = seen_of(self->length);
-    reading_t r = {.ratio = PM_ONE};
-    read_pulses(self, c, seen, &r);
-    const pm_ab_t i = self->pulse[self->count - 1U].i;
-    if (is_still(c, pm_hypot(i.alpha, i.beta), r.turn, r.periods)) {
-        return PM_FAILED_NOT_TURNING;
+    flying_start_reading_t *r = &self->reading;
+    if (r->ratio == 0) {
+        r->ratio = PM_ONE;
+        read_pulses(self, c, seen, r);
+        const pm_ab_t i = self->pulse[self->count - 1U].i;
+        if (is_still(c, pm_hypot(i.alpha, i.beta), r->turn, r->periods)) {
+            return PM_FAILED_NOT_TURNING;
+        }
+        find_behind(c, machine, seen, r);
+        r->ratio = pm_div(machine->L_q, machine->L_d);
+        return PM_RUNNING;
     }
-    find_behind(c, machine, seen, &r);
-    r.ratio = pm_div(machine->L_q, machine->L_d);
-    read_ends(self, c, seen, &r);
-    find_behind(c, machine, seen, &r);
-    self->theta = r.angle + r.behind;
-    self->omega = pm_div(r.turn, pm_omega_to_angle(PM_ONE, k_theta));
+    read_ends(self, c, seen, r);
+    find_behind(c, machine, seen, r);
+    self->theta = r->angle + r->behind;
+    self->omega = pm_div(r->turn, pm_omega_to_angle(PM_ONE, k_theta));
     return PM_DONE;
 }
 

@@ -62,8 +62,19 @@ typedef struct {
     uint16_t at; /* ... in that period */
 } flying_start_pulse_t;
 
+/* What is known of the pulses: first nothing. */
+typedef struct {
+    pm_q_t ratio;      /* L_q / L_d */
+    pm_angle_t behind; /* from a current to d, at the end of its pulse */
+    pm_angle_t half;   /* that the rotor has turned since the middle of it */
+    uint32_t periods;  /* from the first pulse to the last, */
+    int32_t turn;      /* in one of them, */
+    pm_angle_t angle;  /* and the current of the last */
+} flying_start_reading_t;
+
 typedef struct {
     flying_start_pulse_t pulse[FLYING_START_PULSES];
+    flying_start_reading_t reading;
     uint32_t charged; /* parts for which the low switches were on */
     uint16_t length;  /* parts */
     uint16_t timer;   /* periods since the first pulse began; before, since the procedure did */
@@ -81,7 +92,8 @@ typedef struct {
 pm_procedure_t flying_start_step(flying_start_t *self, const flying_start_config_t *config, pm_abc_t i,
                                  uint16_t period, uint32_t *low);
 
-/* After PM_DONE: theta and omega; k_theta is that of pm_omega_to_angle(). Not for the control interrupt. */
+/* After PM_DONE: theta and omega; k_theta is that of pm_omega_to_angle(). Not for the control interrupt. In two calls, PM_RUNNING after
+ * the first, so that 1 kHz has the time at 40 kHz. */
 pm_procedure_t flying_start_find(flying_start_t *self, const flying_start_config_t *config,
                                  const pm_machine_t *machine, int32_t k_theta);
 

@@ -103,6 +103,14 @@ struct Found {
     double angle_error_rad = 0, speed_error = 0, most_A = 0, time_s = 0;
 };
 
+// In as many calls as it takes.
+pm_procedure_t find(flying_start_t *self, const flying_start_config_t *c, const pm_machine_t *machine,
+                    int32_t k_theta)
+{
+    const pm_procedure_t first = flying_start_find(self, c, machine, k_theta);
+    return first == PM_RUNNING ? flying_start_find(self, c, machine, k_theta) : first;
+}
+
 Found pulses(Turning x, bool fine, uint64_t seed)
 {
     const double omega_base = 1.3 * std::max(std::abs(x.omega_1_s), 1.0);
@@ -140,7 +148,7 @@ Found pulses(Turning x, bool fine, uint64_t seed)
         }
     }
     if (f.result == PM_DONE) {
-        f.result = flying_start_find(&self, &c, &machine, k_theta);
+        f.result = find(&self, &c, &machine, k_theta);
         const int since = static_cast<uint16_t>(k - 1 - self.pulse[self.count - 1].at);
         const double turned = self.omega / double(PM_ONE) * omega_base * x.m.period_s * since;
         f.angle_error_rad = wrapped(x.theta_rad - turned - rad(self.theta));
@@ -231,7 +239,7 @@ TEST(FlyingStart, OnePulseIsNoSpeed)
         self.length = 32;
         self.count = static_cast<decltype(self.count)>(count);
         self.pulse[0].i = {q28(0.5), 0};
-        EXPECT_EQ(flying_start_find(&self, &c, &machine, 1 << 28), PM_FAILED_NOT_TURNING);
+        EXPECT_EQ(find(&self, &c, &machine, 1 << 28), PM_FAILED_NOT_TURNING);
     }
 }
 
@@ -598,7 +606,7 @@ TEST(FlyingStart, WhatTheDevicesTookIsGivenBack)
             self.pulse[n] = {pm_clarke({q28(leg[0] - sum), q28(leg[1] - sum), q28(leg[2] - sum)}),
                              static_cast<uint16_t>(10 * n)};
         }
-        ASSERT_EQ(flying_start_find(&self, &c, &machine, INT32_C(1) << 30), PM_DONE);
+        ASSERT_EQ(find(&self, &c, &machine, INT32_C(1) << 30), PM_DONE);
         const double theta = rad(self.theta) - 90 * kDegree;
         EXPECT_LE(std::abs(wrapped(theta - (at + 20) * kDegree)), 4.5 * kDegree) << at;
     }
