@@ -6,8 +6,7 @@
  *   |i| = |w| psi_m tau / L_q                                   while tau is small against L / R and a turn
  *   angle of i = theta -+ (90 degrees + delta),  tan delta = s tan(|w| c),   - forwards, + backwards
  *   c = tau / 2 / (1 + y/3 - x/6 + 0.04 x y),  x = R tau / L_q,  y = R tau / L_d
- * theta belongs to the end of the pulse. What the devices took is given back: V_drop tau / L_q in each leg, of which what lies along d,
- * once theta is known, is s times as much.
+ * theta belongs to the end of the pulse. What devices drop along the current is added as i_drop = V_drop tau / L_q in each leg.
  *
  * The first pulse is a period long; on boards that have PWM on one switch and different halves of a period, a 64th of one,
  * at its end. A pulse twice or four times as long follows while it cannot carry more than about 40 % of rated current, is not
@@ -62,19 +61,8 @@ typedef struct {
     uint16_t at; /* ... in that period */
 } flying_start_pulse_t;
 
-/* What is known of the pulses: first nothing. */
-typedef struct {
-    pm_q_t ratio;      /* L_q / L_d */
-    pm_angle_t behind; /* from a current to d, at the end of its pulse */
-    pm_angle_t half;   /* that the rotor has turned since the middle of it */
-    uint32_t periods;  /* from the first pulse to the last, */
-    int32_t turn;      /* in one of them, */
-    pm_angle_t angle;  /* and the current of the last */
-} flying_start_reading_t;
-
 typedef struct {
     flying_start_pulse_t pulse[FLYING_START_PULSES];
-    flying_start_reading_t reading;
     uint32_t charged; /* parts for which the low switches were on */
     uint16_t length;  /* parts */
     uint16_t timer;   /* periods since the first pulse began; before, since the procedure did */
@@ -92,8 +80,7 @@ typedef struct {
 pm_procedure_t flying_start_step(flying_start_t *self, const flying_start_config_t *config, pm_abc_t i,
                                  uint16_t period, uint32_t *low);
 
-/* After PM_DONE: theta and omega; k_theta is that of pm_omega_to_angle(). Not for the control interrupt. In two calls, PM_RUNNING after
- * the first, so that 1 kHz has the time at 40 kHz. */
+/* After PM_DONE: theta and omega; k_theta is that of pm_omega_to_angle(). Not for the control interrupt. */
 pm_procedure_t flying_start_find(flying_start_t *self, const flying_start_config_t *config,
                                  const pm_machine_t *machine, int32_t k_theta);
 
