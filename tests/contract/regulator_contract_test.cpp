@@ -268,6 +268,22 @@ TEST_P(RegulatorContract, StableWithInductancesOffByAThird)
     }
 }
 
+// A carrier would be lost in the choice of a state.
+TEST_P(RegulatorContract, IsRefusedWithInjectionIfItSwitches)
+{
+    drive_params_t p = GetParam().params;
+    for (const int32_t method : {0, 1}) { // injection finds the rotor, or leads behind the align
+        p.start_method = method;
+        drive_config_t c = {};
+        const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
+        EXPECT_EQ(r.ok, !GetParam().switches()) << method;
+        if (GetParam().switches()) {
+            EXPECT_EQ(r.param, DRIVE_PARAM_regulator) << method;
+            EXPECT_STREQ(r.reason, "cannot add an injected voltage: start_method 2") << method;
+        }
+    }
+}
+
 INSTANTIATE_TEST_SUITE_P(All, RegulatorContract, testing::ValuesIn(cases()),
                          [](const testing::TestParamInfo<RegulatorCase> &x) { return x.param.name; });
 

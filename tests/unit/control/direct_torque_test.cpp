@@ -176,14 +176,4 @@ TEST(DirectTorque, TakesTheStateOfTheTable)
     }
 }
 
-TEST(DirectTorque, IsRefusedWithInjection)
-{
-    drive_params_t p = switching::parameters(switching::ipm(), REGULATOR_direct_torque);
-    p.start_method = 1;
-    drive_config_t c = {};
-    const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
-    EXPECT_FALSE(r.ok);
-    EXPECT_EQ(r.param, DRIVE_PARAM_regulator);
-}
-
 } // namespace

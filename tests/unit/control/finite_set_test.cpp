@@ -131,15 +131,4 @@ TEST(FiniteSet, SaysWhenTheLinkDoesNotSuffice)
     EXPECT_LT(limited, 1800);
 }
 
-TEST(FiniteSet, IsRefusedWithInjection)
-{
-    drive_params_t p = switching::parameters(kBench, REGULATOR_finite_set);
-    p.start_method = 1;
-    drive_config_t c = {};
-    const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
-    EXPECT_FALSE(r.ok);
-    EXPECT_EQ(r.param, DRIVE_PARAM_regulator);
-    EXPECT_STREQ(r.reason, "cannot add an injected voltage: start_method 2");
-}
-
 } // namespace

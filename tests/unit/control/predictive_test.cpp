@@ -223,14 +223,4 @@ TEST(Predictive, SaysWhenTheLinkDoesNotSuffice)
     EXPECT_LT(limited, 1800);
 }
 
-TEST(Predictive, IsRefusedWithInjection)
-{
-    drive_params_t p = switching::parameters(switching::ipm(), REGULATOR_predictive);
-    p.start_method = 1;
-    drive_config_t c = {};
-    const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
-    EXPECT_FALSE(r.ok);
-    EXPECT_EQ(r.param, DRIVE_PARAM_regulator);
-}
-
 } // namespace
