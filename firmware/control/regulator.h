@@ -10,7 +10,7 @@
  *   make_x(maker, config)           configuration from SI parameters (x_config.c)
  *   x_bandwidth(maker)              of the closed loop, in Hz
  * References are the drive's; dead time belongs to the modulator. A regulator with the trait REGULATOR_SWITCHES gives
- * a switch state instead, and the voltage that it makes.
+ * a switch state instead, and the voltage that it makes, of which the drive keeps the mean for all that reads it at 1 kHz.
  *
  * Cost of the dispatch: one branch for the default, which is compiled into the caller, none in an image that has no
  * other; a call for the others. Tests: tests/contract/regulator_contract_test.cpp runs all of the list. */
@@ -41,14 +41,6 @@ enum {
 #undef PM_METHOD
 };
 
-/* How many of them give switch states. */
-enum {
-    REGULATORS_SWITCH = 0
-#define PM_METHOD(name, help, traits, needs) PM_IN_IMAGE(name, +(int)((traits)&REGULATOR_SWITCHES))
-#include "firmware/control/regulators.def"
-#undef PM_METHOD
-};
-
 typedef struct {
     regulator_id_t id;
     union {
@@ -65,12 +57,6 @@ typedef union {
 } regulator_t;
 
 uint32_t regulator_traits(regulator_id_t id); /* REGULATOR_... */
-
-/* Its voltage is that of a state, not the one that the current needs. */
-static inline bool regulator_switches(regulator_id_t id)
-{
-    return REGULATORS_SWITCH > 0 && (regulator_traits(id) & (uint32_t)REGULATOR_SWITCHES) != 0U;
-}
 
 void regulator_reset(regulator_t *self, const regulator_config_t *config, pm_dq_t v, pm_dq_t i, pm_q_t omega);
 void regulator_slow_down(regulator_config_t *config, pm_unit_t share);

@@ -45,7 +45,8 @@ struct drive {
     pm_ab_t v_acting;  /* commanded at k-1: acts over [k, k+1) */
     pm_ab_t v_next;    /* commanded at k: acts over [k+1, k+2) */
 
-    regulator_out_t voltage; /* of the current control, without carrier */
+    regulator_out_t voltage;    /* of the current control, without carrier */
+    PM_IF_HELD(pm_dq_t v_held;) /* mean of switch states over some 64 periods, Q22: `voltage` is that, then */
     regulator_t regulator;
     regulator_config_t regulator_config; /* the configured one, slowed while injection asks for it */
     pm_dq_t i_ref;

@@ -7,6 +7,8 @@
 #include "firmware/math/pair.h"
 #include "firmware/math/trig.h"
 
+/* Mean of switch states. */
+#define K_HELD PM_FRAC(1.0 / 64)
 /* A code of full scale is one. */
 #define CURRENT_BITS (PM_Q_BITS - 15)
 
@@ -229,6 +231,8 @@ static inline void control(drive_t *drive, const position_out_t *frame, bool usu
 #if PM_CARRIES(NEEDS_HELD)
     if (pm_rarely(u->legs != 0U)) {
         drive->v_next = v_ab;
+        u->v.d = pm_lp1(&drive->v_held.d, u->v.d, K_HELD); /* who reads it at 1 kHz wants the mean */
+        u->v.q = pm_lp1(&drive->v_held.q, u->v.q, K_HELD);
         out->legs = u->legs;
         out->trip = 0;
         clear_instants(out);

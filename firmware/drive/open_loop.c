@@ -161,10 +161,6 @@ static pm_q_t emf_of_speed(const drive_t *drive)
 static void damp(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
-    if (regulator_switches(c->regulator.id)) { /* what is below needs the voltage of the mean */
-        drive->omega_open = drive->omega_ramp;
-        return;
-    }
     const pm_q_t v = c->open_loop.v_swing;
     const pm_q_t steady = is_fast(drive) ? drive->emf_open : 0; /* what R, L and psi_m are not known to */
     const pm_q_t emf = emf_of_speed(drive) - pm_mul(drive->omega_ramp, c->machine.psi_m);
@@ -206,9 +202,6 @@ static void try_again(drive_t *drive)
 static void watch(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
-    if (regulator_switches(c->regulator.id)) { /* what is below needs the voltage of the mean */
-        return;
-    }
     const follow_in_t in = {.omega = drive->omega_ramp,
                             .v = {.d = pm_narrow(drive->voltage.v.d), .q = pm_narrow(drive->voltage.v.q)},
                             .i = drive->i_open,
@@ -247,9 +240,6 @@ static void hand_over_in_time(drive_t *drive)
 
 void open_loop_rested(drive_t *drive)
 {
-    if (regulator_switches(drive->config.regulator.id)) {
-        return;
-    }
     const drive_config_t *c = &drive->config;
     follow_rested(&drive->follow, &c->machine, drive->i_open, drive->status.v_dc);
     position_set_resistance(&drive->position, &c->position, drive->follow.R);

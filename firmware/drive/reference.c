@@ -39,26 +39,13 @@ static pm_q_t current_for(const drive_t *drive, pm_q_t torque)
     return torque < 0 ? -i : i;
 }
 
-/* |v| that the current takes. Of a regulator that gives switch states, by the machine's equations: a state is no measure. */
-static pm_q_t voltage_taken(const drive_t *drive)
-{
-    const drive_config_t *c = &drive->config;
-    if (!regulator_switches(c->regulator.id)) {
-        return pm_hypot(pm_narrow(drive->voltage.v.d), pm_narrow(drive->voltage.v.q));
-    }
-    const pm_dq_t i = drive->i_ref;
-    const pm_q_t omega = drive->position.pll.omega;
-    const pm_q_t psi_d = c->machine.psi_m + pm_mul(c->machine.L_d, i.d);
-    return pm_hypot(pm_mul(c->machine.R_s, i.d) - pm_mul(omega, pm_mul(c->machine.L_q, i.q)),
-                    pm_mul(c->machine.R_s, i.q) + pm_mul(omega, psi_d));
-}
-
 static pm_q_t flux_current(drive_t *drive, pm_q_t i_q)
 {
     const drive_config_t *c = &drive->config;
     const pm_q_t v_top = pm_unit(drive->status.v_dc, c->v_share);
-    const pm_q_t weak = field_weakening_step(&drive->field_weakening, &c->field_weakening,
-                                             voltage_taken(drive), v_top - v_top / 20);
+    const pm_q_t weak = field_weakening_step(
+        &drive->field_weakening, &c->field_weakening,
+        pm_hypot(pm_narrow(drive->voltage.v.d), pm_narrow(drive->voltage.v.q)), v_top - v_top / 20);
     const pm_q_t light = pm_mul(c->i_d_light, drive->position.weight);
     const pm_q_t i_d = light < 0 ? -light : pm_min(mtpa_i_d(&c->mtpa, i_q), -light);
     return pm_max(i_d + weak, -c->i_max);
