@@ -70,7 +70,17 @@ static void make_damping(maker_t *m, open_loop_config_t *c)
     c->k_swing = fixed(m, corners, FRAC_BITS - 1, DRIVE_PARAM_J);
     c->v_swing =
         fixed(m, least(pm_num_div(emf, pm_num_mul(m->t_slow, m->base.v)), pm_num(1)), Q_BITS, DRIVE_PARAM_J);
-    c->per_swing = fixed(m, pm_num_div(k, emf), SMALL_BITS, DRIVE_PARAM_psi_m);
+    const pm_num_t per_swing = pm_num_div(k, emf);
+    c->per_swing = fixed(m, per_swing, SMALL_BITS, DRIVE_PARAM_psi_m);
+    const pm_num_t L_d = si(m, DRIVE_PARAM_L_d);
+    const pm_num_t L_q = si(m, DRIVE_PARAM_L_q);
+    const pm_num_t difference = pm_num_cmp(L_q, L_d) < 0 ? pm_num_sub(L_d, L_q) : pm_num_sub(L_q, L_d);
+    /* i_max, or i_most */
+    const pm_num_t moved =
+        least(pm_num_mul(difference, si(m, DRIVE_PARAM_i_max)), pm_num_mul(pm_num_ratio(4, 9), psi));
+    const pm_num_t own = pm_num_div(mul3(per_swing, pm_num_ratio(3, 4), moved), m->base.psi);
+    const pm_num_t k_yield = pm_num_div(pm_num_ratio(3, 2), pm_num_add(pm_num(1), own));
+    c->k_yield = (uint16_t)fixed(m, least(k_yield, pm_num(1)), 15, DRIVE_PARAM_L_q);
 }
 
 static void make_open_loop(maker_t *m, open_loop_config_t *c)

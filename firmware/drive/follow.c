@@ -76,13 +76,9 @@ bool follow_slow(follow_t *self, const pm_machine_t *machine, const follow_in_t 
     self->turned = self->ms != 0U ? self->turned : 0;
     self->follows_ms = (uint8_t)pm_min(self->follows_ms + 1, FOLLOW_FOLLOWS_MS);
     self->follows = self->follows || self->follows_ms == FOLLOW_FOLLOWS_MS;
+    const bool back = in->omega < 0;
+    self->lag = pm_atan2(back ? -self->along : self->along, back ? -self->across : self->across);
     return false;
-}
-
-pm_angle_t follow_lag(const follow_t *self, pm_q_t omega)
-{
-    const bool back = omega < 0;
-    return pm_atan2(back ? -self->along : self->along, back ? -self->across : self->across);
 }
 
 int32_t follow_load(const follow_t *self)

@@ -16,7 +16,7 @@
  * The load is too high for the current where |along| > 0.65 e, 40 degrees of a round rotor; below 0.4 there is more
  * current than it needs.
  *
- * follow_slow() at 1 kHz while a vector is imposed. Filters of 20 ms; one division, at the end of a rest. State 32 bytes.
+ * follow_slow() at 1 kHz while a vector is imposed. Filters of 20 ms; one division, at the end of a rest. State 36 bytes.
  * Tests: tests/unit/drive/follow_test.cpp, tests/scenario/fault_stall_open.yaml, open_loop_load.yaml,
  * open_loop_salient.yaml. */
 #ifndef DRIVE_FOLLOW_H
@@ -52,6 +52,7 @@ typedef struct {
     pm_q_t R, R_doubt;
     pm_q_t along, across; /* filtered; at rest: v_d */
     pm_q_t emf;           /* |e| where it says something, else 0 */
+    pm_angle_t lag;       /* delta, while the rotor is seen to follow */
     int32_t turned;       /* by the vector since the rotor was seen to follow, ... */
     int32_t least;        /* ... and what it must, of FOLLOW_TURN */
     uint16_t ms;          /* that it stands, or has rested */
@@ -71,9 +72,6 @@ void follow_rested(follow_t *self, const pm_machine_t *machine, pm_q_t i, pm_q_t
 
 /* True: the rotor does not follow. */
 bool follow_slow(follow_t *self, const pm_machine_t *machine, const follow_in_t *in);
-
-/* By how much the rotor is behind a vector that turns at omega, delta of above. */
-pm_angle_t follow_lag(const follow_t *self, pm_q_t omega);
 
 /* 1: the load asks for more current; -1: for less; 0 neither, or not known. */
 int32_t follow_load(const follow_t *self);

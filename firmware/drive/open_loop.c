@@ -14,9 +14,6 @@
 #define PER_TURN (INT32_MAX / (FOLLOW_TURN / 2))
 /* With more current, before the vector turns once more. */
 #define REST_MS 100U
-/* With which the vector yields, 2 ms: at once, it would answer its own movement, which the next voltage may show as a swing three
- * times as large. */
-#define K_YIELD PM_FRAC(0.4)
 /* From the lead of an observer on: the voltage of a step of the current is not that of the rotor. */
 #define SETTLE_MS 5U
 
@@ -106,7 +103,7 @@ void open_loop_release(drive_t *drive)
     drive->position.pll.omega = drive->omega_ramp;
     if (drive->follow.follows) {
         const position_config_t *c = &drive->config.position;
-        position_turn(&drive->position, c, 0U - follow_lag(&drive->follow, drive->omega_ramp), drive->i_ab);
+        position_turn(&drive->position, c, 0U - drive->follow.lag, drive->i_ab);
         position_set_resistance(&drive->position, c, drive->follow.R);
     }
 }
@@ -153,7 +150,7 @@ static pm_q_t emf_of_speed(const drive_t *drive)
     if (!is_fast(drive) || !f->follows) {
         return e.alpha;
     }
-    return pm_park(e, pm_dir(follow_lag(f, drive->omega_ramp))).d;
+    return pm_park(e, pm_dir(f->lag)).d;
 }
 
 /* A rotor on a vector of constant current swings undamped: the vector falls behind one that is too fast and runs ahead of
@@ -167,8 +164,8 @@ static void damp(drive_t *drive)
     const pm_q_t seen = steady + pm_clamp(emf - steady, -v, v);
     const pm_q_t swing = seen - pm_lp1(&drive->emf_open, seen, c->open_loop.k_swing);
     const pm_q_t yields = -pm_small_gain(pm_small(swing), c->open_loop.per_swing);
-    pm_q_t moves = drive->omega_open - drive->omega_ramp;
-    drive->omega_open = drive->omega_ramp + pm_lp1(&moves, yields, K_YIELD);
+    const pm_q_t moves = drive->omega_open - drive->omega_ramp;
+    drive->omega_open += pm_mul(yields - moves, (pm_q_t)c->open_loop.k_yield << (PM_Q_BITS - 15));
 }
 
 void open_loop_hold(drive_t *drive)

@@ -35,9 +35,16 @@ void *memset(void *to, int value, size_t size)
 {
     const uint32_t byte = (uint8_t)value;
     if (by_words((uintptr_t)to, 0U, size)) {
+        const uint32_t word = byte * 0x01010101U;
         uint32_t *t = to;
-        for (size_t n = 0; n < size / 4U; ++n) {
-            t[n] = byte * 0x01010101U;
+        uint32_t *const end = t + size / 4U;
+        if ((size & 4U) != 0U) {
+            *t++ = word;
+        }
+        while (t != end) { /* by two: some kilobytes within a control period */
+            t[0] = word;
+            t[1] = word;
+            t += 2;
         }
     } else {
         uint8_t *t = to;

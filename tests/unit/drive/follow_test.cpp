@@ -80,8 +80,7 @@ TEST(Follow, ALagOfUpToAQuarterTurnFollows)
                 ASSERT_FALSE(x.step(omega, lag)) << omega << ' ' << lag;
             }
             EXPECT_TRUE(x.self.follows);
-            EXPECT_NEAR(static_cast<int32_t>(follow_lag(&x.self, fixed(omega, 28))) / std::pow(2, 32) * 360,
-                        lag, 0.5);
+            EXPECT_NEAR(static_cast<int32_t>(x.self.lag) / std::pow(2, 32) * 360, lag, 0.5);
             EXPECT_NEAR(real(x.self.along), omega * kPsi * std::sin(lag * kDegree),
                         1e-4 * std::abs(omega) + 1e-6);
             EXPECT_NEAR(real(x.self.across), omega * kPsi * std::cos(lag * kDegree),

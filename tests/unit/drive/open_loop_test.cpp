@@ -455,8 +455,7 @@ TEST(OpenLoop, TheStepOfTheCurrentIsNoSwing)
                              bench::fixed(real(x.d.omega_open) * reactive + emf - step, PM_WIDE_BITS)};
             slow(x, 1);
             yields = std::max(yields, std::abs(real(x.d.omega_open) - omega));
-            lag_deg =
-                std::max(lag_deg, std::abs(bench::rad(follow_lag(&x.d.follow, x.d.omega_ramp))) / kDegree);
+            lag_deg = std::max(lag_deg, std::abs(bench::rad(x.d.follow.lag)) / kDegree);
         }
         if (settles) {
             EXPECT_LT(yields, 0.01 * omega);
