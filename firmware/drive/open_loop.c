@@ -165,7 +165,7 @@ static void damp(drive_t *drive)
     const pm_q_t swing = seen - pm_lp1(&drive->emf_open, seen, c->open_loop.k_swing);
     const pm_q_t yields = -pm_small_gain(pm_small(swing), c->open_loop.per_swing);
     const pm_q_t moves = drive->omega_open - drive->omega_ramp;
-    drive->omega_open += pm_mul(yields - moves, (pm_q_t)c->open_loop.k_yield << (PM_Q_BITS - 15));
+    drive->omega_open += pm_mul(yields - moves, (pm_q_t)c->open_loop.k_yield * (PM_ONE / 32768));
 }
 
 void open_loop_hold(drive_t *drive)
