@@ -144,6 +144,7 @@ void block_take_duty(drive_t *drive);           /* mode duty: its speed without 
 
 /* open_loop.c: align, open-loop start, current mode, hand-over to the observer and back. */
 void open_loop_start(drive_t *drive);
+void open_loop_begin(drive_t *drive);  /* the stage alone: vector and position are what they are */
 void open_loop_hold(drive_t *drive);   /* the vector stays, but for a rotor that swings */
 void open_loop_rested(drive_t *drive); /* the end of the align: what its voltage says of R */
 void open_loop_slow(drive_t *drive);

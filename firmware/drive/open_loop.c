@@ -17,7 +17,7 @@
 /* From the lead of an observer on: the voltage of a step of the current is not that of the rotor. */
 #define SETTLE_MS 5U
 
-static void begin(drive_t *drive)
+void open_loop_begin(drive_t *drive)
 {
     drive->stage = STAGE_OPEN_LOOP;
     drive->emf_open = 0;
@@ -29,7 +29,7 @@ static void begin(drive_t *drive)
 
 void open_loop_start(drive_t *drive)
 {
-    begin(drive);
+    open_loop_begin(drive);
     drive->theta_open = SWEEP_FROM;
     drive->omega_ramp = 0;
     drive->omega_open = 0;
@@ -75,7 +75,7 @@ void open_loop_resume(drive_t *drive)
     regulator_reset(&drive->regulator, &drive->config.regulator, pm_park(v, dir), pm_park(present, dir),
                     drive->omega_ramp);
     follow_resume(&drive->follow);
-    begin(drive);
+    open_loop_begin(drive);
     drive->i_ref = (pm_dq_t){.d = drive->i_open, .q = 0};
     drive->rest_ms = SETTLE_MS;
     drive->emf_open = unexplained(drive, v, i);

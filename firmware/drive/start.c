@@ -87,7 +87,8 @@ PM_RARE static void begin_caught(drive_t *drive)
     const pm_pll_t caught = {.theta = drive->sequence.theta, .omega = drive->sequence.omega};
     const bool imposed = !c->position.injects && pm_abs(caught.omega) < c->position.omega_low;
     if (imposed) {
-        open_loop_start(drive);
+        open_loop_begin(drive);
+        drive->i_vector = c->open_loop.i;
     }
     drive_take_over(drive, &caught, 0);
     const pm_q_t v_top = pm_unit(drive->status.v_dc, c->v_share);

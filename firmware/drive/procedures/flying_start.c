@@ -51,7 +51,7 @@ static uint32_t longer(const flying_start_t *self, const flying_start_config_t *
 /* Until the next pulse; all of the time that is left, if no other fits behind it. */
 static void after_pulse(flying_start_t *self, const flying_start_config_t *c)
 {
-    static const uint8_t more[FLYING_START_PULSES + 1] = {0, 0, 1, 3, 7, 0}; /* pitches, of so many pulses */
+    static const uint8_t more[FLYING_START_PULSES + 1] = {0, 0, 1, 3, 7, 15, 0}; /* pitches, of so many pulses */
     const uint32_t pitch = periods_of(self->length) + SEEN + QUIET - 1U;
     const uint32_t behind = self->timer + pitch;
     if (self->charged >= c->charge && (self->count >= FLYING_START_PULSES || behind > c->span)) {
@@ -134,21 +134,30 @@ pm_procedure_t flying_start_step(flying_start_t *self, const flying_start_config
     return PM_RUNNING;
 }
 
-/* A leg's current with what the devices took from it; within the noise they conduct nothing. */
-static pm_q_t restored(const flying_start_config_t *c, pm_q_t i, pm_q_t drop)
+/* By the device of a leg, with the sign of its current; within the noise it conducts nothing. */
+static pm_q_t taken_by(const flying_start_config_t *c, pm_q_t i, pm_q_t drop)
 {
-    const pm_q_t size = pm_abs(i);
-    const pm_q_t more = size < THERE * c->noise ? 0 : drop;
-    return i < 0 ? i - more : i + more;
+    const pm_q_t more = pm_abs(i) < THERE * c->noise ? 0 : drop;
+    return i < 0 ? -more : more;
 }
 
-static pm_angle_t angle_of(const flying_start_config_t *c, pm_ab_t i, uint32_t seen)
+/* With what the devices took: along d, L_q / L_d times as much. */
+static pm_angle_t angle_of(const flying_start_config_t *c, pm_ab_t i, uint32_t seen,
+                           const flying_start_reading_t *known)
 {
     const pm_abc_t legs = pm_clarke_inverse(i);
     const pm_q_t drop = times(c->drop, seen);
-    const pm_ab_t whole = pm_clarke((pm_abc_t){
-        .a = restored(c, legs.a, drop), .b = restored(c, legs.b, drop), .c = restored(c, legs.c, drop)});
-    return pm_atan2(whole.beta, whole.alpha);
+    const pm_ab_t taken = pm_clarke((pm_abc_t){
+        .a = taken_by(c, legs.a, drop), .b = taken_by(c, legs.b, drop), .c = taken_by(c, legs.c, drop)});
+    pm_angle_t angle = pm_atan2(i.beta + taken.beta, i.alpha + taken.alpha);
+    for (int round = 0; round < 2 && known->ratio != PM_ONE; round++) {
+        const pm_dir_t rotor = pm_dir(angle + known->behind - known->half);
+        const pm_dq_t along = pm_park(taken, rotor);
+        const pm_ab_t whole =
+            pm_park_inverse((pm_dq_t){.d = pm_mul_sat(along.d, known->ratio), .q = along.q}, rotor);
+        angle = pm_atan2(i.beta + whole.beta, i.alpha + whole.alpha);
+    }
+    return angle;
 }
 
 /* By which the current lags behind the EMF at the end of the pulse. */
@@ -176,6 +185,38 @@ static bool is_still(const flying_start_config_t *c, pm_q_t i, int32_t turn, uin
     return pm_mulh(i, whole) < c->noise + c->noise / 2;
 }
 
+/* Each angle tells how many turns lie before the next. */
+static void read_pulses(const flying_start_t *self, const flying_start_config_t *c, uint32_t seen,
+                        flying_start_reading_t *r)
+{
+    const pm_angle_t first = angle_of(c, self->pulse[0].i, seen, r);
+    int32_t turn = 0;
+    for (uint32_t n = 1; n < self->count; n++) {
+        r->periods = (uint16_t)(self->pulse[n].at - self->pulse[0].at);
+        r->angle = angle_of(c, self->pulse[n].i, seen, r);
+        turn += pm_angle_diff(r->angle - first, (uint32_t)turn * r->periods) / (int32_t)r->periods;
+    }
+    r->turn = turn;
+}
+
+/* The first and the last alone, between which the turns are known. */
+static void read_ends(const flying_start_t *self, const flying_start_config_t *c, uint32_t seen,
+                      flying_start_reading_t *r)
+{
+    const pm_angle_t first = angle_of(c, self->pulse[0].i, seen, r);
+    r->angle = angle_of(c, self->pulse[self->count - 1U].i, seen, r);
+    r->turn += pm_angle_diff(r->angle - first, (uint32_t)r->turn * r->periods) / (int32_t)r->periods;
+}
+
+/* By what is known of the pulses how d lies. */
+static void find_behind(const flying_start_config_t *c, const pm_machine_t *machine, uint32_t seen,
+                        flying_start_reading_t *p)
+{
+    const pm_angle_t behind = PM_TURN(0.25) + delta_of(c, machine, p->turn, seen);
+    p->behind = p->turn > 0 ? behind : (pm_angle_t)(0U - behind);
+    p->half = (pm_angle_t)(p->turn / (int32_t)(4U * PARTS) * (int32_t)seen);
+}
+
 pm_procedure_t flying_start_find(flying_start_t *self, const flying_start_config_t *c,
                                  const pm_machine_t *machine, int32_t k_theta)
 {
@@ -183,23 +224,27 @@ pm_procedure_t flying_start_find(flying_start_t *self, const flying_start_config
         return PM_FAILED_NOT_TURNING;
     }
     const uint32_t seen = seen_of(self->length);
-    const pm_angle_t first = angle_of(c, self->pulse[0].i, seen);
-    pm_angle_t angle = first;
-    uint32_t periods = 1;
-    int32_t turn = 0;
-    for (uint32_t n = 1; n < self->count; n++) {
-        periods = (uint16_t)(self->pulse[n].at - self->pulse[0].at);
-        angle = angle_of(c, self->pulse[n].i, seen);
-        turn += pm_angle_diff(angle - first, (uint32_t)turn * periods) / (int32_t)periods;
+    flying_start_reading_t *r = &self->reading;
+    r->calls++;
+    if (r->calls == 1U) {
+        r->ratio = PM_ONE;
+        read_pulses(self, c, seen, r);
+        const pm_ab_t i = self->pulse[self->count - 1U].i;
+        if (is_still(c, pm_hypot(i.alpha, i.beta), r->turn, r->periods)) {
+            return PM_FAILED_NOT_TURNING;
+        }
+        find_behind(c, machine, seen, r);
+        r->ratio = pm_div(machine->L_q, machine->L_d);
+        r->calls = pm_abs(r->ratio - PM_ONE) < PM_ONE / 8 ? 2U : 1U;
+    } else if (r->calls == 2U) {
+        read_ends(self, c, seen, r);
+        find_behind(c, machine, seen, r);
+    } else {
+        return PM_DONE;
     }
-    const pm_ab_t i = self->pulse[self->count - 1U].i;
-    if (is_still(c, pm_hypot(i.alpha, i.beta), turn, periods)) {
-        return PM_FAILED_NOT_TURNING;
-    }
-    const pm_angle_t behind = PM_TURN(0.25) + delta_of(c, machine, turn, seen);
-    self->theta = turn > 0 ? angle + behind : angle - behind;
-    self->omega = pm_div(turn, pm_omega_to_angle(PM_ONE, k_theta));
-    return PM_DONE;
+    self->theta = r->angle + r->behind;
+    self->omega = pm_div(r->turn, pm_omega_to_angle(PM_ONE, k_theta));
+    return PM_RUNNING;
 }
 
 void procedure_flying_start_begin(drive_t *drive)

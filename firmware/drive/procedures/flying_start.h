@@ -6,13 +6,14 @@
  *   |i| = |w| psi_m tau / L_q                                   while tau is small against L / R and a turn
  *   angle of i = theta -+ (90 degrees + delta),  tan delta = s tan(|w| c),   - forwards, + backwards
  *   c = tau / 2 / (1 + y/3 - x/6 + 0.04 x y),  x = R tau / L_q,  y = R tau / L_d
- * theta belongs to the end of the pulse. What devices drop along the current is added as i_drop = V_drop tau / L_q in each leg.
+ * theta belongs to the end of the pulse. What the devices took is given back: V_drop tau / L_q in each leg, of which what lies along d,
+ * once theta is known, is s times as much.
  *
  * The first pulse is a period long; on boards that have PWM on one switch and different halves of a period, a 64th of one,
  * at its end. A pulse twice or four times as long follows while it cannot carry more than about 40 % of rated current, is not
  * longer than 3.2 ms, and the rotor does not turn by more than 0.2 rad meanwhile: then an error of L_q / L_d costs little. What
  * has no angle yet is not enough.
- * Five of the length that is left, at distances that double, give the speed: each tells how many turns lie before the next.
+ * Six of the length that is left, at distances that double, give the speed: each tells how many turns lie before the next.
  *   w = (angle of i_n - angle of i_0) / (t_n - t_0)
  * At rest (PM_FAILED_NOT_TURNING): currents below twenty times their noise or one and a half i_drop, or a turn that noise could
  * make, 0.16 |i| |turn in rad| below 1.5 times the noise of a current. A 12-bit converter of 2.5 times rated current sees 5 to
@@ -39,7 +40,7 @@
 extern "C" {
 #endif
 
-#define FLYING_START_PULSES 5
+#define FLYING_START_PULSES 6
 #define FLYING_START_PARTS  32 /* of a period */
 #define FLYING_START_LEAST  20 /* times its noise: a current that has an angle, of 3 degrees rms */
 
@@ -61,8 +62,20 @@ typedef struct {
     uint16_t at; /* ... in that period */
 } flying_start_pulse_t;
 
+/* What is known of the pulses: first nothing. */
+typedef struct {
+    pm_q_t ratio;      /* L_q / L_d */
+    pm_angle_t behind; /* from a current to d, at the end of its pulse */
+    pm_angle_t half;   /* that the rotor has turned since the middle of it */
+    uint32_t periods;  /* from the first pulse to the last, */
+    int32_t turn;      /* in one of them, */
+    pm_angle_t angle;  /* and the current of the last */
+    uint8_t calls;     /* of flying_start_find() */
+} flying_start_reading_t;
+
 typedef struct {
     flying_start_pulse_t pulse[FLYING_START_PULSES];
+    flying_start_reading_t reading;
     uint32_t charged; /* parts for which the low switches were on */
     uint16_t length;  /* parts */
     uint16_t timer;   /* periods since the first pulse began; before, since the procedure did */
@@ -80,7 +93,9 @@ typedef struct {
 pm_procedure_t flying_start_step(flying_start_t *self, const flying_start_config_t *config, pm_abc_t i,
                                  uint16_t period, uint32_t *low);
 
-/* After PM_DONE: theta and omega; k_theta is that of pm_omega_to_angle(). Not for the control interrupt. */
+/* After PM_DONE: theta and omega; k_theta is that of pm_omega_to_angle(). Not for the control interrupt. In three calls, PM_RUNNING
+ * after the first two, so that each, and what begins after the last, fits into 1 kHz at 40 kHz; in two where L_q / L_d is within an
+ * eighth of 1, as the angle of a fast rotor is known less well with each millisecond. */
 pm_procedure_t flying_start_find(flying_start_t *self, const flying_start_config_t *config,
                                  const pm_machine_t *machine, int32_t k_theta);
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 #include <random>
+#include <utility>
 
 #include "tests/support/application.h"
 #include "tests/support/plants.h"
@@ -32,7 +33,7 @@ constexpr double kFormula_rad = 4 * kDegree, kSpeedError = 0.03;
 // --- The pulses alone ----------------------------------------------------------------------------------------------
 
 struct Machine {
-    double R_ohm, L_d_H, L_q_H, psi_Wb, period_s, i_rated_A, i_full_A;
+    double R_ohm, L_d_H, L_q_H, psi_Wb, period_s, i_rated_A, i_full_A, drop_V;
 };
 
 struct Turning {
@@ -40,14 +41,29 @@ struct Turning {
     double omega_1_s, theta_rad;
     double i_d_A = 0, i_q_A = 0;
 
+    // By the devices of the three legs, along d and q.
+    std::pair<double, double> taken(double d_A, double q_A) const
+    {
+        double d_V = 0, q_V = 0;
+        for (int k = 0; k < 3 && m.drop_V > 0; ++k) {
+            const double g = theta_rad - 2 * kPi / 3 * k;
+            const double leg_A = d_A * std::cos(g) - q_A * std::sin(g);
+            const double leg_V = m.drop_V * std::clamp(leg_A / (1e-3 * m.i_full_A), -1.0, 1.0);
+            d_V += 2.0 / 3 * leg_V * std::cos(g);
+            q_V -= 2.0 / 3 * leg_V * std::sin(g);
+        }
+        return {d_V, q_V};
+    }
+
     // Shorted, by the rotor's equations: Heun in 200 steps.
     void shorted(double t_s)
     {
         const int n = 200;
         const double dt = t_s / n;
         const auto rate = [this](double d, double q, double *d_d, double *d_q) {
-            *d_d = (-m.R_ohm * d + omega_1_s * m.L_q_H * q) / m.L_d_H;
-            *d_q = (-m.R_ohm * q - omega_1_s * (m.L_d_H * d + m.psi_Wb)) / m.L_q_H;
+            const auto [taken_d_V, taken_q_V] = taken(d, q);
+            *d_d = (-taken_d_V - m.R_ohm * d + omega_1_s * m.L_q_H * q) / m.L_d_H;
+            *d_q = (-taken_q_V - m.R_ohm * q - omega_1_s * (m.L_d_H * d + m.psi_Wb)) / m.L_q_H;
         };
         for (int k = 0; k < n; ++k) {
             double d0 = 0, q0 = 0, d1 = 0, q1 = 0;
@@ -55,13 +71,14 @@ struct Turning {
             rate(i_d_A + dt * d0, i_q_A + dt * q0, &d1, &q1);
             i_d_A += dt * (d0 + d1) / 2;
             i_q_A += dt * (q0 + q1) / 2;
+            theta_rad += omega_1_s * dt;
         }
     }
 
     void period(uint32_t low)
     {
         const double share = low == 0U ? 0 : (low < 32U ? low / 64.0 : 1.0);
-        theta_rad += omega_1_s * m.period_s;
+        theta_rad += omega_1_s * (1 - share) * m.period_s;
         if (share > 0) {
             shorted(share * m.period_s);
         } else {
@@ -86,6 +103,17 @@ struct Found {
     double angle_error_rad = 0, speed_error = 0, most_A = 0, time_s = 0;
 };
 
+// In as many calls as it takes.
+pm_procedure_t find(flying_start_t *self, const flying_start_config_t *c, const pm_machine_t *machine,
+                    int32_t k_theta)
+{
+    pm_procedure_t result = PM_RUNNING;
+    for (int call = 0; call < 3 && result == PM_RUNNING; ++call) {
+        result = flying_start_find(self, c, machine, k_theta);
+    }
+    return result;
+}
+
 Found pulses(Turning x, bool fine, uint64_t seed)
 {
     const double omega_base = 1.3 * std::max(std::abs(x.omega_1_s), 1.0);
@@ -101,6 +129,7 @@ Found pulses(Turning x, bool fine, uint64_t seed)
     c.i_zero = c.i_rings = q28(2e-3);
     c.i_enough = q28(0.12 * x.m.i_rated_A / x.m.i_full_A);
     c.decay = q28(x.m.R_ohm * x.m.period_s / (64 * x.m.L_q_H));
+    c.drop = q28(x.m.drop_V * x.m.period_s / (64 * x.m.L_q_H) / x.m.i_full_A);
     pm_machine_t machine = {};
     machine.L_d = q28(x.m.L_d_H / x.m.L_q_H * 0.5);
     machine.L_q = q28(0.5);
@@ -122,7 +151,7 @@ Found pulses(Turning x, bool fine, uint64_t seed)
         }
     }
     if (f.result == PM_DONE) {
-        f.result = flying_start_find(&self, &c, &machine, k_theta);
+        f.result = find(&self, &c, &machine, k_theta);
         const int since = static_cast<uint16_t>(k - 1 - self.pulse[self.count - 1].at);
         const double turned = self.omega / double(PM_ONE) * omega_base * x.m.period_s * since;
         f.angle_error_rad = wrapped(x.theta_rad - turned - rad(self.theta));
@@ -170,6 +199,31 @@ TEST(FlyingStart, FindsAngleAndSpeedOfRandomMachines)
     }
 }
 
+// What devices drop, a tenth of the EMF here, drives more current along d than along q: given back by L_q alone, 24 of the 400 angles
+// are off by more than 10 degrees, the worst by 14. A leg whose current they took wholly does not show how much that was: one in a
+// hundred may be off by up to 12.
+TEST(FlyingStart, DropsTakeMoreAlongTheDirectAxis)
+{
+    std::mt19937_64 random(19);
+    int found = 0, beyond = 0;
+    for (int n = 0; n < 400; ++n) {
+        Turning x = draw(random);
+        x.m.L_q_H = std::uniform_real_distribution<double>(2.5, 5)(random) * x.m.L_d_H;
+        x.m.drop_V = 0.1 * x.m.psi_Wb * std::abs(x.omega_1_s);
+        const Found f = pulses(x, false, random());
+        if (f.result == PM_FAILED_NOT_TURNING) { // the smallest currents are not one and a half times i_drop
+            continue;
+        }
+        ASSERT_EQ(f.result, PM_DONE) << n;
+        ++found;
+        beyond += std::abs(f.angle_error_rad) > kAngle_rad ? 1 : 0;
+        EXPECT_LE(std::abs(f.angle_error_rad), 1.2 * kAngle_rad) << n;
+        EXPECT_LE(std::abs(f.speed_error), 5 * kSpeedError) << n;
+    }
+    EXPECT_GE(found, 395);
+    EXPECT_LE(beyond, 4);
+}
+
 // Noise is no speed, whichever way it points.
 TEST(FlyingStart, ARotorAtRestIsNotTurning)
 {
@@ -191,7 +245,7 @@ TEST(FlyingStart, OnePulseIsNoSpeed)
         self.length = 32;
         self.count = static_cast<decltype(self.count)>(count);
         self.pulse[0].i = {q28(0.5), 0};
-        EXPECT_EQ(flying_start_find(&self, &c, &machine, 1 << 28), PM_FAILED_NOT_TURNING);
+        EXPECT_EQ(find(&self, &c, &machine, 1 << 28), PM_FAILED_NOT_TURNING);
     }
 }
 
@@ -558,7 +612,7 @@ TEST(FlyingStart, WhatTheDevicesTookIsGivenBack)
             self.pulse[n] = {pm_clarke({q28(leg[0] - sum), q28(leg[1] - sum), q28(leg[2] - sum)}),
                              static_cast<uint16_t>(10 * n)};
         }
-        ASSERT_EQ(flying_start_find(&self, &c, &machine, INT32_C(1) << 30), PM_DONE);
+        ASSERT_EQ(find(&self, &c, &machine, INT32_C(1) << 30), PM_DONE);
         const double theta = rad(self.theta) - 90 * kDegree;
         EXPECT_LE(std::abs(wrapped(theta - (at + 20) * kDegree)), 4.5 * kDegree) << at;
     }
