@@ -19,7 +19,7 @@
  * make, 0.16 |i| |turn in rad| below 1.5 times the noise of a current. A 12-bit converter of 2.5 times rated current sees 5 to
  * 10 % of rated speed, and less where L is small.
  *
- * Largest current: that of the first pulse, |w| psi_m tau / L_q, or 40 % of rated. All takes at most 16 ms, without the wait for
+ * Largest current: that of the first pulse, |w| psi_m tau / L_q, or 40 % of rated. All takes at most 15 ms, without the wait for
  * zero current: where the EMF exceeds the link the diodes conduct, and no switch closes until that ends;
  * PM_FAILED_TIMEOUT after 65,535 periods. Between pulses the diodes take the current back to zero, and the link takes its
  * energy, 3/4 L i^2. What rings on for longer than four periods is that of the legs' capacitance, v_dc root(C / L_d) at

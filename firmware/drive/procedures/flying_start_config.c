@@ -2,7 +2,7 @@
 #include "firmware/params/maker.h"
 
 #define LONGEST_US 3200U  /* a pulse */
-#define SPAN_US    16000U /* all of them */
+#define SPAN_US    15000U /* all of them */
 
 static pm_q_t per_part(maker_t *m, pm_num_t v, drive_param_id_t blame)
 {
