@@ -131,6 +131,37 @@ void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t
     write_shares(self, config, &u, PM_SHARE_HALF, pm_per_volt(link), i_quarter, out);
 }
 
+#if MODULATOR_HAS_EDGES
+/* Share of the period that a leg misses, Q20; lost: with the sign of its current. */
+static int32_t missed(pm_leg_t from, pm_leg_t to, int32_t dead, int32_t lost)
+{
+    if (from == PM_LEG_LOW && to == PM_LEG_HIGH) {
+        return -pm_clamp(dead + lost, 0, dead);
+    }
+    if (from == PM_LEG_HIGH && to == PM_LEG_LOW) {
+        return pm_clamp(dead - lost, 0, dead);
+    }
+    return 0;
+}
+
+pm_ab_t modulator_edges(const modulator_t *self, const modulator_config_t *config, uint16_t from, uint16_t to,
+                        pm_abc_t i, pm_q_t v_dc)
+{
+    if (from == to || self->zone_alpha == 0) {
+        return (pm_ab_t){.alpha = 0, .beta = 0};
+    }
+    const pm_q_t current[PM_LEGS] = {i.a, i.b, i.c};
+    const pm_pair_t height = pm_pair(&self->near, &self->far);
+    pm_q_t v[PM_LEGS];
+    for (uint32_t leg = 0; leg < PM_LEGS; leg++) {
+        const int32_t lost = zones_add(0, pm_mulh(current[leg] / 4, self->zone_alpha), height);
+        const int32_t share = missed(pm_leg(from, leg), pm_leg(to, leg), config->dead, lost);
+        v[leg] = pm_frac(v_dc, pm_shl(share, 32 - PM_SHARE_BITS));
+    }
+    return pm_clarke((pm_abc_t){.a = v[0], .b = v[1], .c = v[2]});
+}
+#endif
+
 #if PM_CARRIES(NEEDS_HALVES)
 /* By how much all legs must move to lie within 0 ... top. */
 static int32_t into_range(const int32_t on[PM_LEGS], int32_t top)

@@ -157,6 +157,10 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
 {
     const bool checked = is_checked(drive, in);
     drive->v_acting = drive->v_next;
+#if MODULATOR_HAS_EDGES
+    drive->legs_before = 0;
+    drive->legs_acting = 0;
+#endif
     out->trip = 0;
     clear_instants(out);
     if (!checked) {
@@ -212,6 +216,26 @@ static inline void excite(drive_t *drive, const excitation_t *carrier, drive_out
     (void)out;
 }
 
+#if PM_CARRIES(NEEDS_HELD)
+/* What acts is what a state makes less what its edges miss, with the currents at these. */
+static inline void note_edges(drive_t *drive, uint16_t legs)
+{
+#if MODULATOR_HAS_EDGES
+    if (drive->legs_before != 0U) {
+        const pm_ab_t v = modulator_edges(&drive->modulator, &drive->config.modulator, drive->legs_before,
+                                          drive->legs_acting, drive->i_abc, drive->status.v_dc);
+        drive->v_acting.alpha += v.alpha;
+        drive->v_acting.beta += v.beta;
+    }
+    drive->legs_before = drive->legs_acting;
+    drive->legs_acting = legs;
+#else
+    (void)drive;
+    (void)legs;
+#endif
+}
+#endif
+
 /* The voltage acts one and a half periods later, when the frame has turned to drive->ahead. */
 static inline void control(drive_t *drive, const position_out_t *frame, bool usual, drive_out_t *out)
 {
@@ -230,6 +254,7 @@ static inline void control(drive_t *drive, const position_out_t *frame, bool usu
     pm_ab_t v_ab = pm_park_inverse_quarter(v, frame->ahead);
 #if PM_CARRIES(NEEDS_HELD)
     if (pm_rarely(u->legs != 0U)) {
+        note_edges(drive, u->legs);
         drive->v_next = v_ab;
         u->v.d = pm_lp1(&drive->v_held.d, u->v.d, K_HELD); /* who reads it at 1 kHz wants the mean */
         u->v.q = pm_lp1(&drive->v_held.q, u->v.q, K_HELD);

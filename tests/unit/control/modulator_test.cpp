@@ -501,6 +501,43 @@ TEST(Modulator, CapacitanceOfALegIsFollowedWithinItsError)
     EXPECT_GE(largest, 0.05); // the counts of a period do not hide it
 }
 
+// A held leg that changes misses the dead time where its diode carries the current on, and nothing where the current itself moves
+// the node.
+TEST(Modulator, EdgesOfHeldLegsComeLateAgainstTheCurrent)
+{
+    constexpr pm_leg_t kHigh = PM_LEG_HIGH, kLow = PM_LEG_LOW;
+    modulator_config_t c = compensating();
+    c.drop = 0;
+    modulator_t m = {};
+    modulator_slow(&m, &c, fixed(kLink, 28));
+    const auto missed = [](pm_leg_t from, pm_leg_t to, double i) {
+        const double f = std::clamp(i / kZone, -1.0, 1.0);
+        const double up = -std::min(1.0, 1 + f), down = std::min(1.0, 1 - f);
+        return kDead * kLink * (from == to ? 0 : (to == kHigh ? up : down));
+    };
+    const pm_leg_t states[] = {kHigh, kLow};
+    for (int n = 0; n < 64; ++n) {
+        pm_leg_t from[3], to[3];
+        for (int leg = 0; leg < 3; ++leg) {
+            from[leg] = states[n >> leg & 1];
+            to[leg] = states[n >> (leg + 3) & 1];
+        }
+        for (const double size : {0.0, 0.2 * kZone, 0.1}) {
+            const double i[3] = {size, -2 * size, size};
+            const pm_abc_t legs = {fixed(i[0], 28), fixed(i[1], 28), fixed(i[2], 28)};
+            const Complex v =
+                bench::complex(modulator_edges(&m, &c, pm_legs_of(from[0], from[1], from[2]),
+                                               pm_legs_of(to[0], to[1], to[2]), legs, fixed(kLink, 28)));
+            Complex expected = 0;
+            for (int leg = 0; leg < 3; ++leg) {
+                expected +=
+                    2.0 / 3 * missed(from[leg], to[leg], i[leg]) * std::polar(1.0, leg * 120 * kDegree);
+            }
+            EXPECT_NEAR(std::abs(v - expected), 0, 1e-5) << n << ' ' << size;
+        }
+    }
+}
+
 TEST(Modulator, CompensationSwitchedOffIsNone)
 {
     modulator_config_t c = compensating();
