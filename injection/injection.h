@@ -109,7 +109,8 @@ static inline void injection_step(injection_t *self, const injection_config_t *c
                                       {in->dir.cos, in->dir.sin},
                                       in->omega,
                                       {in->ahead.cos, in->ahead.sin},
-                                      INJECTION_IF_MORE(in->more)};
+                                      INJECTION_IF_MORE(in->more, )
+                                          INJECTION_IF_VOLTAGE({in->v.alpha, in->v.beta})};
         injection_out_t result;
         injection_step_other(self, config, &given, &result);
         *out = result;

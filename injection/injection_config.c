@@ -4,10 +4,24 @@
 #include "injection/saliency_config.h"
 #include "injection/sine.h"
 
+/* The voltage of the carrier is made by the regulator of the current. */
+static bool in_reference(const maker_t *m)
+{
+#if PM_HAS(current_sine)
+    return (injection_traits((injection_id_t)m->params->injection) & (uint32_t)SOURCE_IN_REFERENCE) != 0U;
+#else
+    (void)m;
+    return false;
+#endif
+}
+
 /* Without a load dead time and devices take 4/3 of a leg's loss of the vector, whose sign is the current's: a carrier
  * below that moves no current, and what answers is the noise. */
 static bool carrier_passes(const maker_t *m)
 {
+    if (in_reference(m)) {
+        return true;
+    }
     const pm_num_t lost = pm_num_add(dead_voltage(m), si(m, DRIVE_PARAM_device_drop));
     return pm_num_cmp(si(m, DRIVE_PARAM_v_injection), pm_num_mul(lost, pm_num_ratio(4, 3))) > 0;
 }
@@ -16,7 +30,8 @@ static bool carrier_passes(const maker_t *m)
 static void check_carrier(maker_t *m)
 {
     const pm_num_t linear = pm_num_mul(si(m, DRIVE_PARAM_v_dc_nominal), pm_num_sqrt(pm_num_ratio(1, 3)));
-    if (pm_num_cmp(si(m, DRIVE_PARAM_v_injection), pm_num_mul(linear, pm_num_ratio(3, 5))) > 0) {
+    if (!in_reference(m) &&
+        pm_num_cmp(si(m, DRIVE_PARAM_v_injection), pm_num_mul(linear, pm_num_ratio(3, 5))) > 0) {
         refuse(m, DRIVE_PARAM_v_injection, "leaves too little of v_dc_nominal for control");
     } else if (!carrier_passes(m)) {
         refuse(m, DRIVE_PARAM_v_injection, "is lost in dead time");
@@ -39,7 +54,7 @@ void make_injection(maker_t *m, injection_config_t *c)
 {
     check_carrier(m);
     c->id = (injection_id_t)m->params->injection;
-    c->reserve = per_unit(m, DRIVE_PARAM_v_injection, m->base.v);
+    c->reserve = in_reference(m) ? 0 : per_unit(m, DRIVE_PARAM_v_injection, m->base.v);
     switch (c->id) {
 #define PM_METHOD(name, help, traits, needs)                                                                 \
     PM_IN_IMAGE(name, case INJECTION_##name                                                                  \

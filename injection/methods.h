@@ -2,6 +2,7 @@
 #ifndef INJECTION_METHODS_H
 #define INJECTION_METHODS_H
 
+#include "injection/current_sine.h"
 #include "injection/inform.h"
 #include "injection/pulsating_sine.h"
 #include "injection/pulsating_square.h"

@@ -160,6 +160,28 @@ void make_saliency_across(maker_t *m, saliency_config_t *c, pm_num_t flux)
     }
 }
 
+#if PM_HAS(current_sine)
+static pm_num_t slope_held(const maker_t *m, const inductances_t *L)
+{
+    return pm_num_mul(m->base.i, pm_num_div(pm_num_sub(L->L_q, L->L_d), L->L_d));
+}
+
+void make_saliency_held(maker_t *m, saliency_config_t *c)
+{
+    const inductances_t zero = inductances_at_zero(m);
+    const inductances_t rated = inductances_at_rated(m);
+    *c = (saliency_config_t){0};
+    make_gain(m, c, slope_held(m, &zero), slope_held(m, &rated));
+    if (m->params->cross_coupling_comp == 2) {
+        refuse(m, DRIVE_PARAM_cross_coupling_comp, "2 turns a carrier of the voltage: 1");
+    } else if (m->params->cross_coupling_comp != 0) {
+        make_lambda(m, c);
+    } else {
+        /* not compensated */
+    }
+}
+#endif
+
 void make_saliency_sequence(maker_t *m, saliency_config_t *c, pm_num_t flux)
 {
     *c = (saliency_config_t){0};

@@ -27,6 +27,10 @@ pm_num_t slope_sequence(const inductances_t *L, pm_num_t flux); /* of the negati
  * that has no saliency left at rated current. */
 void make_saliency_across(maker_t *m, saliency_config_t *c, pm_num_t flux);
 
+/* What a source needs that asks for a current along d and reads the voltage across: lambda, and as gain the radians per
+ * share of the voltage along d, Q20: L_d / (L_q - L_d). */
+void make_saliency_held(maker_t *m, saliency_config_t *c);
+
 /* What a source that reads sequences needs: gain, theta_m and I_p. */
 void make_saliency_sequence(maker_t *m, saliency_config_t *c, pm_num_t flux);
 

@@ -18,6 +18,13 @@ extern "C" {
 #define INJECTION_IF_MORE(...)
 #endif
 
+/* A source has its carrier in the reference of the current, and reads the voltage that makes it. */
+#if PM_HAS(current_sine)
+#define INJECTION_IF_VOLTAGE(...) __VA_ARGS__
+#else
+#define INJECTION_IF_VOLTAGE(...)
+#endif
+
 typedef struct {
     pm_ab_t i;           /* current at k */
     pm_dir_t dir;        /* direction of the present position theta(k) */
@@ -26,11 +33,13 @@ typedef struct {
 #if INJECTION_HAS_MORE
     const obs_more_t *more;
 #endif
+    INJECTION_IF_VOLTAGE(pm_ab_t v;) /* as obs_in_t */
 } injection_in_t;
 
 /* What a carrier does to the period [k+1, k+2); what a source does not name is zero. */
 typedef struct {
-    pm_ab_t v; /* added throughout, per-unit */
+    pm_ab_t v;                          /* added throughout, per-unit */
+    INJECTION_IF_VOLTAGE(pm_q_t i_ref;) /* added to the reference of the current along d */
 #if PM_HAS(counted_carrier)
     pm_dq_t i; /* current of the carrier in the middle of that period, in the estimated frame, where the
                   compensation of dead time is to count it in */
@@ -49,6 +58,7 @@ static inline excitation_t excitation_of(pm_ab_t v)
 {
     excitation_t e;
     e.v = v;
+    INJECTION_IF_VOLTAGE(e.i_ref = 0;)
 #if PM_HAS(counted_carrier)
     e.i.d = 0;
     e.i.q = 0;

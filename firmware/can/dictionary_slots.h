@@ -303,7 +303,7 @@ enum {
     OD_PARAMETER_CROSS_COUPLING_COMP,
     OD_PARAMETER_INJECTION_BANDWIDTH,
     OD_PARAMETER_INJECTION,
-#if PM_HAS(rotating_sine) || PM_HAS(pulsating_sine) || PM_HAS(stationary_sine) || PM_HAS(stationary_square) || PM_HAS(three_phase_hf) || PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating)
+#if PM_HAS(rotating_sine) || PM_HAS(pulsating_sine) || PM_HAS(stationary_sine) || PM_HAS(stationary_square) || PM_HAS(three_phase_hf) || PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating) || PM_HAS(current_sine)
     OD_PARAMETER_F_INJECTION,
     OD_PARAMETER_INJECTION_POST_COMP,
 #endif
@@ -354,11 +354,14 @@ enum {
 #if PM_HAS(counted_carrier)
     OD_PARAMETER_INJECTION_PRE_COMP,
 #endif
-#if PM_HAS(rotating_sine) || PM_HAS(pulsating_sine) || PM_HAS(stationary_sine) || PM_HAS(stationary_square) || PM_HAS(three_phase_hf) || PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating)
+#if PM_HAS(rotating_sine) || PM_HAS(pulsating_sine) || PM_HAS(stationary_sine) || PM_HAS(stationary_square) || PM_HAS(three_phase_hf) || PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating) || PM_HAS(current_sine)
     OD_PARAMETER_INJECTION_DELAY,
 #endif
 #if PM_HAS(carrier_rest)
     OD_PARAMETER_INJECTION_REST,
+#endif
+#if PM_HAS(current_sine)
+    OD_PARAMETER_I_CARRIER,
 #endif
 #if PM_HAS(six_step)
     OD_PARAMETER_COMMUTATION,

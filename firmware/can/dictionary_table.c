@@ -4,7 +4,7 @@
 
 /* clang-format off */
 
-const uint32_t od_schema = 0xE28B2809U;
+const uint32_t od_schema = 0xCD1EC2F9U;
 
 /* least, preset, most; those of parameters are in firmware/params/parameters.def */
 const od_values_t od_values[] = {
@@ -74,7 +74,7 @@ const int32_t od_presets[] = {
     500,
     512,
     65536,
-    66,
+    67,
     671088928,
     687866144,
     687866400,
@@ -372,7 +372,7 @@ const od_entry_t od_table[] = {
     {0x2400U, 3U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_CROSS_COUPLING_COMP, 0U, 0U},
     {0x2400U, 4U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_INJECTION_BANDWIDTH, 0U, 0U},
     {0x2400U, 5U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_INJECTION, 0U, 0U},
-#if PM_HAS(rotating_sine) || PM_HAS(pulsating_sine) || PM_HAS(stationary_sine) || PM_HAS(stationary_square) || PM_HAS(three_phase_hf) || PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating)
+#if PM_HAS(rotating_sine) || PM_HAS(pulsating_sine) || PM_HAS(stationary_sine) || PM_HAS(stationary_square) || PM_HAS(three_phase_hf) || PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating) || PM_HAS(current_sine)
     {0x2400U, 6U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_F_INJECTION, 0U, 0U},
     {0x2400U, 7U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_INJECTION_POST_COMP, 0U, 0U},
 #endif
@@ -423,11 +423,14 @@ const od_entry_t od_table[] = {
 #if PM_HAS(counted_carrier)
     {0x2400U, 64U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_INJECTION_PRE_COMP, 0U, 0U},
 #endif
-#if PM_HAS(rotating_sine) || PM_HAS(pulsating_sine) || PM_HAS(stationary_sine) || PM_HAS(stationary_square) || PM_HAS(three_phase_hf) || PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating)
+#if PM_HAS(rotating_sine) || PM_HAS(pulsating_sine) || PM_HAS(stationary_sine) || PM_HAS(stationary_square) || PM_HAS(three_phase_hf) || PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating) || PM_HAS(current_sine)
     {0x2400U, 65U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_INJECTION_DELAY, 0U, 0U},
 #endif
 #if PM_HAS(carrier_rest)
     {0x2400U, 66U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_INJECTION_REST, 0U, 0U},
+#endif
+#if PM_HAS(current_sine)
+    {0x2400U, 67U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_I_CARRIER, 0U, 0U},
 #endif
 #if PM_HAS(six_step)
     {0x2500U, 0U, OD_READ, OD_U8, OD_CONSTANT, OD_GROUP_NONE, 0U, 30U, 0U},

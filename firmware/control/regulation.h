@@ -13,6 +13,7 @@ extern "C" {
 /* Traits of a regulator, a sum; they stand in its row of the list. */
 enum {
     REGULATOR_SWITCHES = 1, /* gives a switch state, not a voltage: it ripples, and no carrier can be added */
+    REGULATOR_FOLLOWS = 2,  /* within a few periods: a carrier may be in the reference */
 };
 
 typedef struct {

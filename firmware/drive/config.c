@@ -251,6 +251,26 @@ static pm_q_t i_d_rated(const maker_t *m, const mtpa_config_t *mtpa)
     return mtpa_i_d(mtpa, i_rated);
 }
 
+/* A carrier must come through the regulator. */
+static void check_injected(maker_t *m, const drive_config_t *config)
+{
+    const uint32_t traits = regulator_traits(config->regulator.id);
+#if PM_HAS(current_sine)
+    const uint32_t source = injection_traits((injection_id_t)m->params->injection);
+    if ((source & (uint32_t)SOURCE_IN_REFERENCE) != 0U) {
+        if ((traits & REGULATOR_FOLLOWS) == 0U) {
+            refuse(m, DRIVE_PARAM_regulator, "does not follow a carrier in its reference: 1, 2 or 3");
+        }
+        return;
+    }
+#endif
+    if ((traits & REGULATOR_SWITCHES) != 0U) {
+        refuse(m, DRIVE_PARAM_regulator,
+               PM_HAS(current_sine) ? "cannot add an injected voltage: injection 11, or start_method 2"
+                                    : "cannot add an injected voltage: start_method 2");
+    }
+}
+
 drive_result_t drive_configure(drive_config_t *config, const drive_params_t *params, uint32_t channels)
 {
     maker_t m = {.params = params,
@@ -282,8 +302,8 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
     }
     make_modulator(&m, &config->modulator);
     make_regulator(&m, &config->regulator);
-    if (config->injection && (regulator_traits(config->regulator.id) & REGULATOR_SWITCHES) != 0U) {
-        refuse(&m, DRIVE_PARAM_regulator, "cannot add an injected voltage: start_method 2");
+    if (config->injection) {
+        check_injected(&m, config);
     }
     if (params->t_settle != 0 && (regulator_traits(config->regulator.id) & REGULATOR_SWITCHES) != 0U) {
         refuse(&m, DRIVE_PARAM_regulator, "hides currents from low-side shunts");

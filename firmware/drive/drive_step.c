@@ -236,13 +236,23 @@ static inline void note_edges(drive_t *drive, uint16_t legs)
 }
 #endif
 
+static inline pm_dq_t current_wanted(const drive_t *drive, const position_out_t *frame)
+{
+    pm_dq_t i_ref = pm_pair_dq(&drive->i_ref);
+#if PM_HAS(current_sine)
+    i_ref.d += drive->carrier ? frame->carrier.i_ref : 0;
+#endif
+    (void)frame;
+    return i_ref;
+}
+
 /* The voltage acts one and a half periods later, when the frame has turned to drive->ahead. */
 static inline void control(drive_t *drive, const position_out_t *frame, bool usual, drive_out_t *out)
 {
     const drive_config_t *c = &drive->config;
     const pm_q_t v_dc = drive->status.v_dc;
     const regulator_in_t in = {.i = frame->i,
-                               .i_ref = pm_pair_dq(&drive->i_ref),
+                               .i_ref = current_wanted(drive, frame),
                                .omega = frame->omega,
                                .v_max = pm_unit(v_dc, drive->v_share),
                                PM_IF_HELD(.ahead = frame->ahead, .v_dc = v_dc)};

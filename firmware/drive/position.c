@@ -38,7 +38,7 @@ void position_step(position_t *self, const position_config_t *config, const posi
                                     .dir = dir,
                                     .omega = pll.omega,
                                     .ahead = frame_ahead,
-                                    INJECTION_IF_MORE(.more = at->more)};
+                                    INJECTION_IF_MORE(.more = at->more, ) INJECTION_IF_VOLTAGE(.v = *at->v)};
         injection_out_t low;
         injection_step(&self->injection, &config->injection, &raw, &low);
         i_dq.d = low.i.d; /* by members, so that it stays in registers */

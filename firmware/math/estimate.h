@@ -18,6 +18,7 @@ enum {
     SOURCE_ONE_WAY = 8,    /* its carrier turns one way: mirrored inputs do not give mirrored outputs */
     SOURCE_STATOR = 16,    /* its carrier stands in the stator: turned inputs do not give the same outputs */
     SOURCE_IN_MEAN = 32,   /* eps is right in the mean over a sixth of a turn only */
+    SOURCE_IN_REFERENCE = 64, /* its carrier is in the reference of the current, not in the voltage */
 };
 
 #if PM_CARRIES(PM_MEASURED)

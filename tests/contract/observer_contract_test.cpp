@@ -181,7 +181,7 @@ class Injection : public Source
     }
     Carrier carrier() override
     {
-        return {bench::complex(carrier_.v), bench::complex(carrier_.split)};
+        return {bench::complex(carrier_.v) + made_, bench::complex(carrier_.split)};
     }
 
   protected:
@@ -192,16 +192,22 @@ class Injection : public Source
         ASSERT_EQ(none.eps, 0);
         injection_slow(&state_, &config_, &in);
         k_ = 0;
+        i_ref_ = 0;
     }
     obs_out_t step_with(const obs_in_t &in) override
     {
         if (++k_ % 10 == 0) {
             injection_slow(&state_, &config_, &in);
         }
-        const injection_in_t given = {in.i, in.dir, in.omega, ahead_, in.more};
+        const injection_in_t given = {in.i, in.dir, in.omega, ahead_, in.more, in.v};
         injection_out_t out;
         injection_step(&state_, &config_, &given, &out);
         carrier_ = out.carrier;
+        // a regulator that gives a carrier of its reference the voltage along d that the winding needs
+        const double change_A = (real(carrier_.i_ref) - i_ref_) * kBase.i_A;
+        i_ref_ = real(carrier_.i_ref);
+        made_ = kMachine.L_d0_H / kBase.period_s * change_A / kBase.v_V *
+                Complex(real(ahead_.cos, 30), real(ahead_.sin, 30));
         if (carrier_.sample_at[0] != 0) {
             ask(carrier_.sample_at[0]);
         }
@@ -216,6 +222,8 @@ class Injection : public Source
     injection_t state_;
     pm_half_dir_t ahead_ = {1 << 30, 0};
     excitation_t carrier_ = {};
+    Complex made_ = 0;
+    double i_ref_ = 0;
     int k_ = 0;
 };
 

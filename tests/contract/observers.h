@@ -102,6 +102,7 @@ inline std::vector<InjectionCase> injection_cases(const Machine &m = kIpmLinear,
         drive_params_t p = parameters(m, b);
         p.injection = static_cast<int32_t>(id);
         p.start_method = 1;
+        p.regulator = (traits & SOURCE_IN_REFERENCE) != 0 ? static_cast<int32_t>(REGULATOR_deadbeat) : 0;
         p.neutral_filter = static_cast<int32_t>(std::lround(kNeutral.filter_s * 1e9));
         drive_config_t config = {};
         const drive_result_t result = drive_configure(&config, &p, PM_CHANNELS);

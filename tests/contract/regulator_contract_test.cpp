@@ -268,18 +268,26 @@ TEST_P(RegulatorContract, StableWithInductancesOffByAThird)
     }
 }
 
-// A carrier would be lost in the choice of a state.
-TEST_P(RegulatorContract, IsRefusedWithInjectionIfItSwitches)
+// A carrier of the voltage would be lost in the choice of a state, one of the reference in slow control.
+TEST_P(RegulatorContract, TakesTheCarriersThatItPasses)
 {
+    const bool switches = GetParam().switches(), follows = (GetParam().traits & REGULATOR_FOLLOWS) != 0;
     drive_params_t p = GetParam().params;
     for (const int32_t method : {0, 1}) { // injection finds the rotor, or leads behind the align
         p.start_method = method;
-        drive_config_t c = {};
-        const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
-        EXPECT_EQ(r.ok, !GetParam().switches()) << method;
-        if (GetParam().switches()) {
-            EXPECT_EQ(r.param, DRIVE_PARAM_regulator) << method;
-            EXPECT_STREQ(r.reason, "cannot add an injected voltage: start_method 2") << method;
+        for (const injection_id_t source : {INJECTION_pulsating_sine, INJECTION_current_sine}) {
+            p.injection = static_cast<int32_t>(source);
+            const bool takes = source == INJECTION_current_sine ? follows : !switches;
+            drive_config_t c = {};
+            const drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
+            EXPECT_EQ(r.ok, takes) << method << ' ' << source << ' ' << drive_param_table[r.param].name;
+            if (!takes) {
+                EXPECT_EQ(r.param, DRIVE_PARAM_regulator) << method;
+                EXPECT_STREQ(r.reason,
+                             source == INJECTION_current_sine
+                                 ? "does not follow a carrier in its reference: 1, 2 or 3"
+                                 : "cannot add an injected voltage: injection 11, or start_method 2");
+            }
         }
     }
 }

@@ -27,6 +27,16 @@ inline Names must_be_positive(const pulsating_sine_config_t &c)
     return and_of(c.sine, {{"pulsating gain_0", c.saliency.gain_0}, {"pulsating h_d", c.h_d}});
 }
 
+inline Names must_be_positive(const current_sine_config_t &c)
+{
+    return and_of(c.sine, {{"current gain_0", c.saliency.gain_0},
+                           {"current i_h", c.i_h},
+                           {"current i_later", c.i_later},
+                           {"current v_d", c.v_d},
+                           {"current k_0", c.k_0},
+                           {"current half_turn", c.half_turn}});
+}
+
 inline Names must_be_positive(const stationary_sine_config_t &c)
 {
     return and_of(c.sine, {{"stationary gain_0", c.saliency.gain_0},
