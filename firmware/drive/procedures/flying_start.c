@@ -51,7 +51,8 @@ static uint32_t longer(const flying_start_t *self, const flying_start_config_t *
 /* Until the next pulse; all of the time that is left, if no other fits behind it. */
 static void after_pulse(flying_start_t *self, const flying_start_config_t *c)
 {
-    static const uint8_t more[FLYING_START_PULSES + 1] = {0, 0, 1, 3, 7, 15, 0}; /* pitches, of so many pulses */
+    static const uint8_t more[FLYING_START_PULSES + 1] = {0, 0,  1, 3,
+                                                          7, 15, 0}; /* pitches, of so many pulses */
     const uint32_t pitch = periods_of(self->length) + SEEN + QUIET - 1U;
     const uint32_t behind = self->timer + pitch;
     if (self->charged >= c->charge && (self->count >= FLYING_START_PULSES || behind > c->span)) {
