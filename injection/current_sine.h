@@ -4,7 +4,9 @@
  * A carrier added to the voltage is lost on such a regulator: one of switch states gives a zero state for any voltage below v_dc / 3,
  * and deadbeat control takes the carrier for an error. So the current is asked for,
  *   i_d* = ... + I_h cos phi_k,  phi_k = k a,  a = 2 pi / N,  f_h = f_pwm / N  (sine.h)
- * and the regulator (firmware/control, trait REGULATOR_FOLLOWS) makes a voltage along d of it. It controls the answer along q away
+ * and the regulator (firmware/control, trait REGULATOR_FOLLOWS) makes a voltage along d of it, of amplitude v_injection:
+ *   I_h = v_injection T_s / (2 sin(a/2) L_d)
+ * It controls the answer along q away
  * as well, so that the current alone does not show the position; what the winding has for its current beside the voltage that was
  * applied does. In the estimated frame, e: position error, v: mean voltage over [k-1, k), di = i_k - i_k-1:
  *   y = L_qh / T_s (di_q + lambda di_d) - v_q
@@ -25,7 +27,7 @@
  * gain. misfit: |V_d| against that of I_h without load, relative. The current that is controlled and reported is the sampled one, with
  * the carrier. Bandwidth of the position loop: as sine.h; current control is not slowed.
  *
- * Range: w_h L_d I_h up to 0.6 v_dc/sqrt(3); switch states follow a carrier from half of what one of them moves the current by,
+ * Range: v_injection up to 0.6 v_dc/sqrt(3); switch states follow a carrier from half of what one of them moves the current by,
  * I_h > v_dc T_s / (3 L_d), below which the position is lost. L_q / T_s below 60 times the base impedance. Each period 230
  * instructions in a program that carries all channels, where pulsating_sine.h takes 185; in no image. 1 kHz: 280. Functions as injection.h says.
  * Tests: tests/unit/injection/current_sine_test.cpp, tests/scenario/current_sine.yaml. */

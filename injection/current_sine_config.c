@@ -9,17 +9,14 @@ injection_limits_t current_sine_limits(const maker_t *m)
     return (injection_limits_t){.pll_max = sine_limits(m).pll_max};
 }
 
-/* Amplitude of the change in a period: 2 sin(a / 2) I_h; within 1e-4 for N >= 8. */
-static pm_num_t change(const maker_t *m)
+/* I_h = v_injection T_s / (2 sin(a / 2) L_d); within 1e-4 for N >= 8. */
+static pm_num_t i_carrier(const maker_t *m)
 {
     const pm_num_t a = pm_num_mul(sine_omega(m), m->base.t_s);
     const pm_num_t less = pm_num_sub(pm_num(1), pm_num_div(square(a), pm_num(24)));
-    return mul3(si(m, DRIVE_PARAM_i_carrier), a, less);
-}
-
-static pm_num_t voltage_along_d(const maker_t *m)
-{
-    return pm_num_div(pm_num_mul(si(m, DRIVE_PARAM_L_d), change(m)), m->base.t_s);
+    const pm_num_t change =
+        pm_num_div(pm_num_mul(si(m, DRIVE_PARAM_v_injection), m->base.t_s), si(m, DRIVE_PARAM_L_d));
+    return pm_num_div(change, pm_num_mul(a, less));
 }
 
 /* L_q / T_s through the incremental values without load and at rated current. */
@@ -40,18 +37,9 @@ static pm_num_t later(const maker_t *m)
 {
     const pm_num_t x = mul3(pm_num_ratio(3, 4), sine_omega(m), m->base.t_s);
     const pm_num_t less = pm_num_sub(pm_num(1), pm_num_div(square(x), pm_num(6)));
-    return mul3(pm_num_mul(pm_num(2), si(m, DRIVE_PARAM_i_carrier)), x, less);
+    return mul3(pm_num_mul(pm_num(2), i_carrier(m)), x, less);
 }
 #endif
-
-/* The regulator has to make the carrier beside the voltage that the load needs. */
-static void check_voltage(maker_t *m)
-{
-    const pm_num_t linear = pm_num_mul(si(m, DRIVE_PARAM_v_dc_nominal), pm_num_sqrt(pm_num_ratio(1, 3)));
-    if (pm_num_cmp(voltage_along_d(m), pm_num_mul(linear, pm_num_ratio(3, 5))) > 0) {
-        refuse(m, DRIVE_PARAM_i_carrier, "takes more than 0.6 of the voltage: lower it or f_injection");
-    }
-}
 
 void make_current_sine(maker_t *m, current_sine_config_t *c)
 {
@@ -59,12 +47,11 @@ void make_current_sine(maker_t *m, current_sine_config_t *c)
     c->sine.lag = 5U * (c->sine.step / 2U) - PM_TURN(0.25); /* of V_d: two periods and a half behind i_d* */
     make_saliency_held(m, &c->saliency);
     make_across(m, c);
-    check_voltage(m);
-    c->i_h = per_unit(m, DRIVE_PARAM_i_carrier, m->base.i);
+    c->i_h = fixed(m, pm_num_div(i_carrier(m), m->base.i), Q_BITS, DRIVE_PARAM_v_injection);
 #if PM_HAS(counted_carrier)
-    c->i_later = fixed(m, pm_num_div(later(m), m->base.i), Q_BITS, DRIVE_PARAM_i_carrier);
+    c->i_later = fixed(m, pm_num_div(later(m), m->base.i), Q_BITS, DRIVE_PARAM_v_injection);
 #endif
-    c->v_d = gain(m, pm_num_div(voltage_along_d(m), m->base.v), Q_BITS, DRIVE_PARAM_i_carrier);
+    c->v_d = per_unit(m, DRIVE_PARAM_v_injection, m->base.v);
     c->half_turn =
         fixed(m, pm_num_div(pm_num_mul(m->base.omega, m->base.t_s), pm_num(2)), Q_BITS, DRIVE_PARAM_f_pwm);
     c->voltage_read = m->params->injection_post_comp != 0;
@@ -76,7 +63,7 @@ pm_num_t current_sine_answer(const maker_t *m)
 {
     const inductances_t L = inductances_at_zero(m);
     const pm_num_t share = pm_num_div(pm_num_sub(L.L_q, L.L_d), pm_num_mul(pm_num(2), L.L_q));
-    return pm_num_mul(sine_answer(m, pm_num_mul(si(m, DRIVE_PARAM_i_carrier), share)), pm_num_ratio(1, 2));
+    return pm_num_mul(sine_answer(m, pm_num_mul(i_carrier(m), share)), pm_num_ratio(1, 2));
 }
 
 #endif

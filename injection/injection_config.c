@@ -30,8 +30,7 @@ static bool carrier_passes(const maker_t *m)
 static void check_carrier(maker_t *m)
 {
     const pm_num_t linear = pm_num_mul(si(m, DRIVE_PARAM_v_dc_nominal), pm_num_sqrt(pm_num_ratio(1, 3)));
-    if (!in_reference(m) &&
-        pm_num_cmp(si(m, DRIVE_PARAM_v_injection), pm_num_mul(linear, pm_num_ratio(3, 5))) > 0) {
+    if (pm_num_cmp(si(m, DRIVE_PARAM_v_injection), pm_num_mul(linear, pm_num_ratio(3, 5))) > 0) {
         refuse(m, DRIVE_PARAM_v_injection, "leaves too little of v_dc_nominal for control");
     } else if (!carrier_passes(m)) {
         refuse(m, DRIVE_PARAM_v_injection, "is lost in dead time");

@@ -360,9 +360,6 @@ enum {
 #if PM_HAS(carrier_rest)
     OD_PARAMETER_INJECTION_REST,
 #endif
-#if PM_HAS(current_sine)
-    OD_PARAMETER_I_CARRIER,
-#endif
 #if PM_HAS(six_step)
     OD_PARAMETER_COMMUTATION,
     OD_PARAMETER_SIX_STEP_SPEED,

@@ -4,7 +4,7 @@
 
 /* clang-format off */
 
-const uint32_t od_schema = 0xCD1EC2F9U;
+const uint32_t od_schema = 0xE28B2809U;
 
 /* least, preset, most; those of parameters are in firmware/params/parameters.def */
 const od_values_t od_values[] = {
@@ -74,7 +74,7 @@ const int32_t od_presets[] = {
     500,
     512,
     65536,
-    67,
+    66,
     671088928,
     687866144,
     687866400,
@@ -428,9 +428,6 @@ const od_entry_t od_table[] = {
 #endif
 #if PM_HAS(carrier_rest)
     {0x2400U, 66U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_INJECTION_REST, 0U, 0U},
-#endif
-#if PM_HAS(current_sine)
-    {0x2400U, 67U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_I_CARRIER, 0U, 0U},
 #endif
 #if PM_HAS(six_step)
     {0x2500U, 0U, OD_READ, OD_U8, OD_CONSTANT, OD_GROUP_NONE, 0U, 30U, 0U},

@@ -30,6 +30,8 @@ constexpr int kSettled = 200; // windows of 20
 const Base kBase = bench::kIpmBase;
 const Machine &kMachine = bench::kIpmLinear;
 constexpr double kI_h_A = 0.3;
+const double kV_h_V =
+    kMachine.L_d0_H * kI_h_A * 2 * std::sin(bench::kPi / 20) / kBase.period_s; // of 20 periods
 
 drive_params_t parameters()
 {
@@ -37,6 +39,7 @@ drive_params_t parameters()
     p.injection = static_cast<int32_t>(INJECTION_current_sine);
     p.start_method = 1;
     p.regulator = static_cast<int32_t>(REGULATOR_finite_set);
+    p.v_injection = static_cast<int32_t>(std::lround(1e3 * kV_h_V));
     return p;
 }
 
@@ -273,10 +276,10 @@ TEST(CurrentSine, WhatItCannotDoIsRefused)
 {
     drive_params_t p = parameters();
     drive_config_t c = {};
-    p.i_carrier = 2000; // 270 V of 2 pi 500 Hz 43 mH
+    p.v_injection = 105000; // of 300 V / sqrt(3)
     drive_result_t r = drive_configure(&c, &p, PM_CHANNELS);
-    EXPECT_EQ(r.param, DRIVE_PARAM_i_carrier);
-    EXPECT_STREQ(r.reason, "takes more than 0.6 of the voltage: lower it or f_injection");
+    EXPECT_EQ(r.param, DRIVE_PARAM_v_injection);
+    EXPECT_STREQ(r.reason, "leaves too little of v_dc_nominal for control");
     p = parameters();
     p.cross_coupling_comp = 2;
     r = drive_configure(&c, &p, PM_CHANNELS);
