@@ -37,14 +37,15 @@ void *memset(void *to, int value, size_t size)
     if (by_words((uintptr_t)to, 0U, size)) {
         const uint32_t word = byte * 0x01010101U;
         uint32_t *t = to;
-        uint32_t *const end = t + size / 4U;
+        const uint32_t *const end = &t[size / 4U];
         if ((size & 4U) != 0U) {
-            *t++ = word;
+            t[0] = word;
+            t = &t[1];
         }
         while (t != end) { /* by two: some kilobytes within a control period */
             t[0] = word;
             t[1] = word;
-            t += 2;
+            t = &t[2];
         }
     } else {
         uint8_t *t = to;
