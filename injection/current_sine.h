@@ -2,24 +2,26 @@
  * cross-coupling compensation (5.2.2.2, row 51).
  *
  * A carrier added to the voltage is lost on such a regulator: one of switch states gives a zero state for any voltage below v_dc / 3,
- * and deadbeat control takes the carrier for an error. So the current is asked for,
- *   i_d* = ... + I_h cos phi_k,  phi_k = k a,  a = 2 pi / N,  f_h = f_pwm / N  (sine.h)
+ * and deadbeat control takes the carrier for an error. So the current is asked for, N periods to a carrier (sine.h),
+ *   i_d* = ... + I_h cos(k a)
+ *   a = 2 pi / N
  * and the regulator (firmware/control, trait REGULATOR_FOLLOWS) makes a voltage along d of it, of amplitude v_injection:
  *   I_h = v_injection T_s / (2 sin(a/2) L_d)
- * It controls the answer along q away
- * as well, so that the current alone does not show the position; what the winding has for its current beside the voltage that was
- * applied does. In the estimated frame, e: position error, v: mean voltage over [k-1, k), di = i_k - i_k-1:
- *   y = L_qh / T_s (di_q + lambda di_d) - v_q
- *     = e (L_qh - L_dh) / T_s di_d + ...,  v_d = L_dh / T_s di_d + ...
+ * It controls the answer along q away as well, so that the current alone does not show the position. The voltage that the current
+ * would take of L_q, compared with the one that was applied, does. In the estimated frame, e: position error, v: mean voltage over
+ * [k-1, k), di = i_k - i_k-1:
+ *   y = L_qh / T_s (di_q + lambda di_d) - v_q = e (L_qh - L_dh) / T_s di_d + ...
+ *   v_d = L_dh / T_s di_d + ...
  * R, the EMF and what rotation adds are steady or a quarter of a period off; of the last, w / w_h R / (w_h L_d) by gain is left.
- * The window gives the complex amplitudes of both:
- *   eps = gain(i_q) Re[Y V_d*] / |V_d|^2,  gain = L_dh / (L_qh - L_dh)      zero at e = 0 whatever the load (saliency.h)
+ * The window gives the complex amplitudes of both; lambda makes eps zero at e = 0 whatever the load (saliency.h):
+ *   eps = gain(i_q) Re[Y V_d*] / |V_d|^2
+ *   gain = L_dh / (L_qh - L_dh)
  * which is the e = Re[(j w_h I_q - V_q/L_q) D*] / |D|^2 of the row with j w_h as the difference that belongs to a mean voltage. The
  * ripple of switch states moves y no more than any other current does. 1 / |V_d| and the phase of V_d are those of the last
  * millisecond.
  *
  * A modulator is told by how much the carrier takes the current further until the middle of the period in which its voltage acts,
- *   i_d(k+1.5) - i_d(k) = (i_d*_k + i_d*_k-1) / 2 - i_d*_k-2 = -2 I_h sin(3/4 a) sin(phi_k - 5/4 a)
+ *   i_d(k+1.5) - i_d(k) = (i_d*_k + i_d*_k-1) / 2 - i_d*_k-2 = -2 I_h sin(3/4 a) sin(k a - 5/4 a)
  * so that dead time is compensated with the sign of the current there: at full load that leaves 0.5 degrees of 2.
  *
  * injection_post_comp 0: v_q is not read, only the current; for comparison. L_qh and lambda are those of the present i_q.

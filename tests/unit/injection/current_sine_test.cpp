@@ -7,6 +7,7 @@
 #include "firmware/params/parameters.h"
 #include "tests/contract/bench.h"
 #include "tests/contract/observers.h"
+#include "tests/unit/injection/rig.h"
 #include "tests/unit/math/samples.h"
 
 namespace
@@ -119,7 +120,7 @@ class Held
         EXPECT_LT(std::abs(bench::complex(out.i) * kBase.i_A - wanted - ripple), 1e-5);
         given.push_back(out.carrier);
         theta += omega * kBase.period_s;
-        close(real(out.eps));
+        error -= loop_.turn(loop_Hz, real(out.eps), kBase.period_s);
         return {real(out.eps), real(last.misfit), bench::complex(last.vector) * kBase.v_V};
     }
 
@@ -132,19 +133,11 @@ class Held
         return psi * std::polar(1.0, theta);
     }
 
-    // The loop of drive/position.c at standstill: a double pole with damping 0.9.
-    void close(double eps)
-    {
-        const double w = 2 * bench::kPi * loop_Hz;
-        speed_ += w * w * eps * kBase.period_s;
-        error -= (speed_ + 1.8 * w * eps) * kBase.period_s;
-    }
-
     injection_config_t config_;
     injection_t self_ = {};
     samples::Random random_;
     Complex i_ = 0, psi_ = 0;
-    double speed_ = 0;
+    rig::Loop loop_;
 };
 
 Answer settled(double error_rad, const injection_config_t &c = config(parameters()))

@@ -40,6 +40,19 @@ struct Answer {
     Complex i_A; // the current that the source calls fundamental, estimated frame
 };
 
+// The loop of drive/position.c at standstill: a double pole with damping 0.9.
+struct Loop {
+    double speed = 0;
+
+    // In a period.
+    double turn(double bandwidth_Hz, double eps, double period_s)
+    {
+        const double w = 2 * bench::kPi * bandwidth_Hz;
+        speed += w * w * eps * period_s;
+        return (speed + 1.8 * w * eps) * period_s;
+    }
+};
+
 class Run
 {
   public:
@@ -102,7 +115,7 @@ class Run
                           bench::complex(out.i) * kBase.i_A};
         given.push_back(out.carrier);
         run(given.size() > 1 ? given[given.size() - 2] : excitation_t{});
-        close(a.eps);
+        error -= loop_.turn(loop_Hz, a.eps, kBase.period_s);
         return a;
     }
 
@@ -164,18 +177,10 @@ class Run
         return bench::kNeutral.flux_Wb(i_ * std::polar(1.0, theta), theta) - 0.5 * (c * u).real();
     }
 
-    // The loop of drive/position.c at standstill: a double pole with damping 0.9.
-    void close(double eps)
-    {
-        const double w = 2 * bench::kPi * loop_Hz;
-        speed_ += w * w * eps * kBase.period_s;
-        error -= (speed_ + 1.8 * w * eps) * kBase.period_s;
-    }
-
     injection_config_t config_;
     injection_t self_ = {};
     Complex i_ = 0, between_ = 0;
-    double speed_ = 0;
+    Loop loop_;
     double v_zero_V_ = 0;
 };
 
