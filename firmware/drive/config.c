@@ -54,6 +54,19 @@ static void make_base(maker_t *m, drive_config_t *config)
     m->inductance = pm_num_div(b->psi, b->i);
 }
 
+/* open_loop_config_t::k_yield, with the current of i_max or, where that is less, i_most. */
+static uint16_t yield(maker_t *m, pm_num_t per_swing)
+{
+    const pm_num_t L_d = si(m, DRIVE_PARAM_L_d);
+    const pm_num_t L_q = si(m, DRIVE_PARAM_L_q);
+    const pm_num_t difference = pm_num_cmp(L_q, L_d) < 0 ? pm_num_sub(L_d, L_q) : pm_num_sub(L_q, L_d);
+    const pm_num_t flux = least(pm_num_mul(difference, si(m, DRIVE_PARAM_i_max)),
+                                pm_num_mul(pm_num_ratio(4, 9), si(m, DRIVE_PARAM_psi_m)));
+    const pm_num_t g = pm_num_div(mul3(per_swing, pm_num_ratio(3, 4), flux), m->base.psi);
+    const pm_num_t k = pm_num_div(pm_num_ratio(3, 2), pm_num_add(pm_num(1), g));
+    return (uint16_t)fixed(m, least(k, pm_num(1)), 15, DRIVE_PARAM_L_q);
+}
+
 /* A rotor swings about the current vector like a pendulum:
  *   w^2 = 3/2 p^2 psi i / J
  * The vector yields by k times the difference of the rotor's speed from its low-pass. The corner is 3 w, so
@@ -72,15 +85,7 @@ static void make_damping(maker_t *m, open_loop_config_t *c)
         fixed(m, least(pm_num_div(emf, pm_num_mul(m->t_slow, m->base.v)), pm_num(1)), Q_BITS, DRIVE_PARAM_J);
     const pm_num_t per_swing = pm_num_div(k, emf);
     c->per_swing = fixed(m, per_swing, SMALL_BITS, DRIVE_PARAM_psi_m);
-    const pm_num_t L_d = si(m, DRIVE_PARAM_L_d);
-    const pm_num_t L_q = si(m, DRIVE_PARAM_L_q);
-    const pm_num_t difference = pm_num_cmp(L_q, L_d) < 0 ? pm_num_sub(L_d, L_q) : pm_num_sub(L_q, L_d);
-    /* i_max, or i_most */
-    const pm_num_t moved =
-        least(pm_num_mul(difference, si(m, DRIVE_PARAM_i_max)), pm_num_mul(pm_num_ratio(4, 9), psi));
-    const pm_num_t own = pm_num_div(mul3(per_swing, pm_num_ratio(3, 4), moved), m->base.psi);
-    const pm_num_t k_yield = pm_num_div(pm_num_ratio(3, 2), pm_num_add(pm_num(1), own));
-    c->k_yield = (uint16_t)fixed(m, least(k_yield, pm_num(1)), 15, DRIVE_PARAM_L_q);
+    c->k_yield = yield(m, per_swing);
 }
 
 static void make_open_loop(maker_t *m, open_loop_config_t *c)

@@ -67,8 +67,10 @@ typedef struct {
     pm_frac_t k_swing; /* low-pass that knows swinging from steady turning, at 1 kHz */
     pm_q_t v_swing;    /* largest EMF of swinging that is damped */
     int32_t per_swing; /* speed against such an EMF; pm_small_gain */
-    /* Q15: at once, the vector would answer its own movement where that shows as a swing, g times as large.
-     *   k = 1.5 / (1 + g), at most 1,    g = per_swing 3/4 |L_q - L_d| i */
+    /* By which the vector yields in a millisecond, Q15. What it moves by shows as a swing g times as large, where L_q and L_d differ:
+     *   g = per_swing 3/4 |L_q - L_d| i
+     *   k = 1.5 / (1 + g), at most 1
+     * whose answer to itself has a pole at -1/2 and is gone after some milliseconds. */
     uint16_t k_yield;
     uint16_t align_ms;
     pm_angle_t sweep; /* of the vector per ms while aligning: a quarter turn in half the time */

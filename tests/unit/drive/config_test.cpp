@@ -80,6 +80,11 @@ drive_params_t changed(const Changes &changes)
     return p;
 }
 
+double told(const drive_params_t &p, drive_param_id_t id)
+{
+    return drive_param_get(&p, id) * std::pow(10, drive_param_exp10[id]);
+}
+
 struct Cross {
     const char *what;
     Changes changes;
@@ -405,6 +410,24 @@ TEST(Config, LqBelowLdIsAccepted)
         drive_config_t one = {};
         const drive_result_t r = drive_configure(&one, &p, PM_CHANNELS);
         EXPECT_TRUE(r.ok) << observer << ' ' << drive_param_table[r.param].name << ' ' << r.reason;
+    }
+}
+
+// What the vector's own movement shows as a swing, and how fast it may yield then: at once for round machines, two fifths where
+// saliency takes 4/9 of the flux.
+TEST(Config, AVectorYieldsAsItsOwnMovementAllows)
+{
+    for (const double L_q : {43e-3, 50e-3, 75e-3, 300e-3, 30e-3}) {
+        const drive_params_t p = changed({{DRIVE_PARAM_L_q, L_q}, {DRIVE_PARAM_L_d, 43e-3}});
+        drive_config_t c = {};
+        drive_configure(&c, &p, PM_CHANNELS); // of what is refused besides, this is made all the same
+        const double pole_pairs = p.pole_pairs, psi = told(p, DRIVE_PARAM_psi_m), J = told(p, DRIVE_PARAM_J);
+        const double swing =
+            std::sqrt(1.5 * pole_pairs * pole_pairs * psi * told(p, DRIVE_PARAM_i_open_loop) / J);
+        const double turn = swing * 1e-3, corners = std::min(6 * turn, 0.8);
+        const double flux = std::min(std::abs(L_q - 43e-3) * told(p, DRIVE_PARAM_i_max), 4.0 / 9 * psi);
+        const double g = told(p, DRIVE_PARAM_open_loop_damping) * corners / (turn * psi) * 0.75 * flux;
+        EXPECT_NEAR(c.open_loop.k_yield / 32768.0, std::min(1.0, 1.5 / (1 + g)), 1e-4) << L_q;
     }
 }
 
