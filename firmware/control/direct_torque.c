@@ -2,7 +2,7 @@
 
 #include "firmware/control/switch_states.h"
 
-#if PM_CARRIES(NEEDS_HELD)
+#if REGULATION_HOLDS
 
 /* Of the square of the flux: 1 and 2 % of the flux. */
 #define FLUX_BAND PM_FRAC(0.02)

@@ -2,7 +2,7 @@
 
 #include "firmware/control/switch_states.h"
 
-#if PM_CARRIES(NEEDS_HELD)
+#if REGULATION_HOLDS
 
 /* Wide enough for any voltage that deadbeat control asks for. */
 #define V_ANY PM_Q(7.9)

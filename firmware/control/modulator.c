@@ -131,7 +131,7 @@ void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t
     write_shares(self, config, &u, PM_SHARE_HALF, pm_per_volt(link), i_quarter, out);
 }
 
-#if MODULATOR_HAS_EDGES
+#if REGULATION_HOLDS
 /* Share of the period that a leg misses, Q20; lost: with the sign of its current. */
 static int32_t missed(pm_leg_t from, pm_leg_t to, int32_t dead, int32_t lost)
 {

@@ -40,8 +40,8 @@
 #ifndef CONTROL_MODULATOR_H
 #define CONTROL_MODULATOR_H
 
+#include "firmware/control/regulation.h"
 #include "firmware/math/frames.h"
-#include "firmware/math/image.h"
 #include "firmware/math/legs.h"
 #include "firmware/math/measure.h"
 #include "firmware/math/root.h"
@@ -86,9 +86,6 @@ void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t 
 void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
                     pm_ab_t i_quarter, modulator_out_t *out);
 
-/* A regulator of switch states is in the image. */
-#define MODULATOR_HAS_EDGES (PM_HAS(finite_set) || PM_HAS(predictive) || PM_HAS(direct_torque))
-
 /* A period in `hidden`. */
 #define MODULATOR_NEXT 256
 
@@ -105,11 +102,12 @@ static inline uint32_t modulator_take_hidden(modulator_t *self)
     return (hidden | last) & 7U;
 }
 
-#if MODULATOR_HAS_EDGES
-/* Voltage that legs which are held miss in the period that begins, as they change from the states of one period to those of the
- * next. An edge comes by the dead time late where the current flows through the diode that it leaves:
- *   upwards   -T_dt/T_s v_dc min(1, 1 + f),  downwards  +T_dt/T_s v_dc min(1, 1 - f),  f with the sign of the current
- * i: the legs' currents at the edge. None without compensation of dead time. */
+#if REGULATION_HOLDS
+/* Voltage that dead time takes in a period from legs that are held, as they go from one state to the next. Of a leg, with f between
+ * -1 and 1 by its current i at the edge (comp_zone):
+ *   upwards    -T_dt/T_s v_dc min(1, 1 + f)
+ *   downwards  +T_dt/T_s v_dc min(1, 1 - f)
+ * None without compensation of dead time. */
 pm_ab_t modulator_edges(const modulator_t *self, const modulator_config_t *config, uint16_t from, uint16_t to,
                         pm_abc_t i, pm_q_t v_dc);
 #endif

@@ -2,7 +2,7 @@
 
 #include "firmware/control/switch_states.h"
 
-#if PM_CARRIES(NEEDS_HELD)
+#if REGULATION_HOLDS
 
 void predictive_reset(predictive_t *self, const predictive_config_t *config, pm_dq_t v, pm_dq_t i,
                       pm_q_t omega)

@@ -5,6 +5,7 @@
 #include "firmware/drive/block.h"
 #include "firmware/drive/drive.h"
 #include "firmware/drive/follow.h"
+#include "firmware/drive/held.h"
 #include "firmware/drive/open_phase.h"
 #include "firmware/drive/procedures/procedure.h"
 #include "firmware/drive/procedures/sequence.h"
@@ -46,11 +47,7 @@ struct drive {
     pm_ab_t v_next;    /* commanded at k: acts over [k+1, k+2) */
 
     regulator_out_t voltage; /* of the current control, without carrier */
-#if MODULATOR_HAS_EDGES
-    uint16_t legs_before,
-        legs_acting; /* held in the period that has ended and in the one that begins; 0: not */
-#endif
-    PM_IF_HELD(pm_dq_t v_held;) /* mean of switch states over some 64 periods, Q22: `voltage` is that, then */
+    PM_IF_HELD(held_t held;) /* where it holds the legs */
     regulator_t regulator;
     regulator_config_t regulator_config; /* the configured one, slowed while injection asks for it */
     pm_dq_t i_ref;

@@ -7,8 +7,6 @@
 #include "firmware/math/pair.h"
 #include "firmware/math/trig.h"
 
-/* Mean of switch states. */
-#define K_HELD PM_FRAC(1.0 / 64)
 /* A code of full scale is one. */
 #define CURRENT_BITS (PM_Q_BITS - 15)
 
@@ -157,10 +155,7 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
 {
     const bool checked = is_checked(drive, in);
     drive->v_acting = drive->v_next;
-#if MODULATOR_HAS_EDGES
-    drive->legs_before = 0;
-    drive->legs_acting = 0;
-#endif
+    PM_IF_HELD(held_end(&drive->held);)
     out->trip = 0;
     clear_instants(out);
     if (!checked) {
@@ -216,26 +211,6 @@ static inline void excite(drive_t *drive, const excitation_t *carrier, drive_out
     (void)out;
 }
 
-#if PM_CARRIES(NEEDS_HELD)
-/* What acts is what a state makes less what its edges miss, with the currents at these. */
-static inline void note_edges(drive_t *drive, uint16_t legs)
-{
-#if MODULATOR_HAS_EDGES
-    if (drive->legs_before != 0U) {
-        const pm_ab_t v = modulator_edges(&drive->modulator, &drive->config.modulator, drive->legs_before,
-                                          drive->legs_acting, drive->i_abc, drive->status.v_dc);
-        drive->v_acting.alpha += v.alpha;
-        drive->v_acting.beta += v.beta;
-    }
-    drive->legs_before = drive->legs_acting;
-    drive->legs_acting = legs;
-#else
-    (void)drive;
-    (void)legs;
-#endif
-}
-#endif
-
 static inline pm_dq_t current_wanted(const drive_t *drive, const position_out_t *frame)
 {
     pm_dq_t i_ref = pm_pair_dq(&drive->i_ref);
@@ -262,12 +237,10 @@ static inline void control(drive_t *drive, const position_out_t *frame, bool usu
 
     const pm_dq_t v = {.d = pm_shl(u->v.d, 30 - PM_WIDE_BITS), .q = pm_shl(u->v.q, 30 - PM_WIDE_BITS)};
     pm_ab_t v_ab = pm_park_inverse_quarter(v, frame->ahead);
-#if PM_CARRIES(NEEDS_HELD)
+#if REGULATION_HOLDS
     if (pm_rarely(u->legs != 0U)) {
-        note_edges(drive, u->legs);
+        held_step(drive);
         drive->v_next = v_ab;
-        u->v.d = pm_lp1(&drive->v_held.d, u->v.d, K_HELD); /* who reads it at 1 kHz wants the mean */
-        u->v.q = pm_lp1(&drive->v_held.q, u->v.q, K_HELD);
         out->legs = u->legs;
         out->trip = 0;
         clear_instants(out);

@@ -68,13 +68,6 @@
 #define PM_IF_MEASURED(...)
 #endif
 
-/* The same for NEEDS_HELD. */
-#if PM_CARRIES(NEEDS_HELD)
-#define PM_IF_HELD(...) __VA_ARGS__
-#else
-#define PM_IF_HELD(...)
-#endif
-
 /* Of a row of a list, in the file that has its dispatch. */
 #define PM_CHECK_NEEDS(name, needs) PM_NEED_LIST(PM_CHECK_NEED, name, needs)
 #define PM_CHECK_NEED(name, needs, bit, what)                                                                \
