@@ -57,6 +57,8 @@ bool follow_slow(follow_t *self, const pm_machine_t *machine, const follow_in_t 
     const pm_q_t reactance = pm_mul(in->omega, pm_half(m->L_d) + pm_half(m->L_q));
     (void)pm_lp1(&self->along, in->v.d - pm_mul(self->R, in->i), K_MEAN);
     (void)pm_lp1(&self->across, in->v.q - pm_mul(reactance, in->i), K_MEAN);
+    const bool back = in->omega < 0;
+    self->lag = pm_atan2(back ? -self->along : self->along, back ? -self->across : self->across);
     const pm_q_t psi = m->psi_m - pm_mul(m->L_q - m->L_d, in->i) / 2;
     self->emf = pm_mul(pm_abs(in->omega), pm_max(psi, pm_half(m->psi_m)));
     self->turned = pm_min(self->turned + in->turn, self->least);
@@ -76,8 +78,6 @@ bool follow_slow(follow_t *self, const pm_machine_t *machine, const follow_in_t 
     self->turned = self->ms != 0U ? self->turned : 0;
     self->follows_ms = (uint8_t)pm_min(self->follows_ms + 1, FOLLOW_FOLLOWS_MS);
     self->follows = self->follows || self->follows_ms == FOLLOW_FOLLOWS_MS;
-    const bool back = in->omega < 0;
-    self->lag = pm_atan2(back ? -self->along : self->along, back ? -self->across : self->across);
     return false;
 }
 

@@ -52,7 +52,7 @@ typedef struct {
     pm_q_t R, R_doubt;
     pm_q_t along, across; /* filtered; at rest: v_d */
     pm_q_t emf;           /* |e| where it says something, else 0 */
-    pm_angle_t lag;       /* delta, while the rotor is seen to follow */
+    pm_angle_t lag;       /* delta of a rotor that follows, from the first ms on */
     int32_t turned;       /* by the vector since the rotor was seen to follow, ... */
     int32_t least;        /* ... and what it must, of FOLLOW_TURN */
     uint16_t ms;          /* that it stands, or has rested */

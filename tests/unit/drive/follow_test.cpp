@@ -89,6 +89,23 @@ TEST(Follow, ALagOfUpToAQuarterTurnFollows)
     }
 }
 
+// Behind an observer the vector damps at once, long before the filters show that the rotor follows.
+TEST(Follow, TheLagIsKnownFromTheFirstMillisecondBehindAnObserver)
+{
+    for (const double omega : {0.2, -0.2}) {
+        for (const double lag : {-60.0, 15.0, 60.0}) {
+            Rig x;
+            x.rest();
+            follow_resume(&x.self);
+            for (int ms = 0; ms < 30; ++ms) {
+                x.step(omega, lag);
+                ASSERT_NEAR(static_cast<int32_t>(x.self.lag) / std::pow(2, 32) * 360, lag, 0.5)
+                    << omega << ' ' << ms;
+            }
+        }
+    }
+}
+
 TEST(Follow, ARotorThatStandsIsSeenFromTheSpeedOnAtWhichItsEmfWouldShow)
 {
     for (const double sign : {1.0, -1.0}) {
