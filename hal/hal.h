@@ -22,6 +22,7 @@
 #include <stdint.h>
 
 #include "firmware/drive/drive.h"
+#include "firmware/params/store.h"
 #include "hal/can_frame.h"
 
 #ifdef __cplusplus
@@ -155,7 +156,7 @@ uint32_t hal_can_lost(const hal_t *hal); /* frames that found the receive ring f
 /* --- store.c: two pages of flash ----------------------------------------------------------------------- */
 
 #define HAL_STORE_PAGES     2
-#define HAL_STORE_PAGE_SIZE 2048U
+#define HAL_STORE_PAGE_SIZE STORE_PAGE
 
 /* any, also before hal_init(): the page in place. After an interrupted write its contents are undefined, but
  * reading it is harmless. */

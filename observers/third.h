@@ -130,6 +130,9 @@ static inline void third_compare(third_t *self, pm_half_dir_t dir, int32_t y, in
 
 void make_third(maker_t *m, third_config_t *c);
 
+/* RC of the signal, s; of an open winding, whose signal is the mean of a period, half of that. */
+pm_num_t third_filter(const maker_t *m);
+
 #ifdef __cplusplus
 }
 #endif

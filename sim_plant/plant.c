@@ -133,6 +133,11 @@ const plant_inverter_t *plant_inverter(const plant_t *plant)
     return &plant->config.inverter;
 }
 
+int plant_leg_count(const plant_t *plant)
+{
+    return plant->gates.legs;
+}
+
 void plant_turn_rotor(plant_t *plant, double angle_e_rad)
 {
     assert(isfinite(angle_e_rad));

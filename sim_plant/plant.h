@@ -119,6 +119,7 @@ void plant_set_source(plant_t *plant, double v_source_V);
 plant_machine_t *plant_machine(plant_t *plant); /* drift; next period on */
 plant_sensor_t *plant_sensor(plant_t *plant);   /* sensor faults */
 const plant_inverter_t *plant_inverter(const plant_t *plant);
+int plant_leg_count(const plant_t *plant); /* 3, or 6 */
 void plant_set_temperature(plant_t *plant, double winding_degC, double magnet_degC);
 void plant_set_leg_fault(plant_t *plant, int leg, plant_leg_fault_t fault);
 void plant_set_supply(plant_t *plant, bool connected); /* lost supply: the link runs on its capacitor */

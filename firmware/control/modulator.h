@@ -42,6 +42,7 @@
 
 #include "firmware/control/regulation.h"
 #include "firmware/math/frames.h"
+#include "firmware/math/image.h"
 #include "firmware/math/legs.h"
 #include "firmware/math/measure.h"
 #include "firmware/math/root.h"
@@ -85,6 +86,20 @@ void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t 
 /* i_quarter: a quarter of the current, Q26. */
 void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
                     pm_ab_t i_quarter, modulator_out_t *out);
+
+#if PM_HAS(open_winding)
+/* A bridge whose legs may have a common part and whose currents a sum. */
+typedef struct {
+    pm_ab_t v;
+    pm_q_t v_zero;         /* added to each leg */
+    pm_ab_t i_quarter;     /* as above */
+    pm_q_t i_zero_quarter; /* a quarter of what each leg carries beside it */
+} modulator_zero_t;
+
+/* As modulator_step(), with shunts in the lines; where the legs do not reach as far, vector and common part are shortened. */
+void modulator_step_zero(modulator_t *self, const modulator_config_t *config, const modulator_zero_t *in,
+                         pm_q_t v_dc, modulator_out_t *out);
+#endif
 
 /* A period in `hidden`. */
 #define MODULATOR_NEXT 256

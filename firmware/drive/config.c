@@ -130,6 +130,14 @@ static pm_q_t pushed(maker_t *m, pm_unit_t share)
     return at_most_twice(m, pm_num_div(dead_voltage(m), k_p), DRIVE_PARAM_dead_time);
 }
 
+#if PM_HAS(open_winding)
+/* Of three currents that flow alike, half of i_max each. */
+static pm_q_t most_zero(maker_t *m)
+{
+    return per_unit(m, DRIVE_PARAM_i_max, m->base.i) / 2 * 3;
+}
+#endif
+
 static void make_protection(maker_t *m, protection_config_t *c, pm_unit_t share, pm_q_t most)
 {
     const drive_params_t *p = m->params;
@@ -141,6 +149,8 @@ static void make_protection(maker_t *m, protection_config_t *c, pm_unit_t share,
     c->v_dc_span = c->v_dc_max - c->v_dc_min;
     c->v_dc_derate = per_unit(m, DRIVE_PARAM_v_dc_derate, m->base.v);
     c->i_sum = PM_Q(0.1);
+    PM_IN_IMAGE(
+        open_winding, if (p->winding == 1) { c->i_sum = most_zero(m); })
     c->offset_max = fixed(m, pm_num_div(si(m, DRIVE_PARAM_offset_max), si(m, DRIVE_PARAM_i_full_scale)), 15,
                           DRIVE_PARAM_offset_max);
     c->heat_max = borne(pm_min(i_rated, 2 * PM_ONE));
@@ -226,6 +236,8 @@ static void check_board(maker_t *m)
     }
 }
 
+#define VOLTAGE_MOST 200 /* of an open winding, over 201 */
+
 static void make_limits(maker_t *m, drive_config_t *config)
 {
     config->k_theta = config->position.pll_low.k_theta;
@@ -234,6 +246,12 @@ static void make_limits(maker_t *m, drive_config_t *config)
     config->v_share = fixed(m, pm_num_mul(si(m, DRIVE_PARAM_voltage_limit), pm_num_sqrt(pm_num_ratio(1, 3))),
                             UNIT_BITS, DRIVE_PARAM_voltage_limit);
     config->v_share = pm_min(config->v_share, modulator_reach(m, &config->modulator));
+    PM_IN_IMAGE(
+        open_winding, if (config->open_winding.on) {
+            config->v_share = fixed(
+                m, least(si(m, DRIVE_PARAM_voltage_limit), pm_num_ratio(VOLTAGE_MOST, VOLTAGE_MOST + 1)),
+                UNIT_BITS, DRIVE_PARAM_voltage_limit);
+        })
     config->machine.R_s = per_unit(m, DRIVE_PARAM_R_s, m->impedance);
     config->machine.L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
     config->machine.L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);
@@ -298,6 +316,7 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
 #if PM_CARRIES(NEEDS_NEUTRAL)
     make_neutral(&m, &config->neutral);
 #endif
+    PM_IN_IMAGE(open_winding, make_open_winding(&m, &config->open_winding);)
     choose_start(&m, config, channels);
     if (config->injection) {
         const injection_limits_t limits = injection_limits(&m);

@@ -13,6 +13,7 @@
 #include "firmware/drive/block.h"
 #include "firmware/drive/fault_short.h"
 #include "firmware/drive/neutral.h"
+#include "firmware/drive/open_winding.h"
 #include "firmware/drive/position.h"
 #include "firmware/drive/procedures/flying_start.h"
 #include "firmware/drive/procedures/saliency_map.h"
@@ -88,6 +89,7 @@ typedef struct {
 #if PM_CARRIES(NEEDS_NEUTRAL)
     neutral_config_t neutral;
 #endif
+    PM_IN_IMAGE(open_winding, open_winding_config_t open_winding;)
     pulses_config_t pulses;
     PM_IN_IMAGE(boundary_detection, boundary_detection_config_t boundary_detection;)
     PM_IN_IMAGE(dc_link_pulses, dc_link_pulses_config_t dc_link_pulses;)

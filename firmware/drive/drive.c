@@ -136,6 +136,7 @@ PM_RARE void drive_prepare(drive_t *drive)
         const pm_pll_t along = {.theta = drive->theta_open, .omega = omega};
         position_force(&drive->position, &c->position, &along);
     }
+    PM_IN_IMAGE(open_winding, open_winding_slow(&drive->open_winding, &c->open_winding, omega);)
     drive->turn_open = turn;
     drive->usual = drive->stage == STAGE_VECTOR && drive->config.regulator.id == REGULATOR_INLINE;
     drive->ahead = pm_dir((pm_angle_t)turn + (pm_angle_t)pm_half(turn));

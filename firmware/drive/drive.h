@@ -53,6 +53,10 @@ typedef struct {
 #if PM_CARRIES(PM_DONE_AT)
     pm_instants_t instants;
 #endif
+#if PM_CARRIES(NEEDS_BRIDGES)
+    uint16_t second
+        [DRIVE_LEGS]; /* of a second bridge: timer counts of both halves; its legs are off where those of the first are, else PWM */
+#endif
 } drive_out_t;
 
 /* Bytes that come first and are the same in every program. */
@@ -63,6 +67,8 @@ typedef struct {
 #endif
 #if PM_CARRIES(PM_DONE_AT)
 #define DRIVE_OUT_COMMON offsetof(drive_out_t, instants)
+#elif PM_CARRIES(NEEDS_BRIDGES)
+#define DRIVE_OUT_COMMON offsetof(drive_out_t, second)
 #else
 #define DRIVE_OUT_COMMON sizeof(drive_out_t)
 #endif

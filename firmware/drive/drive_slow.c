@@ -170,9 +170,14 @@ static void stop(drive_t *drive)
     }
 }
 
-/* A mode that the commutation does not have. */
+/* A mode that the commutation, or the winding, does not have. */
 static bool is_refused(const drive_t *drive)
 {
+#if PM_HAS(open_winding)
+    if (drive->config.open_winding.on && drive->command.mode == DRIVE_MODE_IDENTIFY) {
+        return true;
+    }
+#endif
 #if PM_HAS(six_step)
     return drive->command.mode == DRIVE_MODE_DUTY && !drive->config.block.on;
 #else

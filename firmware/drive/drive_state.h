@@ -35,6 +35,7 @@ struct drive {
 #if PM_CARRIES(NEEDS_NEUTRAL)
     neutral_t neutral;
 #endif
+    PM_IN_IMAGE(open_winding, open_winding_t open_winding;)
     bool hw_fault;
     bool carrier;      /* injection is on */
     bool forced;       /* open loop: the observer is forced to the ramp angle */

@@ -53,16 +53,22 @@ static inline obs_more_t measure_more(drive_t *drive, const drive_in_t *in)
 #if PM_HAS(zero_vector)
     more.v_dc = &drive->status.v_dc;
 #endif
-#if PM_CARRIES(NEEDS_NEUTRAL)
-    more.v_zero = neutral_signal(&drive->neutral, &drive->config.neutral, in->more.v_neutral) -
-                  neutral_star(&drive->neutral, &drive->config.neutral, drive->v_acting);
-#endif
 #if PM_HAS(pwm_excitation)
     for (uint32_t n = 0; n < PM_SAMPLES; n++) {
         if (pm_sampled(&in->more, n)) {
             more.i_sample[n] = pm_clarke(currents(drive, in->more.i_sample[n], drive->zero[2]));
         }
     }
+#endif
+#if PM_HAS(open_winding)
+    if (pm_rarely(drive->config.open_winding.on)) {
+        more.v_zero = open_winding_signal(&drive->open_winding, &drive->config.open_winding, drive->i_abc);
+        return more;
+    }
+#endif
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    more.v_zero = neutral_signal(&drive->neutral, &drive->config.neutral, in->more.v_neutral) -
+                  neutral_star(&drive->neutral, &drive->config.neutral, drive->v_acting);
 #endif
     return more;
 }
@@ -92,6 +98,18 @@ static inline void clear_instants(drive_out_t *out)
 {
 #if PM_CARRIES(PM_DONE_AT)
     out->instants = (pm_instants_t){0};
+#else
+    (void)out;
+#endif
+}
+
+/* Without control the second bridge ties its ends of an open winding together, to the negative rail. */
+static void tie_second(drive_out_t *out)
+{
+#if PM_CARRIES(NEEDS_BRIDGES)
+    for (uint32_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        out->second[leg] = 0;
+    }
 #else
     (void)out;
 #endif
@@ -156,8 +174,10 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
     const bool checked = is_checked(drive, in);
     drive->v_acting = drive->v_next;
     PM_IF_HELD(held_end(&drive->held);)
+    PM_IN_IMAGE(open_winding, open_winding_reset(&drive->open_winding);)
     out->trip = 0;
     clear_instants(out);
+    tie_second(out);
     if (!checked) {
         drive->v_next = (pm_ab_t){0, 0};
         drive->hw_fault = in->hw_fault;
@@ -193,6 +213,23 @@ static inline void write_out(const modulator_out_t *m, drive_out_t *out)
     out->trip = 0;
     clear_instants(out);
 }
+
+#if PM_HAS(open_winding)
+/* i_quarter: as modulator_step() takes it. */
+static void control_open(drive_t *drive, pm_ab_t v, pm_ab_t i_quarter, drive_out_t *out)
+{
+    const drive_config_t *c = &drive->config;
+    open_winding_out_t bridges;
+    open_winding_step(&drive->open_winding, &c->open_winding, &drive->modulator, &c->modulator, v,
+                      drive->status.v_dc, i_quarter, &bridges);
+    drive->v_next = bridges.v;
+    write_out(&bridges.bridge[0], out);
+    for (uint32_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        pm_assume(bridges.bridge[1].on[leg] >= 0 && bridges.bridge[1].on[leg] <= UINT16_MAX);
+        out->second[leg] = (uint16_t)bridges.bridge[1].on[leg];
+    }
+}
+#endif
 
 /* What a carrier asks of the period beside its mean voltage. */
 static inline void excite(drive_t *drive, const excitation_t *carrier, drive_out_t *out)
@@ -256,9 +293,15 @@ static inline void control(drive_t *drive, const position_out_t *frame, bool usu
         i.q += frame->carrier.i.q;
 #endif
     }
+    const pm_ab_t i_quarter = pm_park_inverse_quarter(i, frame->ahead);
+#if PM_HAS(open_winding)
+    if (pm_rarely(c->open_winding.on)) {
+        control_open(drive, v_ab, i_quarter, out);
+        return;
+    }
+#endif
     modulator_out_t m;
-    modulator_step(&drive->modulator, &c->modulator, v_ab, v_dc, pm_park_inverse_quarter(i, frame->ahead),
-                   &m);
+    modulator_step(&drive->modulator, &c->modulator, v_ab, v_dc, i_quarter, &m);
     drive->v_next = m.v;
     write_out(&m, out);
 #if PM_HAS(zero_vector)

@@ -33,6 +33,7 @@
 #define PM_WITHOUT_carrier_rest 1
 #define PM_WITHOUT_neutral 1
 #define PM_WITHOUT_injection_stages 1
+#define PM_WITHOUT_open_winding 1
 #define PM_WITHOUT_back_emf 1
 #define PM_WITHOUT_extended_emf 1
 #define PM_WITHOUT_extended_emf_ab 1

@@ -19,6 +19,7 @@
 #define PM_WITHOUT_carrier_rest 1
 #define PM_WITHOUT_neutral 1
 #define PM_WITHOUT_injection_stages 1
+#define PM_WITHOUT_open_winding 1
 #define PM_WITHOUT_third_integration 1
 #define PM_WITHOUT_third_sogi 1
 #define PM_WITHOUT_third_crossings 1

@@ -21,6 +21,7 @@
 #define PM_WITHOUT_zero_inductance 1
 #define PM_WITHOUT_mismatch 1
 #define PM_WITHOUT_neutral 1
+#define PM_WITHOUT_open_winding 1
 #define PM_WITHOUT_back_emf 1
 #define PM_WITHOUT_extended_emf 1
 #define PM_WITHOUT_extended_emf_ab 1

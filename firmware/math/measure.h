@@ -34,6 +34,7 @@
 #define NEEDS_HELD       0x0200U /* a leg held high or low */
 #define NEEDS_ONE_SWITCH 0x0400U /* PWM on one switch of a leg, the other open */
 #define NEEDS_COMMUTATE  0x0800U /* the legs change at an instant within the period */
+#define NEEDS_BRIDGES    0x1000U /* a second bridge of three legs, on the same link and carrier */
 
 /* Of the board, no need of a method: its upper switches live on capacitors that the lower ones charge. A start charges
  * them before its first pulse (firmware/drive/procedures/charge.h). */
@@ -50,11 +51,12 @@
     X(name, needs, NEEDS_HALVES, "different halves of a period")                                             \
     X(name, needs, NEEDS_HELD, "legs held high or low")                                                      \
     X(name, needs, NEEDS_ONE_SWITCH, "PWM on one switch of a leg")                                           \
-    X(name, needs, NEEDS_COMMUTATE, "commutation within the period")
+    X(name, needs, NEEDS_COMMUTATE, "commutation within the period")                                         \
+    X(name, needs, NEEDS_BRIDGES, "a second bridge")
 
 #define PM_MEASURED 0x003FU
 #define PM_DONE_AT  (NEEDS_SECOND_SAMPLE | NEEDS_COMMUTATE)
-#define PM_ALL      0x0F3FU
+#define PM_ALL      0x1F3FU
 
 #ifndef PM_CHANNELS
 #define PM_CHANNELS PM_ALL

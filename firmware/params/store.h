@@ -33,10 +33,19 @@ typedef struct {
     int32_t value;
 } store_pair_t;
 
-#define STORE_PAIRS_MAX 249U
+/* Bytes of a page. A board's is one of its flash, which holds what an image has; a program with every method
+ * has more to keep. */
+#ifndef STORE_PAGE
+#ifdef PM_IMAGE_HEADER
+#define STORE_PAGE 2048U
+#else
+#define STORE_PAGE 4096U
+#endif
+#endif
+#define STORE_WORDS     (STORE_PAGE / 4U)
 #define STORE_HEADER    4U /* words */
 #define STORE_SEALS     4U
-#define STORE_WORDS     (STORE_HEADER + 2U * STORE_PAIRS_MAX + 2U + 2U * STORE_SEALS) /* a page of 2 kB */
+#define STORE_PAIRS_MAX ((STORE_WORDS - STORE_HEADER - 2U) / 2U - STORE_SEALS)
 
 /* Number of pairs of a valid page, -1: void. */
 int32_t store_check(const uint32_t page[STORE_WORDS]);

@@ -16,6 +16,7 @@ uint32_t hal_channels(const hal_t *hal)
                          (neutral ? NEEDS_NEUTRAL : 0U) |
                          (sensor->i_dc_full_scale_A > 0.0 ? NEEDS_DC_CURRENT : 0U) |
                          (sensor->capture_s > 0.0 ? NEEDS_CAPTURES : 0U) |
+                         (plant_leg_count(hal->plant) > DRIVE_LEGS ? NEEDS_BRIDGES : 0U) |
                          (plant_inverter(hal->plant)->bootstrap_charge_s > 0.0 ? PM_BOOTSTRAP : 0U);
     return all & ~hal->without;
 }

@@ -82,6 +82,11 @@ double i_q(const Sample &s, const Setup &)
     return s.rig.truth.i_q_A;
 }
 
+double zero_current(const Sample &s, const Setup &)
+{
+    return s.rig.truth.i_zero_A;
+}
+
 double v_dc(const Sample &s, const Setup &)
 {
     return s.rig.truth.v_dc_V;
@@ -129,6 +134,8 @@ const FoldedMetric folded_metrics[] = {
     {"i_q_max_A", "A", "highest q current, true frame, at the sample instants", Fold::max, false, i_q},
     {"i_q_std_A", "A", "rms of the q current about its mean, true frame, at the sample instants",
      Fold::deviation, false, i_q},
+    {"zero_current_rms_A", "A", "rms of the current that all phases of an open winding have in common",
+     Fold::rms, false, zero_current},
     {"v_dc_max_V", "V", "highest DC-link voltage", Fold::max, false, v_dc},
     {"v_dc_min_V", "V", "lowest DC-link voltage", Fold::min, false, v_dc},
     {"weight_mean", "1", "mean share of the flux observer; 0: injection alone", Fold::mean, true, weight},

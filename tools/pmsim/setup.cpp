@@ -184,6 +184,7 @@ void derive_board_parameters(Setup &setup)
     derive(DRIVE_PARAM_i_full_scale, sensor.i_full_scale_A);
     derive(DRIVE_PARAM_v_full_scale, sensor.v_full_scale_V);
     derive(DRIVE_PARAM_t_settle, sensor.shunt == PLANT_LOW_SIDE ? sensor.settle_s : 0.0);
+    derive(DRIVE_PARAM_winding, setup.plant.winding.connection == PLANT_OPEN ? 1.0 : 0.0);
     if (sensor.v_zero_full_scale_V > 0.0) {
         derive(DRIVE_PARAM_neutral_full_scale, sensor.v_zero_full_scale_V);
         derive(DRIVE_PARAM_neutral_filter, sensor.v_zero_filter_s);
@@ -216,9 +217,6 @@ void require_drive(const Setup &setup)
     const auto refuse = [&setup](const std::string &why) { throw InputError(setup.file + ": " + why); };
     if (setup.plant.winding.sets == 2) {
         refuse("the drive cannot run two sets yet");
-    }
-    if (setup.plant.winding.connection == PLANT_OPEN) {
-        refuse("the drive cannot run an open winding yet");
     }
     if (setup.plant.sensor.shunt == PLANT_SINGLE_SHUNT) {
         refuse("the drive cannot measure with a single shunt yet");

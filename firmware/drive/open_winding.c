@@ -1,0 +1,75 @@
+#include "firmware/drive/open_winding.h"
+
+#include "firmware/math/trig.h"
+
+#if PM_HAS(open_winding)
+
+#define THIRD       PM_FRAC(1.0 / 3)
+#define PER_ROOT_12 PM_FRAC(0.288675134594812882) /* 1 / (2 sqrt(3)) */
+
+void open_winding_reset(open_winding_t *self)
+{
+    *self = (open_winding_t){.turn = pm_dir(0), .lead = pm_dir(0)};
+}
+
+pm_q_t open_winding_signal(open_winding_t *self, const open_winding_config_t *config, pm_abc_t i)
+{
+    const pm_q_t before = self->i;
+    self->i = pm_frac(i.a, THIRD) + pm_frac(i.b, THIRD) + pm_frac(i.c, THIRD);
+    const pm_q_t acted = self->v_acting;
+    self->v_acting = self->v_next;
+    if (config->held) {
+        return acted;
+    }
+    return acted - pm_mul(config->R, self->i + before) - pm_mul_sat(config->L, self->i - before);
+}
+
+/* Turned by its step; the pair is a signal and what lags it by a quarter of its cycle. */
+static void turn(open_winding_t *self)
+{
+    const pm_q_t y = self->y;
+    const pm_q_t q = self->q;
+    self->y = pm_shl(pm_mulh_sub(pm_mulh(y, self->turn.cos), q, self->turn.sin), 1);
+    self->q = pm_shl(pm_mulh_add(pm_mulh(y, self->turn.sin), q, self->turn.cos), 1);
+}
+
+/* v_0 that holds i_0 at zero; beyond `most` nothing is gathered. */
+static pm_q_t hold(open_winding_t *self, const open_winding_config_t *config, pm_q_t most)
+{
+    turn(self);
+    self->y = pm_clamp(self->y - pm_mul(config->k_r, self->i), -most, most);
+    const pm_q_t v = pm_shl(pm_mulh_sub(pm_mulh(self->y, self->lead.cos), self->q, self->lead.sin), 1);
+    return pm_clamp(v - pm_mul(config->k_p, self->i), -most, most);
+}
+
+void open_winding_step(open_winding_t *self, const open_winding_config_t *config, modulator_t *modulator,
+                       const modulator_config_t *modulator_config, pm_ab_t v, pm_q_t v_dc, pm_ab_t i_quarter,
+                       open_winding_out_t *out)
+{
+    const pm_q_t v_zero = config->held ? hold(self, config, v_dc / 4) : 0;
+    const pm_ab_t half = {.alpha = pm_half(v.alpha), .beta = pm_half(v.beta)};
+    const pm_ab_t across = {.alpha = pm_frac(v.beta, PER_ROOT_12), .beta = pm_frac(v.alpha, PER_ROOT_12)};
+    const modulator_zero_t first = {
+        .v = {.alpha = half.alpha - across.alpha, .beta = across.beta + half.beta},
+        .v_zero = pm_half(v_zero),
+        .i_quarter = i_quarter,
+        .i_zero_quarter = self->i / 4};
+    const modulator_zero_t second = {
+        .v = {.alpha = -half.alpha - across.alpha, .beta = across.beta - half.beta},
+        .v_zero = -pm_half(v_zero),
+        .i_quarter = {.alpha = -i_quarter.alpha, .beta = -i_quarter.beta},
+        .i_zero_quarter = -(self->i / 4)};
+    modulator_step_zero(modulator, modulator_config, &first, v_dc, &out->bridge[0]);
+    modulator_step_zero(modulator, modulator_config, &second, v_dc, &out->bridge[1]);
+    out->v = (pm_ab_t){.alpha = out->bridge[0].v.alpha - out->bridge[1].v.alpha,
+                       .beta = out->bridge[0].v.beta - out->bridge[1].v.beta};
+    self->v_next = v_zero;
+}
+
+void open_winding_slow(open_winding_t *self, const open_winding_config_t *config, pm_q_t omega)
+{
+    self->turn = pm_dir((pm_angle_t)pm_rad_to_angle(pm_mul(config->turn, omega)));
+    self->lead = pm_dir((pm_angle_t)pm_rad_to_angle(pm_mul(config->lead, omega)));
+}
+
+#endif

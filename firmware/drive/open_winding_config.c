@@ -1,0 +1,63 @@
+#include "firmware/drive/open_winding.h"
+
+#include "firmware/control/regulator.h"
+#include "firmware/math/compiler.h"
+#include "firmware/params/maker.h"
+#include "injection/injection.h"
+
+#if PM_HAS(open_winding)
+
+#define SLOWEST 10 /* of f_pwm, the loop of i_0 */
+
+/* What drives legs by itself knows one bridge. */
+static void check(maker_t *m)
+{
+    static const char star[] = "needs a star: winding 0";
+    const drive_params_t *p = m->params;
+    if (p->L_0 == 0) {
+        refuse(m, DRIVE_PARAM_L_0, "of an open winding must be known");
+    } else if (p->start_method != 2) {
+        refuse(m, DRIVE_PARAM_start_method, "an open winding is started by 2");
+    } else if (p->flying_start != 0) {
+        refuse(m, DRIVE_PARAM_flying_start, star);
+    } else if (p->commutation != 0) {
+        refuse(m, DRIVE_PARAM_commutation, star);
+    } else if ((regulator_traits((regulator_id_t)p->regulator) & REGULATOR_SWITCHES) != 0U) {
+        refuse(m, DRIVE_PARAM_regulator, star);
+    } else if (p->t_settle != 0) {
+        refuse(m, DRIVE_PARAM_t_settle, "an open winding needs shunts in the lines");
+    } else {
+        /* it can be run */
+    }
+}
+
+PM_APART void make_open_winding(maker_t *m, open_winding_config_t *c)
+{
+    *c = (open_winding_config_t){.on = m->params->winding == 1, .held = m->params->zero_current == 1};
+    if (!c->on) {
+        return;
+    }
+    require(m, NEEDS_BRIDGES, DRIVE_PARAM_winding);
+    m->channels |= NEEDS_NEUTRAL; /* the currents tell what the star point does otherwise */
+    check(m);
+    if (!m->result.ok) {
+        return;
+    }
+    const pm_num_t f =
+        least(si(m, DRIVE_PARAM_current_bandwidth), pm_num_div(si(m, DRIVE_PARAM_f_pwm), pm_num(SLOWEST)));
+    const pm_num_t two_pi = {PM_NUM_TWO_PI_M, PM_NUM_TWO_PI_E};
+    const pm_num_t bandwidth = pm_num_mul(two_pi, f);
+    const pm_num_t k_p = pm_num_div(pm_num_mul(bandwidth, si(m, DRIVE_PARAM_L_0)), m->impedance);
+    const pm_num_t three = pm_num_mul(pm_num(3), m->base.omega);
+    const pm_num_t delay =
+        pm_num_add(pm_num_mul(pm_num_ratio(3, 2), m->base.t_s), pm_num_div(pm_num(1), bandwidth));
+    c->k_p = gain(m, k_p, Q_BITS, DRIVE_PARAM_L_0);
+    c->k_r = gain(m, mul3(k_p, pm_num_div(bandwidth, pm_num(8)), m->base.t_s), Q_BITS, DRIVE_PARAM_L_0);
+    c->R = fixed(m, pm_num_div(si(m, DRIVE_PARAM_R_s), m->impedance), Q_BITS - 1, DRIVE_PARAM_R_s);
+    c->L = fixed(m, pm_num_div(si(m, DRIVE_PARAM_L_0), pm_num_mul(m->impedance, m->base.t_s)), Q_BITS,
+                 DRIVE_PARAM_L_0);
+    c->turn = fixed(m, pm_num_mul(three, m->base.t_s), Q_BITS, DRIVE_PARAM_speed_trip);
+    c->lead = fixed(m, pm_num_mul(three, delay), Q_BITS, DRIVE_PARAM_speed_trip);
+}
+
+#endif
