@@ -18,7 +18,7 @@ polarity_carrier_t polarity_by_current(maker_t *m, uint32_t n, pm_q_t h_d)
  *   w^2 = 3/2 p^2 psi_m i / J < (2 pi injection_bandwidth)^2 */
 PM_APART static bool falls_off(const maker_t *m)
 {
-    const pm_num_t torque = mul3(pm_num_mul(pm_num_ratio(3, 2), square(pole_pairs(m))),
+    const pm_num_t torque = mul3(pm_num_mul(torque_share(m->params), square(pole_pairs(m))),
                                  si(m, DRIVE_PARAM_psi_m), si(m, DRIVE_PARAM_i_polarity));
     const pm_num_t follows = square(angular(m, DRIVE_PARAM_injection_bandwidth));
     return pm_num_cmp(torque, pm_num_mul(follows, si(m, DRIVE_PARAM_J))) > 0;

@@ -15,6 +15,8 @@
 #include "observers/sliding_mode.h"
 #include "observers/third_crossings.h"
 #include "observers/third_integration.h"
+#include "observers/third_pair.h"
+#include "observers/third_pair_flux.h"
 #include "observers/third_sogi.h"
 #include "observers/zero_vector.h"
 

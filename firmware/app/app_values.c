@@ -3,6 +3,7 @@
 #include <stddef.h>
 
 #include "firmware/app/app_parts.h"
+#include "firmware/params/maker.h"
 
 #define THOUSAND 1000
 
@@ -143,7 +144,8 @@ static pm_num_t rated_torque(const app_t *app)
 {
     const pm_num_t psi = pm_num_dec(app->params.psi_m, -9);
     const pm_num_t i = pm_num_dec(app->params.i_rated, -3);
-    return pm_num_mul(pm_num_mul(pm_num_ratio(3, 2), pm_num(app->params.pole_pairs)), pm_num_mul(psi, i));
+    return pm_num_mul(pm_num_mul(torque_share(&app->params), pm_num(app->params.pole_pairs)),
+                      pm_num_mul(psi, i));
 }
 
 static int32_t rounded(pm_num_t x)

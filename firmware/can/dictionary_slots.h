@@ -287,13 +287,13 @@ enum {
     OD_PARAMETER_EKF_SPEED_NOISE,
     OD_PARAMETER_EKF_ANGLE_NOISE,
 #endif
-#if PM_HAS(third_sogi) || PM_HAS(third_integration) || PM_HAS(third_crossings)
+#if PM_HAS(third_sogi) || PM_HAS(third_integration) || PM_HAS(third_crossings) || PM_HAS(third_pair) || PM_HAS(third_pair_flux)
     OD_PARAMETER_PSI_3,
 #endif
 #if PM_HAS(neutral)
     OD_PARAMETER_DL_0,
 #endif
-#if PM_HAS(third_sogi) || PM_HAS(third_integration) || PM_HAS(third_crossings)
+#if PM_HAS(third_sogi) || PM_HAS(third_integration) || PM_HAS(third_crossings) || PM_HAS(third_pair) || PM_HAS(third_pair_flux)
     OD_PARAMETER_THIRD_NOTCH,
     OD_PARAMETER_THIRD_GAIN,
     OD_PARAMETER_THIRD_DRIFT,
@@ -302,6 +302,10 @@ enum {
     OD_PARAMETER_WINDING,
     OD_PARAMETER_L_0,
     OD_PARAMETER_ZERO_CURRENT,
+#endif
+#if PM_HAS(two_sets)
+    OD_PARAMETER_M_D,
+    OD_PARAMETER_M_Q,
 #endif
     OD_PARAMETER_I_PULSE,
     OD_PARAMETER_V_INJECTION,

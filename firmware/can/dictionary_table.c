@@ -4,7 +4,7 @@
 
 /* clang-format off */
 
-const uint32_t od_schema = 0x61CA15DFU;
+const uint32_t od_schema = 0xD805F4FBU;
 
 /* least, preset, most; those of parameters are in firmware/params/parameters.def */
 const od_values_t od_values[] = {
@@ -352,25 +352,31 @@ const od_entry_t od_table[] = {
     {0x2320U, 2U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_EKF_SPEED_NOISE, 0U, 0U},
     {0x2320U, 3U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_EKF_ANGLE_NOISE, 0U, 0U},
 #endif
-#if PM_HAS(third_sogi) || PM_HAS(third_integration) || PM_HAS(third_crossings) || PM_HAS(neutral)
+#if PM_HAS(third_sogi) || PM_HAS(third_integration) || PM_HAS(third_crossings) || PM_HAS(third_pair) || PM_HAS(third_pair_flux) || PM_HAS(neutral)
     {0x2330U, 0U, OD_READ, OD_U8, OD_CONSTANT, OD_GROUP_NONE, 0U, 37U, 0U},
 #endif
-#if PM_HAS(third_sogi) || PM_HAS(third_integration) || PM_HAS(third_crossings)
+#if PM_HAS(third_sogi) || PM_HAS(third_integration) || PM_HAS(third_crossings) || PM_HAS(third_pair) || PM_HAS(third_pair_flux)
     {0x2330U, 1U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_MACHINE, OD_PARAMETER_PSI_3, 0U, 0U},
 #endif
 #if PM_HAS(neutral)
     {0x2330U, 2U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_MACHINE, OD_PARAMETER_DL_0, 0U, 0U},
 #endif
-#if PM_HAS(third_sogi) || PM_HAS(third_integration) || PM_HAS(third_crossings)
+#if PM_HAS(third_sogi) || PM_HAS(third_integration) || PM_HAS(third_crossings) || PM_HAS(third_pair) || PM_HAS(third_pair_flux)
     {0x2330U, 3U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_MACHINE, OD_PARAMETER_THIRD_NOTCH, 0U, 0U},
     {0x2330U, 4U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_MACHINE, OD_PARAMETER_THIRD_GAIN, 0U, 0U},
     {0x2330U, 5U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_MACHINE, OD_PARAMETER_THIRD_DRIFT, 0U, 0U},
 #endif
+#if PM_HAS(open_winding) || PM_HAS(two_sets)
+    {0x2340U, 0U, OD_READ, OD_U8, OD_CONSTANT, OD_GROUP_NONE, 0U, 37U, 0U},
+#endif
 #if PM_HAS(open_winding)
-    {0x2340U, 0U, OD_READ, OD_U8, OD_CONSTANT, OD_GROUP_NONE, 0U, 35U, 0U},
     {0x2340U, 1U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_MACHINE, OD_PARAMETER_WINDING, 0U, 0U},
     {0x2340U, 2U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_MACHINE, OD_PARAMETER_L_0, 0U, 0U},
     {0x2340U, 3U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_MACHINE, OD_PARAMETER_ZERO_CURRENT, 0U, 0U},
+#endif
+#if PM_HAS(two_sets)
+    {0x2340U, 4U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_MACHINE, OD_PARAMETER_M_D, 0U, 0U},
+    {0x2340U, 5U, OD_READ | OD_WRITE | OD_STORED | OD_ONLY_OFF | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_MACHINE, OD_PARAMETER_M_Q, 0U, 0U},
 #endif
     {0x2400U, 0U, OD_READ, OD_U8, OD_CONSTANT, OD_GROUP_NONE, 0U, 41U, 0U},
     {0x2400U, 1U, OD_READ | OD_WRITE | OD_STORED | OD_RANGE, OD_I32, OD_PARAMETER, OD_GROUP_APPLICATION, OD_PARAMETER_I_PULSE, 0U, 0U},

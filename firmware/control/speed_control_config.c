@@ -6,7 +6,7 @@
 void make_speed_control(maker_t *m, speed_control_config_t *c)
 {
     const pm_num_t bandwidth = angular(m, DRIVE_PARAM_speed_bandwidth);
-    const pm_num_t k_t = mul3(pm_num_ratio(3, 2), square(pole_pairs(m)), si(m, DRIVE_PARAM_psi_m));
+    const pm_num_t k_t = mul3(torque_share(m->params), square(pole_pairs(m)), si(m, DRIVE_PARAM_psi_m));
     const pm_num_t inertia = pm_num_div(si(m, DRIVE_PARAM_J), k_t); /* A per rad/s2 electrical */
     const pm_num_t unit = pm_num_div(m->base.omega, m->base.i);
     const pm_num_t kp = mul3(bandwidth, inertia, unit);

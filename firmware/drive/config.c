@@ -43,7 +43,7 @@ static void make_base(maker_t *m, drive_config_t *config)
     b->omega = pm_num_mul(si(m, DRIVE_PARAM_speed_trip), pole_pairs(m));
     choose_voltage(m, config);
     b->psi = pm_num_div(b->v, b->omega);
-    b->torque = mul3(pm_num_mul(pm_num_ratio(3, 2), pole_pairs(m)), b->psi, b->i);
+    b->torque = mul3(pm_num_mul(torque_share(m->params), pole_pairs(m)), b->psi, b->i);
     b->t_s = pm_num_div(pm_num(1), si(m, DRIVE_PARAM_f_pwm));
     if (pm_num_cmp(pm_num_mul(b->t_s, b->omega), pm_num_ratio(1, 2)) >= 0) {
         refuse(m, DRIVE_PARAM_speed_trip, "above an electrical frequency of f_pwm / 12.6: raise f_pwm");
@@ -75,7 +75,7 @@ static void make_damping(maker_t *m, open_loop_config_t *c)
 {
     const pm_num_t psi = si(m, DRIVE_PARAM_psi_m);
     const pm_num_t stiffness =
-        mul3(pm_num_mul(pm_num_ratio(3, 2), square(pole_pairs(m))), psi, si(m, DRIVE_PARAM_i_open_loop));
+        mul3(pm_num_mul(torque_share(m->params), square(pole_pairs(m))), psi, si(m, DRIVE_PARAM_i_open_loop));
     const pm_num_t turn = pm_num_mul(pm_num_sqrt(pm_num_div(stiffness, si(m, DRIVE_PARAM_J))), m->t_slow);
     const pm_num_t corners = least(pm_num_mul(pm_num(6), turn), pm_num_ratio(4, 5)); /* twice it */
     const pm_num_t emf = pm_num_mul(turn, psi);                                      /* in a step */
@@ -150,7 +150,7 @@ static void make_protection(maker_t *m, protection_config_t *c, pm_unit_t share,
     c->v_dc_derate = per_unit(m, DRIVE_PARAM_v_dc_derate, m->base.v);
     c->i_sum = PM_Q(0.1);
     PM_IN_IMAGE(
-        open_winding, if (p->winding == 1) { c->i_sum = most_zero(m); })
+        open_winding, if (p->winding == (int32_t)WINDING_OPEN) { c->i_sum = most_zero(m); })
     c->offset_max = fixed(m, pm_num_div(si(m, DRIVE_PARAM_offset_max), si(m, DRIVE_PARAM_i_full_scale)), 15,
                           DRIVE_PARAM_offset_max);
     c->heat_max = borne(pm_min(i_rated, 2 * PM_ONE));
@@ -247,7 +247,7 @@ static void make_limits(maker_t *m, drive_config_t *config)
                             UNIT_BITS, DRIVE_PARAM_voltage_limit);
     config->v_share = pm_min(config->v_share, modulator_reach(m, &config->modulator));
     PM_IN_IMAGE(
-        open_winding, if (config->open_winding.on) {
+        open_winding, if (config->winding == (uint8_t)WINDING_OPEN) {
             config->v_share = fixed(
                 m, least(si(m, DRIVE_PARAM_voltage_limit), pm_num_ratio(VOLTAGE_MOST, VOLTAGE_MOST + 1)),
                 UNIT_BITS, DRIVE_PARAM_voltage_limit);
@@ -294,6 +294,18 @@ static void check_injected(maker_t *m, const drive_config_t *config)
     }
 }
 
+#if PM_CARRIES(NEEDS_BRIDGES)
+static void make_windings(maker_t *m, drive_config_t *config)
+{
+    config->winding = (uint8_t)m->params->winding;
+    PM_IN_IMAGE(
+        open_winding,
+        if (config->winding == (uint8_t)WINDING_OPEN) { make_open_winding(m, &config->open_winding); })
+    PM_IN_IMAGE(
+        two_sets, if (config->winding == (uint8_t)WINDING_TWO_SETS) { make_two_sets(m, &config->two_sets); })
+}
+#endif
+
 drive_result_t drive_configure(drive_config_t *config, const drive_params_t *params, uint32_t channels)
 {
     maker_t m = {.params = params,
@@ -316,7 +328,9 @@ drive_result_t drive_configure(drive_config_t *config, const drive_params_t *par
 #if PM_CARRIES(NEEDS_NEUTRAL)
     make_neutral(&m, &config->neutral);
 #endif
-    PM_IN_IMAGE(open_winding, make_open_winding(&m, &config->open_winding);)
+#if PM_CARRIES(NEEDS_BRIDGES)
+    make_windings(&m, config);
+#endif
     choose_start(&m, config, channels);
     if (config->injection) {
         const injection_limits_t limits = injection_limits(&m);

@@ -11,6 +11,7 @@
 #include "firmware/control/regulator.h"
 #include "firmware/control/speed_control.h"
 #include "firmware/drive/block.h"
+#include "firmware/drive/bridges.h"
 #include "firmware/drive/fault_short.h"
 #include "firmware/drive/neutral.h"
 #include "firmware/drive/open_winding.h"
@@ -21,6 +22,7 @@
 #include "firmware/drive/procedures/torque_polarity.h"
 #include "firmware/drive/procedures/zero_inductance.h"
 #include "firmware/drive/rest.h"
+#include "firmware/drive/two_sets.h"
 #include "firmware/math/image.h"
 #include "firmware/math/num.h"
 #include "firmware/params/types.h"
@@ -89,7 +91,11 @@ typedef struct {
 #if PM_CARRIES(NEEDS_NEUTRAL)
     neutral_config_t neutral;
 #endif
+#if PM_CARRIES(NEEDS_BRIDGES)
+    uint8_t winding; /* WINDING_... */
+#endif
     PM_IN_IMAGE(open_winding, open_winding_config_t open_winding;)
+    PM_IN_IMAGE(two_sets, two_sets_config_t two_sets;)
     pulses_config_t pulses;
     PM_IN_IMAGE(boundary_detection, boundary_detection_config_t boundary_detection;)
     PM_IN_IMAGE(dc_link_pulses, dc_link_pulses_config_t dc_link_pulses;)

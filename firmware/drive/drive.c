@@ -1,6 +1,7 @@
 #include "firmware/drive/drive.h"
 
 #include "firmware/drive/drive_parts.h"
+#include "firmware/drive/second_bridge.h"
 #include "firmware/math/compiler.h"
 #include "firmware/math/image.h"
 #include "firmware/math/root.h"
@@ -136,7 +137,9 @@ PM_RARE void drive_prepare(drive_t *drive)
         const pm_pll_t along = {.theta = drive->theta_open, .omega = omega};
         position_force(&drive->position, &c->position, &along);
     }
-    PM_IN_IMAGE(open_winding, open_winding_slow(&drive->open_winding, &c->open_winding, omega);)
+#if PM_CARRIES(NEEDS_BRIDGES)
+    second_bridge_slow(drive, omega);
+#endif
     drive->turn_open = turn;
     drive->usual = drive->stage == STAGE_VECTOR && drive->config.regulator.id == REGULATOR_INLINE;
     drive->ahead = pm_dir((pm_angle_t)turn + (pm_angle_t)pm_half(turn));

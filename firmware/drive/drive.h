@@ -54,8 +54,8 @@ typedef struct {
     pm_instants_t instants;
 #endif
 #if PM_CARRIES(NEEDS_BRIDGES)
-    uint16_t second
-        [DRIVE_LEGS]; /* of a second bridge: timer counts of both halves; its legs are off where those of the first are, else PWM */
+    uint16_t second[DRIVE_LEGS]; /* of a second bridge: timer counts of both halves, ... */
+    uint16_t second_legs;        /* ... and PM_LEGS_OFF or PM_LEGS_PWM */
 #endif
 } drive_out_t;
 

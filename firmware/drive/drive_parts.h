@@ -20,6 +20,26 @@ static inline void drive_write_leg(uint16_t compare[2], int32_t on) /* 0 <= on <
 #endif
 }
 
+/* What a method asked for is asked for in that period alone. */
+static inline void drive_clear_instants(drive_out_t *out)
+{
+#if PM_CARRIES(PM_DONE_AT)
+    out->instants = (pm_instants_t){0};
+#else
+    (void)out;
+#endif
+}
+
+static inline void drive_write_out(const modulator_out_t *m, drive_out_t *out)
+{
+    drive_write_leg(out->compare[0], m->on[0]);
+    drive_write_leg(out->compare[1], m->on[1]);
+    drive_write_leg(out->compare[2], m->on[2]);
+    out->legs = PM_LEGS_PWM;
+    out->trip = 0;
+    drive_clear_instants(out);
+}
+
 /* Each period while the bridge is driven: currents and DC link within their limits. */
 static inline bool protection_currents_passed(const drive_t *drive, int32_t top)
 {
@@ -27,6 +47,12 @@ static inline bool protection_currents_passed(const drive_t *drive, int32_t top)
     const int32_t a = pm_mulh_sub(top, i.a, i.a);
     const int32_t b = pm_mulh_sub(top, i.b, i.b);
     const int32_t c = pm_mulh_sub(top, i.c, i.c);
+#if PM_HAS(two_sets)
+    const pm_abc_t j = drive->two_sets.i; /* none with one set */
+    if (pm_mulh_sub(top, j.a, j.a) < 0 || pm_mulh_sub(top, j.b, j.b) < 0 || pm_mulh_sub(top, j.c, j.c) < 0) {
+        return false;
+    }
+#endif
     return a >= 0 && b >= 0 && c >= 0;
 }
 

@@ -173,8 +173,8 @@ static void stop(drive_t *drive)
 /* A mode that the commutation, or the winding, does not have. */
 static bool is_refused(const drive_t *drive)
 {
-#if PM_HAS(open_winding)
-    if (drive->config.open_winding.on && drive->command.mode == DRIVE_MODE_IDENTIFY) {
+#if PM_CARRIES(NEEDS_BRIDGES)
+    if (drive->config.winding != (uint8_t)WINDING_STAR && drive->command.mode == DRIVE_MODE_IDENTIFY) {
         return true;
     }
 #endif

@@ -36,6 +36,7 @@ struct drive {
     neutral_t neutral;
 #endif
     PM_IN_IMAGE(open_winding, open_winding_t open_winding;)
+    PM_IN_IMAGE(two_sets, two_sets_t two_sets;)
     bool hw_fault;
     bool carrier;      /* injection is on */
     bool forced;       /* open loop: the observer is forced to the ramp angle */
@@ -84,6 +85,7 @@ struct drive {
     pm_q_t v_dc_before, v_dc_ahead; /* a millisecond ago, and in two */
     uint16_t state_ms;              /* since the state or stage was entered */
     uint16_t stall_ms, sum_ms;
+    PM_IN_IMAGE(two_sets, uint16_t second_sum_ms;)
     uint16_t lost;     /* eighths of a ms without a position */
     uint16_t still_ms; /* standstill while stopping */
     uint16_t agree_ms; /* observer and imposed angle turn alike */

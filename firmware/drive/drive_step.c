@@ -2,6 +2,7 @@
 #include "firmware/drive/drive.h"
 
 #include "firmware/drive/drive_parts.h"
+#include "firmware/drive/second_bridge.h"
 #include "firmware/math/compiler.h"
 #include "firmware/math/image.h"
 #include "firmware/math/pair.h"
@@ -60,8 +61,12 @@ static inline obs_more_t measure_more(drive_t *drive, const drive_in_t *in)
         }
     }
 #endif
+#if PM_HAS(two_sets) && PM_CARRIES(NEEDS_NEUTRAL)
+    more.v_zero_second =
+        neutral_signal(&drive->two_sets.neutral, &drive->config.neutral, in->more.v_neutral_second);
+#endif
 #if PM_HAS(open_winding)
-    if (pm_rarely(drive->config.open_winding.on)) {
+    if (pm_rarely(drive->config.winding == (uint8_t)WINDING_OPEN)) {
         more.v_zero = open_winding_signal(&drive->open_winding, &drive->config.open_winding, drive->i_abc);
         return more;
     }
@@ -90,29 +95,12 @@ static inline void measure(drive_t *drive, const drive_in_t *in, int32_t v_bits)
 #endif
     drive->i_abc = i;
     drive->i_ab = pm_clarke(i);
-    drive->status.v_dc = pm_shl(in->v_dc, (uint32_t)v_bits);
-}
-
-/* What a method asked for is asked for in that period alone. */
-static inline void clear_instants(drive_out_t *out)
-{
-#if PM_CARRIES(PM_DONE_AT)
-    out->instants = (pm_instants_t){0};
-#else
-    (void)out;
-#endif
-}
-
-/* Without control the second bridge ties its ends of an open winding together, to the negative rail. */
-static void tie_second(drive_out_t *out)
-{
 #if PM_CARRIES(NEEDS_BRIDGES)
-    for (uint32_t leg = 0; leg < DRIVE_LEGS; leg++) {
-        out->second[leg] = 0;
+    if (pm_rarely(drive->config.winding != (uint8_t)WINDING_STAR)) {
+        second_bridge_measure(drive, in);
     }
-#else
-    (void)out;
 #endif
+    drive->status.v_dc = pm_shl(in->v_dc, (uint32_t)v_bits);
 }
 
 static void off(drive_out_t *out)
@@ -174,10 +162,8 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
     const bool checked = is_checked(drive, in);
     drive->v_acting = drive->v_next;
     PM_IF_HELD(held_end(&drive->held);)
-    PM_IN_IMAGE(open_winding, open_winding_reset(&drive->open_winding);)
     out->trip = 0;
-    clear_instants(out);
-    tie_second(out);
+    drive_clear_instants(out);
     if (!checked) {
         drive->v_next = (pm_ab_t){0, 0};
         drive->hw_fault = in->hw_fault;
@@ -193,6 +179,9 @@ PM_RARE static void without_control(drive_t *drive, const drive_in_t *in, drive_
     if (checked || drive->stage == STAGE_PROCEDURE) {
         procedure_step(drive, in, out);
     }
+#if PM_CARRIES(NEEDS_BRIDGES)
+    second_bridge_without(drive, out);
+#endif
 }
 
 /* Open loop at a speed where the observer has an angle of its own. */
@@ -203,33 +192,6 @@ static inline position_out_t imposed_frame(const drive_t *drive)
                             .i = pm_park(drive->i_ab, dir),
                             .omega = drive->omega_open};
 }
-
-static inline void write_out(const modulator_out_t *m, drive_out_t *out)
-{
-    drive_write_leg(out->compare[0], m->on[0]);
-    drive_write_leg(out->compare[1], m->on[1]);
-    drive_write_leg(out->compare[2], m->on[2]);
-    out->legs = PM_LEGS_PWM;
-    out->trip = 0;
-    clear_instants(out);
-}
-
-#if PM_HAS(open_winding)
-/* i_quarter: as modulator_step() takes it. */
-static void control_open(drive_t *drive, pm_ab_t v, pm_ab_t i_quarter, drive_out_t *out)
-{
-    const drive_config_t *c = &drive->config;
-    open_winding_out_t bridges;
-    open_winding_step(&drive->open_winding, &c->open_winding, &drive->modulator, &c->modulator, v,
-                      drive->status.v_dc, i_quarter, &bridges);
-    drive->v_next = bridges.v;
-    write_out(&bridges.bridge[0], out);
-    for (uint32_t leg = 0; leg < DRIVE_LEGS; leg++) {
-        pm_assume(bridges.bridge[1].on[leg] >= 0 && bridges.bridge[1].on[leg] <= UINT16_MAX);
-        out->second[leg] = (uint16_t)bridges.bridge[1].on[leg];
-    }
-}
-#endif
 
 /* What a carrier asks of the period beside its mean voltage. */
 static inline void excite(drive_t *drive, const excitation_t *carrier, drive_out_t *out)
@@ -280,7 +242,7 @@ static inline void control(drive_t *drive, const position_out_t *frame, bool usu
         drive->v_next = v_ab;
         out->legs = u->legs;
         out->trip = 0;
-        clear_instants(out);
+        drive_clear_instants(out);
         return;
     }
 #endif
@@ -294,16 +256,16 @@ static inline void control(drive_t *drive, const position_out_t *frame, bool usu
 #endif
     }
     const pm_ab_t i_quarter = pm_park_inverse_quarter(i, frame->ahead);
-#if PM_HAS(open_winding)
-    if (pm_rarely(c->open_winding.on)) {
-        control_open(drive, v_ab, i_quarter, out);
+#if PM_CARRIES(NEEDS_BRIDGES)
+    if (pm_rarely(c->winding != (uint8_t)WINDING_STAR)) {
+        second_bridge_control(drive, frame, v_ab, i_quarter, out);
         return;
     }
 #endif
     modulator_out_t m;
     modulator_step(&drive->modulator, &c->modulator, v_ab, v_dc, i_quarter, &m);
     drive->v_next = m.v;
-    write_out(&m, out);
+    drive_write_out(&m, out);
 #if PM_HAS(zero_vector)
     out->instants.sample_at[0] = drive->position.sample_at;
 #endif

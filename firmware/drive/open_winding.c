@@ -44,7 +44,7 @@ static pm_q_t hold(open_winding_t *self, const open_winding_config_t *config, pm
 
 void open_winding_step(open_winding_t *self, const open_winding_config_t *config, modulator_t *modulator,
                        const modulator_config_t *modulator_config, pm_ab_t v, pm_q_t v_dc, pm_ab_t i_quarter,
-                       open_winding_out_t *out)
+                       bridges_t *out)
 {
     const pm_q_t v_zero = config->held ? hold(self, config, v_dc / 4) : 0;
     const pm_ab_t half = {.alpha = pm_half(v.alpha), .beta = pm_half(v.beta)};

@@ -28,7 +28,7 @@
 
 #include <stdbool.h>
 
-#include "firmware/control/modulator.h"
+#include "firmware/drive/bridges.h"
 #include "firmware/math/frames.h"
 #include "firmware/math/image.h"
 #include "firmware/params/types.h"
@@ -38,7 +38,6 @@ extern "C" {
 #endif
 
 typedef struct {
-    bool on;
     bool held;       /* zero_current 1 */
     pm_q_t k_p, k_r; /* per-unit */
     pm_q_t R;        /* half of it, per-unit */
@@ -55,12 +54,6 @@ typedef struct {
     pm_dir_t turn, lead;
 } open_winding_t;
 
-/* The compare values of both bridges, in counts, and what acts. */
-typedef struct {
-    modulator_out_t bridge[2];
-    pm_ab_t v;
-} open_winding_out_t;
-
 #if PM_HAS(open_winding)
 /* Before the first step with control. */
 void open_winding_reset(open_winding_t *self);
@@ -71,7 +64,7 @@ pm_q_t open_winding_signal(open_winding_t *self, const open_winding_config_t *co
 /* v: voltage that is wanted over [k+1, k+2); i_quarter: current expected there, without i_0. */
 void open_winding_step(open_winding_t *self, const open_winding_config_t *config, modulator_t *modulator,
                        const modulator_config_t *modulator_config, pm_ab_t v, pm_q_t v_dc, pm_ab_t i_quarter,
-                       open_winding_out_t *out);
+                       bridges_t *out);
 
 void open_winding_slow(open_winding_t *self, const open_winding_config_t *config, pm_q_t omega);
 

@@ -33,10 +33,7 @@ static void check(maker_t *m)
 
 PM_APART void make_open_winding(maker_t *m, open_winding_config_t *c)
 {
-    *c = (open_winding_config_t){.on = m->params->winding == 1, .held = m->params->zero_current == 1};
-    if (!c->on) {
-        return;
-    }
+    *c = (open_winding_config_t){.held = m->params->zero_current == 1};
     require(m, NEEDS_BRIDGES, DRIVE_PARAM_winding);
     m->channels |= NEEDS_NEUTRAL; /* the currents tell what the star point does otherwise */
     check(m);

@@ -133,6 +133,12 @@ void protection_slow(drive_t *drive)
     if (all_measured(drive) && lasts(&drive->sum_ms, pm_abs(sum) > c->i_sum, 2)) {
         drive_trip(drive, DRIVE_FAULT_SENSOR_SUM);
     }
+#if PM_HAS(two_sets)
+    const pm_abc_t second = drive->two_sets.i;
+    if (lasts(&drive->second_sum_ms, pm_abs(second.a + second.b + second.c) > c->i_sum, 2)) {
+        drive_trip(drive, DRIVE_FAULT_SENSOR_SUM);
+    }
+#endif
     const pm_q_t omega = drive->pll.omega;
     if (turning && pm_abs(omega) > PM_ONE) {
         drive_trip(drive, DRIVE_FAULT_OVER_SPEED);

@@ -20,10 +20,13 @@
 #define PM_WITHOUT_neutral 1
 #define PM_WITHOUT_injection_stages 1
 #define PM_WITHOUT_open_winding 1
+#define PM_WITHOUT_two_sets 1
 #define PM_WITHOUT_third_integration 1
 #define PM_WITHOUT_third_sogi 1
 #define PM_WITHOUT_third_crossings 1
 #define PM_WITHOUT_zero_vector 1
+#define PM_WITHOUT_third_pair 1
+#define PM_WITHOUT_third_pair_flux 1
 #define PM_WITHOUT_pwm_excitation 1
 #define PM_WITHOUT_zero_anti_rotating 1
 #define PM_WITHOUT_zero_rotating 1

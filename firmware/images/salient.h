@@ -22,6 +22,7 @@
 #define PM_WITHOUT_mismatch 1
 #define PM_WITHOUT_neutral 1
 #define PM_WITHOUT_open_winding 1
+#define PM_WITHOUT_two_sets 1
 #define PM_WITHOUT_back_emf 1
 #define PM_WITHOUT_extended_emf 1
 #define PM_WITHOUT_extended_emf_ab 1
@@ -35,6 +36,8 @@
 #define PM_WITHOUT_third_integration 1
 #define PM_WITHOUT_third_sogi 1
 #define PM_WITHOUT_third_crossings 1
+#define PM_WITHOUT_third_pair 1
+#define PM_WITHOUT_third_pair_flux 1
 #define PM_WITHOUT_pwm_excitation 1
 #define PM_WITHOUT_zero_anti_rotating 1
 #define PM_WITHOUT_zero_rotating 1

@@ -36,6 +36,7 @@
 #define PM_WITHOUT_neutral 1
 #define PM_WITHOUT_injection_stages 1
 #define PM_WITHOUT_open_winding 1
+#define PM_WITHOUT_two_sets 1
 #define PM_WITHOUT_back_emf 1
 #define PM_WITHOUT_extended_emf 1
 #define PM_WITHOUT_extended_emf_ab 1
@@ -50,6 +51,8 @@
 #define PM_WITHOUT_third_sogi 1
 #define PM_WITHOUT_third_crossings 1
 #define PM_WITHOUT_zero_vector 1
+#define PM_WITHOUT_third_pair 1
+#define PM_WITHOUT_third_pair_flux 1
 #define PM_WITHOUT_rotating_sine 1
 #define PM_WITHOUT_inform 1
 #define PM_WITHOUT_pwm_excitation 1

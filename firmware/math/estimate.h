@@ -35,6 +35,9 @@ typedef struct {
 #if PM_CARRIES(NEEDS_NEUTRAL)
     pm_q_t
         v_zero; /* mean of the terminals minus star point at k, behind its RC, per-unit (drive/neutral.h) */
+#if PM_CARRIES(NEEDS_SECOND_SET)
+    pm_q_t v_zero_second; /* the same of a second set, 30 degrees on */
+#endif
 #endif
 } obs_more_t;
 #endif

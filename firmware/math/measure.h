@@ -29,6 +29,8 @@
 #define NEEDS_SECOND_SAMPLE 0x0008U /* currents and voltages of these channels, at chosen instants */
 #define NEEDS_CAPTURES      0x0010U /* comparator edges of the terminals with their instants */
 #define NEEDS_CURRENT_MASK  0x0020U /* a current that cannot be measured in this period is marked */
+#define NEEDS_SECOND_SET                                                                                     \
+    0x0040U /* leg currents of a second bridge, and its star point where there are star points */
 /* Done by the timer. */
 #define NEEDS_HALVES     0x0100U /* compare values of their own for the two halves of a period */
 #define NEEDS_HELD       0x0200U /* a leg held high or low */
@@ -48,15 +50,16 @@
     X(name, needs, NEEDS_SECOND_SAMPLE, "a second sample in the period")                                     \
     X(name, needs, NEEDS_CAPTURES, "edges of terminal comparators")                                          \
     X(name, needs, NEEDS_CURRENT_MASK, "the validity of each current")                                       \
+    X(name, needs, NEEDS_SECOND_SET, "the currents of a second bridge")                                      \
     X(name, needs, NEEDS_HALVES, "different halves of a period")                                             \
     X(name, needs, NEEDS_HELD, "legs held high or low")                                                      \
     X(name, needs, NEEDS_ONE_SWITCH, "PWM on one switch of a leg")                                           \
     X(name, needs, NEEDS_COMMUTATE, "commutation within the period")                                         \
     X(name, needs, NEEDS_BRIDGES, "a second bridge")
 
-#define PM_MEASURED 0x003FU
+#define PM_MEASURED 0x007FU
 #define PM_DONE_AT  (NEEDS_SECOND_SAMPLE | NEEDS_COMMUTATE)
-#define PM_ALL      0x1F3FU
+#define PM_ALL      0x1F7FU
 
 #ifndef PM_CHANNELS
 #define PM_CHANNELS PM_ALL
@@ -119,6 +122,12 @@ typedef struct {
 #endif
 #if PM_CARRIES(NEEDS_NEUTRAL)
     uint16_t v_neutral;
+#endif
+#if PM_CARRIES(NEEDS_SECOND_SET)
+    uint16_t i_second[PM_LEGS];
+#if PM_CARRIES(NEEDS_NEUTRAL)
+    uint16_t v_neutral_second; /* as v_neutral, of the second star */
+#endif
 #endif
 #if PM_CARRIES(NEEDS_SECOND_SAMPLE)
     uint16_t sampled;                       /* bit n: sample n was asked for and is here */

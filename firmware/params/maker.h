@@ -9,6 +9,7 @@
 
 #include "firmware/math/compiler.h"
 #include "firmware/math/fixed.h"
+#include "firmware/math/image.h"
 #include "firmware/math/measure.h"
 #include "firmware/params/parameters.h"
 
@@ -139,6 +140,18 @@ static inline pm_q_t per_unit_word(pm_num_word_t base, maker_t *m, drive_param_i
 PM_INLINE pm_q_t per_unit(maker_t *m, drive_param_id_t id, pm_num_t base)
 {
     return per_unit_word(pm_num_word(base), m, id);
+}
+
+/* Torque over pole pairs, flux and current: 3/2 of each set of windings. */
+PM_INLINE pm_num_t torque_share(const drive_params_t *params)
+{
+#if PM_HAS(two_sets)
+    if (params->winding == 2) {
+        return pm_num(3);
+    }
+#endif
+    (void)params;
+    return pm_num_ratio(3, 2);
 }
 
 PM_INLINE pm_num_t pole_pairs(const maker_t *m)

@@ -33,14 +33,13 @@ static void set_leg(const hal_t *hal, int leg, const drive_out_t *out, plant_pwm
     pwm->driven[leg] = state != PM_LEG_OFF && hal->armed;
 }
 
-/* The second bridge is off where the first is, else it has PWM. */
-static void set_second(int leg, const drive_out_t *out, plant_pwm_t *pwm)
+static void set_second(const hal_t *hal, int leg, const drive_out_t *out, plant_pwm_t *pwm)
 {
     const int there = DRIVE_LEGS + leg;
     pwm->compare[there][0] = out->second[leg];
     pwm->compare[there][1] = out->second[leg];
     pwm->state[there] = PLANT_LEG_PWM;
-    pwm->driven[there] = pwm->driven[leg];
+    pwm->driven[there] = out->second_legs != PM_LEGS_OFF && hal->armed;
 }
 
 void sim_commutate(hal_t *hal, uint16_t legs)
@@ -60,7 +59,7 @@ void hal_bridge_write(hal_t *hal, const drive_out_t *out)
     plant_pwm_t pwm = {0};
     for (int leg = 0; leg < DRIVE_LEGS; ++leg) {
         set_leg(hal, leg, out, &pwm);
-        set_second(leg, out, &pwm);
+        set_second(hal, leg, out, &pwm);
     }
     plant_set_pwm(hal->plant, &pwm);
     for (int n = 0; n < PM_SAMPLES; ++n) {

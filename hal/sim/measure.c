@@ -16,7 +16,7 @@ uint32_t hal_channels(const hal_t *hal)
                          (neutral ? NEEDS_NEUTRAL : 0U) |
                          (sensor->i_dc_full_scale_A > 0.0 ? NEEDS_DC_CURRENT : 0U) |
                          (sensor->capture_s > 0.0 ? NEEDS_CAPTURES : 0U) |
-                         (plant_leg_count(hal->plant) > DRIVE_LEGS ? NEEDS_BRIDGES : 0U) |
+                         (plant_leg_count(hal->plant) > DRIVE_LEGS ? NEEDS_BRIDGES | NEEDS_SECOND_SET : 0U) |
                          (plant_inverter(hal->plant)->bootstrap_charge_s > 0.0 ? PM_BOOTSTRAP : 0U);
     return all & ~hal->without;
 }
@@ -64,14 +64,25 @@ void sim_run_period(hal_t *hal)
 
 /* Star point against the mean of the terminals. The plant's differential channel sees the opposite; without
  * it the difference of the channels takes its place, half of the code's range on either side. */
-static uint16_t neutral_code(const plant_adc_t *adc, const plant_sensor_t *sensor)
+static uint16_t neutral_code(const plant_adc_t *adc, const plant_sensor_t *sensor, int set)
 {
     if (sensor->v_zero_full_scale_V > 0.0) {
-        const int32_t mirrored = 2 * MID_SCALE - adc->v_zero[0];
+        const int32_t mirrored = 2 * MID_SCALE - adc->v_zero[set];
         return (uint16_t)(mirrored < UINT16_MAX ? mirrored : UINT16_MAX);
     }
-    const int32_t sum = adc->v_leg[0] + adc->v_leg[1] + adc->v_leg[2];
-    return (uint16_t)(MID_SCALE + (3 * adc->v_neutral[0] - sum) / (2 * PM_LEGS));
+    const uint16_t *leg = &adc->v_leg[PM_LEGS * set];
+    const int32_t sum = leg[0] + leg[1] + leg[2];
+    return (uint16_t)(MID_SCALE + (3 * adc->v_neutral[set] - sum) / (2 * PM_LEGS));
+}
+
+static void fill_second(const hal_t *hal, uint32_t channels, pm_measure_t *more)
+{
+    for (uint32_t leg = 0; leg < PM_LEGS; leg++) {
+        more->i_second[leg] = hal->adc.i_leg[PM_LEGS + leg];
+    }
+    if ((channels & NEEDS_NEUTRAL) != 0U) {
+        more->v_neutral_second = neutral_code(&hal->adc, plant_sensor(hal->plant), 1);
+    }
 }
 
 static void fill_samples(const hal_t *hal, uint32_t channels, pm_measure_t *more)
@@ -85,7 +96,7 @@ static void fill_samples(const hal_t *hal, uint32_t channels, pm_measure_t *more
         }
         more->v_dc_sample[n] = adc->v_dc;
         more->v_neutral_sample[n] =
-            (channels & NEEDS_NEUTRAL) != 0U ? neutral_code(adc, plant_sensor(hal->plant)) : 0U;
+            (channels & NEEDS_NEUTRAL) != 0U ? neutral_code(adc, plant_sensor(hal->plant), 0) : 0U;
     }
 }
 
@@ -113,7 +124,10 @@ static void fill_more(const hal_t *hal, pm_measure_t *more)
         memcpy(more->v_terminal, hal->adc.v_leg, sizeof more->v_terminal);
     }
     if ((channels & NEEDS_NEUTRAL) != 0U) {
-        more->v_neutral = neutral_code(&hal->adc, plant_sensor(hal->plant));
+        more->v_neutral = neutral_code(&hal->adc, plant_sensor(hal->plant), 0);
+    }
+    if ((channels & NEEDS_SECOND_SET) != 0U) {
+        fill_second(hal, channels, more);
     }
     if ((channels & NEEDS_SECOND_SAMPLE) != 0U) {
         fill_samples(hal, channels, more);

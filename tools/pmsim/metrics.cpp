@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <limits>
 
 #include "tools/pmsim/metrics_special.h"
@@ -87,6 +88,16 @@ double zero_current(const Sample &s, const Setup &)
     return s.rig.truth.i_zero_A;
 }
 
+// Amplitude of half the difference of two sets, the second in axes of its own 30 degrees on.
+double difference_current(const Sample &s, const Setup &)
+{
+    const double *i = s.rig.truth.i_A;
+    const auto vector = [](const double *x) {
+        return std::complex<double>((2 * x[0] - x[1] - x[2]) / 3, (x[1] - x[2]) / std::sqrt(3.0));
+    };
+    return 0.5 / std::sqrt(2.0) * std::abs(vector(i) - vector(i + 3) * std::polar(1.0, std::acos(-1.0) / 6));
+}
+
 double v_dc(const Sample &s, const Setup &)
 {
     return s.rig.truth.v_dc_V;
@@ -136,6 +147,8 @@ const FoldedMetric folded_metrics[] = {
      Fold::deviation, false, i_q},
     {"zero_current_rms_A", "A", "rms of the current that all phases of an open winding have in common",
      Fold::rms, false, zero_current},
+    {"difference_current_rms_A", "A", "rms over a phase of half the difference of two sets' currents",
+     Fold::rms, false, difference_current},
     {"v_dc_max_V", "V", "highest DC-link voltage", Fold::max, false, v_dc},
     {"v_dc_min_V", "V", "lowest DC-link voltage", Fold::min, false, v_dc},
     {"weight_mean", "1", "mean share of the flux observer; 0: injection alone", Fold::mean, true, weight},

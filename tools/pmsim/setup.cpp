@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "firmware/drive/bridges.h"
 #include "firmware/params/parameters.h"
 #include "tools/pmsim/setup_fields.h"
 #include "tools/pmsim/text.h"
@@ -184,7 +185,10 @@ void derive_board_parameters(Setup &setup)
     derive(DRIVE_PARAM_i_full_scale, sensor.i_full_scale_A);
     derive(DRIVE_PARAM_v_full_scale, sensor.v_full_scale_V);
     derive(DRIVE_PARAM_t_settle, sensor.shunt == PLANT_LOW_SIDE ? sensor.settle_s : 0.0);
-    derive(DRIVE_PARAM_winding, setup.plant.winding.connection == PLANT_OPEN ? 1.0 : 0.0);
+    const plant_winding_t &winding = setup.plant.winding;
+    derive(DRIVE_PARAM_winding, winding.connection == PLANT_OPEN ? WINDING_OPEN
+                                : winding.sets == 2              ? WINDING_TWO_SETS
+                                                                 : WINDING_STAR);
     if (sensor.v_zero_full_scale_V > 0.0) {
         derive(DRIVE_PARAM_neutral_full_scale, sensor.v_zero_full_scale_V);
         derive(DRIVE_PARAM_neutral_filter, sensor.v_zero_filter_s);
@@ -215,9 +219,6 @@ void read_sections(Setup &setup, const Map &map, bool is_machine_file)
 void require_drive(const Setup &setup)
 {
     const auto refuse = [&setup](const std::string &why) { throw InputError(setup.file + ": " + why); };
-    if (setup.plant.winding.sets == 2) {
-        refuse("the drive cannot run two sets yet");
-    }
     if (setup.plant.sensor.shunt == PLANT_SINGLE_SHUNT) {
         refuse("the drive cannot measure with a single shunt yet");
     }

@@ -5,6 +5,26 @@ void procedure_calibrate_begin(drive_t *drive)
     (void)drive;
 }
 
+#if PM_HAS(two_sets)
+static pm_procedure_t conclude_second(drive_t *drive, int32_t most)
+{
+    const calibrate_t *self = &drive->procedure.calibrate;
+    two_sets_t *second = &drive->two_sets;
+    pm_procedure_t result = PM_DONE;
+    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
+        second->zero[x] = pm_shl(self->second[x], PM_Q_BITS - 15 - CALIBRATE_BITS);
+        if (pm_abs(second->zero[x] - PM_ONE) > most) {
+            result = PM_FAILED_OFFSET;
+        }
+    }
+    second->neutral.zero = pm_shl(self->neutral_second, PM_Q_BITS - 15 - CALIBRATE_BITS);
+    if (second->neutral.zero != 0 && pm_abs(second->neutral.zero - PM_ONE) > PM_ONE / 4) {
+        result = PM_FAILED_OFFSET;
+    }
+    return result;
+}
+#endif
+
 static pm_procedure_t conclude(drive_t *drive)
 {
     const int32_t most = pm_shl(drive->config.protection.offset_max, PM_Q_BITS - 15);
@@ -23,6 +43,11 @@ static pm_procedure_t conclude(drive_t *drive)
         result = PM_FAILED_OFFSET;
     }
 #endif
+#if PM_HAS(two_sets)
+    if (drive->config.winding == (uint8_t)WINDING_TWO_SETS && conclude_second(drive, most) != PM_DONE) {
+        result = PM_FAILED_OFFSET;
+    }
+#endif
     return result;
 }
 
@@ -35,6 +60,12 @@ pm_procedure_t procedure_calibrate_step(drive_t *drive, const drive_in_t *in, dr
     }
 #if PM_CARRIES(NEEDS_NEUTRAL)
     self->neutral += in->more.v_neutral;
+#endif
+#if PM_HAS(two_sets)
+    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
+        self->second[x] += in->more.i_second[x];
+    }
+    self->neutral_second += in->more.v_neutral_second;
 #endif
     self->count++;
     return self->count == CALIBRATE_PERIODS ? conclude(drive) : PM_RUNNING;

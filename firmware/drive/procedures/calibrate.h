@@ -21,6 +21,10 @@ typedef struct {
 #if PM_CARRIES(NEEDS_NEUTRAL)
     int32_t neutral; /* sum of its codes */
 #endif
+#if PM_CARRIES(NEEDS_SECOND_SET)
+    int32_t second[3];
+    int32_t neutral_second;
+#endif
     uint16_t count; /* periods so far */
 } calibrate_t;
 

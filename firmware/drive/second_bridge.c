@@ -1,0 +1,73 @@
+#include "firmware/drive/second_bridge.h"
+
+#include "firmware/drive/drive_parts.h"
+#include "firmware/math/compiler.h"
+#include "firmware/math/image.h"
+
+#if PM_CARRIES(NEEDS_BRIDGES)
+
+static void write_second(const modulator_out_t *m, drive_out_t *out)
+{
+    for (uint32_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        pm_assume(m->on[leg] >= 0 && m->on[leg] <= UINT16_MAX);
+        out->second[leg] = (uint16_t)m->on[leg];
+    }
+    out->second_legs = PM_LEGS_PWM;
+}
+
+void second_bridge_measure(drive_t *drive, const drive_in_t *in)
+{
+#if PM_HAS(two_sets)
+    if (drive->config.winding == (uint8_t)WINDING_TWO_SETS) {
+        drive->i_ab = two_sets_measure(&drive->two_sets, in->more.i_second, drive->i_ab);
+    }
+#else
+    (void)drive;
+    (void)in;
+#endif
+}
+
+void second_bridge_control(drive_t *drive, const position_out_t *frame, pm_ab_t v, pm_ab_t i_quarter,
+                           drive_out_t *out)
+{
+    const drive_config_t *c = &drive->config;
+    const pm_q_t v_dc = drive->status.v_dc;
+    bridges_t bridges;
+    (void)frame;
+#if PM_HAS(two_sets)
+    if (c->winding == (uint8_t)WINDING_TWO_SETS) {
+        const two_sets_in_t in = {
+            .v = v, .i_quarter = i_quarter, .ahead = frame->ahead, .omega = frame->omega, .v_dc = v_dc};
+        two_sets_step(&drive->two_sets, &c->two_sets, &drive->modulator, &c->modulator, &in, &bridges);
+    }
+#endif
+#if PM_HAS(open_winding)
+    if (c->winding == (uint8_t)WINDING_OPEN) {
+        open_winding_step(&drive->open_winding, &c->open_winding, &drive->modulator, &c->modulator, v, v_dc,
+                          i_quarter, &bridges);
+    }
+#endif
+    drive->v_next = bridges.v;
+    drive_write_out(&bridges.bridge[0], out);
+    write_second(&bridges.bridge[1], out);
+}
+
+void second_bridge_without(drive_t *drive, drive_out_t *out)
+{
+    const bool tied = drive->config.winding != (uint8_t)WINDING_TWO_SETS || drive->stage == STAGE_SHORT;
+    for (uint32_t leg = 0; leg < DRIVE_LEGS; leg++) {
+        out->second[leg] = 0;
+    }
+    out->second_legs = tied && out->legs != PM_LEGS_OFF ? PM_LEGS_PWM : PM_LEGS_OFF;
+    PM_IN_IMAGE(open_winding, open_winding_reset(&drive->open_winding);)
+    PM_IN_IMAGE(two_sets, two_sets_reset(&drive->two_sets, &drive->config.two_sets);)
+}
+
+void second_bridge_slow(drive_t *drive, pm_q_t omega)
+{
+    (void)drive;
+    (void)omega;
+    PM_IN_IMAGE(open_winding, open_winding_slow(&drive->open_winding, &drive->config.open_winding, omega);)
+}
+
+#endif

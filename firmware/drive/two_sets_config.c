@@ -1,0 +1,52 @@
+#include "firmware/drive/two_sets.h"
+
+#include "firmware/control/regulator.h"
+#include "firmware/math/compiler.h"
+#include "firmware/params/maker.h"
+#include "injection/injection.h"
+
+#if PM_HAS(two_sets)
+
+/* What drives legs by itself knows one bridge. */
+static void check(maker_t *m)
+{
+    static const char one[] = "needs one set of windings: winding 0";
+    const drive_params_t *p = m->params;
+    if (2 * (int64_t)p->M_d >= p->L_d) {
+        refuse(m, DRIVE_PARAM_M_d, "half of L_d or more: L_d is that of both sets, with M_d in it");
+    } else if (2 * (int64_t)p->M_q >= p->L_q) {
+        refuse(m, DRIVE_PARAM_M_q, "half of L_q or more: L_q is that of both sets, with M_q in it");
+    } else if (p->start_method < 2) {
+        refuse(m, DRIVE_PARAM_start_method, "two sets are started by 2 or 3");
+    } else if (p->flying_start != 0) {
+        refuse(m, DRIVE_PARAM_flying_start, one);
+    } else if (p->commutation != 0) {
+        refuse(m, DRIVE_PARAM_commutation, one);
+    } else if ((regulator_traits((regulator_id_t)p->regulator) & REGULATOR_SWITCHES) != 0U) {
+        refuse(m, DRIVE_PARAM_regulator, one);
+    } else if (p->t_settle != 0) {
+        refuse(m, DRIVE_PARAM_t_settle, "two sets need shunts in the lines");
+    } else {
+        /* they can be run */
+    }
+}
+
+PM_APART void make_two_sets(maker_t *m, two_sets_config_t *c)
+{
+    require(m, NEEDS_BRIDGES | NEEDS_SECOND_SET, DRIVE_PARAM_winding);
+    check(m);
+    if (!m->result.ok) {
+        return;
+    }
+    /* The same control for a machine of the difference: L - M, and no magnet. */
+    drive_params_t difference = *m->params;
+    difference.L_d -= 2 * difference.M_d;
+    difference.L_q -= 2 * difference.M_q;
+    difference.psi_m = 0;
+    maker_t of_z = *m;
+    of_z.params = &difference;
+    make_synchronous_pi(&of_z, &c->regulator);
+    m->result = of_z.result;
+}
+
+#endif
