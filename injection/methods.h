@@ -12,6 +12,8 @@
 #include "injection/stationary_sine.h"
 #include "injection/stationary_square.h"
 #include "injection/zero_anti_rotating.h"
+#include "injection/zero_pair_anti_rotating.h"
+#include "injection/zero_pair_rotating.h"
 #include "injection/zero_pulsating.h"
 #include "injection/zero_rotating.h"
 

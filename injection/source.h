@@ -38,7 +38,9 @@ typedef struct {
 
 /* What a carrier does to the period [k+1, k+2); what a source does not name is zero. */
 typedef struct {
-    pm_ab_t v;                          /* added throughout, per-unit */
+    pm_ab_t v; /* added throughout, per-unit */
+    PM_IN_IMAGE(two_sets,
+                pm_ab_t apart;) /* what a second set of windings is given beside it (drive/two_sets.h) */
     INJECTION_IF_VOLTAGE(pm_q_t i_ref;) /* added to the reference of the current along d */
 #if PM_HAS(counted_carrier)
     pm_dq_t i; /* current of the carrier in the middle of that period, in the estimated frame, where the
@@ -58,6 +60,10 @@ static inline excitation_t excitation_of(pm_ab_t v)
 {
     excitation_t e;
     e.v = v;
+#if PM_HAS(two_sets)
+    e.apart.alpha = 0;
+    e.apart.beta = 0;
+#endif
     INJECTION_IF_VOLTAGE(e.i_ref = 0;)
 #if PM_HAS(counted_carrier)
     e.i.d = 0;

@@ -24,12 +24,28 @@ static pm_num_t ratio_of_sums(const inductances_t *L)
     return pm_num_div(pm_num_mul(pm_num_add(L->L_d, L->L_q), pm_num_ratio(1, 2)), D);
 }
 
+/* Of two sets, whose carriers are 90 degrees apart (zero_pair.h): the current of a set against that of the drive's inductances,
+ * which are L + M,
+ *   (L + M) L / (L^2 - M^2) = L / (L - M) */
+static pm_num_t of_a_set(const maker_t *m)
+{
+#if PM_HAS(two_sets)
+    if (m->params->winding == 2) {
+        const pm_num_t M = si(m, DRIVE_PARAM_M_d);
+        const pm_num_t L = pm_num_sub(si(m, DRIVE_PARAM_L_d), M);
+        return pm_num_div(L, pm_num_sub(L, M));
+    }
+#endif
+    (void)m;
+    return pm_num(1);
+}
+
 /* A without load, V: dL_0 V_h L_sa / (2 D). */
 static pm_num_t amplitude(const maker_t *m)
 {
     const inductances_t L = inductances_at_zero(m);
-    return pm_num_mul(mul3(si(m, DRIVE_PARAM_dL_0), si(m, DRIVE_PARAM_v_injection), ratio_of_sums(&L)),
-                      pm_num_ratio(1, 2));
+    const pm_num_t one = mul3(si(m, DRIVE_PARAM_dL_0), si(m, DRIVE_PARAM_v_injection), ratio_of_sums(&L));
+    return mul3(one, of_a_set(m), pm_num_ratio(1, 2));
 }
 
 pm_num_t zero_unit(const maker_t *m)

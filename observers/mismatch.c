@@ -39,15 +39,28 @@ void mismatch_slow(mismatch_t *self, mismatch_window_t *window, const mismatch_c
 /* Steps of the pause. */
 #define REST   60000U
 
+/* The current of the window's axis. */
+static pm_q_t current_of(uint8_t axis, const mismatch_in_t *in)
+{
+#if PM_HAS(two_sets)
+    if (axis == (uint8_t)MISMATCH_APART) {
+        return in->apart;
+    }
+#endif
+    return axis == (uint8_t)MISMATCH_Q_AXIS ? in->i.q : in->i.d;
+}
+
 pm_q_t mismatch_step(const mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
                      const mismatch_in_t *in, pm_q_t weight, pm_q_t eps)
 {
-    const pm_q_t left = eps + pm_mul(weight, mismatch_eps(self, in->i));
+    pm_q_t learnt = mismatch_eps(self, in->i);
+    PM_IN_IMAGE(two_sets, learnt += pm_mul(self->k_a, in->apart);)
+    const pm_q_t left = eps + pm_mul(weight, learnt);
     if (window != NULL) {
         const pm_angle_t seen = in->pll->theta + (pm_angle_t)pm_rad_to_angle(left);
         window->theta += (pm_angle_t)pm_omega_to_angle(window->omega, in->k_theta);
         window->x += (pm_angle_t)(pm_angle_diff(seen, window->theta) / 16);
-        window->i += (config->id == (uint8_t)MISMATCH_Q_AXIS ? in->i.q : in->i.d) / 16;
+        window->i += current_of(mismatch_axis(window, config), in) / 16;
     }
     return left;
 }
@@ -72,13 +85,26 @@ static pm_q_t real_product(pm_ab_t a, pm_ab_t b)
 }
 
 /* Oscillation of the rotor, rad per base current: -swing times the flux that makes the torque. */
-static pm_q_t rotor(const mismatch_config_t *config, pm_dq_t i)
+static pm_q_t rotor(const mismatch_config_t *config, uint8_t axis, pm_dq_t i)
 {
     const observer_model_t *model = &config->model;
-    const pm_q_t flux = config->id == (uint8_t)MISMATCH_Q_AXIS ? observer_active_flux(model, i)
-                                                               : pm_mul(model->L_d - model->L_q, i.q);
+    const pm_q_t flux = axis == (uint8_t)MISMATCH_Q_AXIS ? observer_active_flux(model, i)
+                                                         : pm_mul(model->L_d - model->L_q, i.q);
     return -pm_shl(pm_sat(pm_mulh(flux, config->swing), 19), 12);
 }
+
+#if PM_HAS(two_sets)
+/* No torque, no swing of the rotor. Each kind of window converges from its own first one. */
+static void learn_apart(mismatch_t *self, const mismatch_window_t *window, const mismatch_config_t *config,
+                        pm_q_t g)
+{
+    const pm_q_t change = g / (4 + (int32_t)((window->windows - MISMATCH_IN_PHASE) / 4U));
+    self->k_a = pm_sat(self->k_a + change, PM_Q_BITS);
+    if (window->windows >= MISMATCH_TRACKS) {
+        self->k.q = pm_sat(self->k.q + pm_mul_sat(change, config->alike), PM_Q_BITS);
+    }
+}
+#endif
 
 static void learn(mismatch_t *self, mismatch_window_t *window, const mismatch_config_t *config,
                   const mismatch_in_t *in)
@@ -89,8 +115,16 @@ static void learn(mismatch_t *self, mismatch_window_t *window, const mismatch_co
         return;
     }
     const pm_q_t g = pm_div(real_product(lifted(window->angle), current), square);
-    const pm_q_t change = (rotor(config, in->i) - g) / (4 + (int32_t)(window->windows / 4U));
-    if (config->id == (uint8_t)MISMATCH_Q_AXIS) {
+    const uint8_t axis = mismatch_axis(window, config);
+#if PM_HAS(two_sets)
+    if (axis == (uint8_t)MISMATCH_APART) {
+        learn_apart(self, window, config, -g);
+        window->windows++;
+        return;
+    }
+#endif
+    const pm_q_t change = (rotor(config, axis, in->i) - g) / (4 + (int32_t)(window->windows / 4U));
+    if (axis == (uint8_t)MISMATCH_Q_AXIS) {
         self->k.q = pm_sat(self->k.q + change, PM_Q_BITS);
     } else {
         self->k_omega = pm_mul(pm_sat(self->k.d + change, PM_Q_BITS), in->pll->omega);
@@ -127,7 +161,7 @@ static int32_t mean(int32_t sum, const mismatch_config_t *config)
 static bool turns(const mismatch_config_t *config, const mismatch_in_t *in)
 {
     const int32_t two = INT32_MAX / (config->samples * config->periods);
-    return config->id == (uint8_t)MISMATCH_Q_AXIS ||
+    return config->id != (uint8_t)MISMATCH_D_AXIS ||
            pm_abs(pm_omega_to_angle(in->pll->omega, in->k_theta)) / 4 > two;
 }
 

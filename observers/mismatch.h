@@ -31,14 +31,22 @@
  * |omega| < 2 w nothing is injected on the d-axis. Active only while the observer leads without the carrier
  * of another source. Which error shows in which observer: docs/methods_notes.md.
  *
+ * Two sets of windings (METHODS.md 7.2.4.3, row 87): a current that one set has more and the other less makes no torque, and shows in
+ * the angle that the first set alone sees (drive/two_sets.h)
+ *   k_a = dL' / psi_a,   L' = L_q - M_q of a set, where i_q shows dL_q + dM_q
+ * The first MISMATCH_IN_PHASE windows are those of the q-axis, which say k_q. The next tell k_a, and from MISMATCH_TRACKS on
+ * what k_a changes by moves k_q as an L_q and M_q that change alike: by (L_q + M_q) / (L_q - M_q).
+ *
  * Each control period: 49 instructions and a call. At 1 kHz: 30 when off, at most 161 otherwise. Range:
  * |k| <= 1 per base current. Tests: tests/unit/observers/mismatch_test.cpp,
  * tests/scenario/mismatch_injection.yaml. */
 #ifndef OBSERVERS_MISMATCH_H
 #define OBSERVERS_MISMATCH_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
+#include "firmware/math/image.h"
 #include "firmware/math/pll.h"
 #include "observers/model.h"
 
@@ -49,7 +57,10 @@ extern "C" {
 #define MISMATCH_PERIODS 4U  /* of the injection in a window, after the first */
 #define MISMATCH_WINDOWS 64U /* learnt before the injection pauses */
 
-typedef enum { MISMATCH_OFF, MISMATCH_Q_AXIS, MISMATCH_D_AXIS, MISMATCH_COUNT } mismatch_id_t;
+#define MISMATCH_IN_PHASE 16U
+#define MISMATCH_TRACKS   40U
+
+typedef enum { MISMATCH_OFF, MISMATCH_Q_AXIS, MISMATCH_D_AXIS, MISMATCH_APART, MISMATCH_COUNT } mismatch_id_t;
 
 typedef struct {
     uint8_t id;       /* mismatch_id_t */
@@ -57,13 +68,15 @@ typedef struct {
     uint16_t samples; /* steps per period of the injection */
     pm_q_t i;         /* its amplitude */
     observer_model_t model;
-    int32_t swing; /* 1.5 P^2 / (J w^2): rad per base flux and base current, Q20 */
+    PM_IN_IMAGE(two_sets, pm_q_t alike;) /* (L_q + M_q) / (L_q - M_q) */
+    int32_t swing;                       /* 1.5 P^2 / (J w^2): rad per base flux and base current, Q20 */
 } mismatch_config_t;
 
 /* What has been learnt. */
 typedef struct {
     pm_dq_t k;      /* k_d, k_q: rad per base current */
     pm_q_t k_omega; /* k_d omega */
+    PM_IN_IMAGE(two_sets, pm_q_t k_a;)
 } mismatch_t;
 
 /* The injection and the response to it; all zero before the first step. */
@@ -86,7 +99,32 @@ typedef struct {
     const pm_pll_t *pll; /* of the step: before its correction */
     int32_t k_theta;     /* pm_omega_to_angle() */
     pm_dq_t i;
+    PM_IN_IMAGE(two_sets, pm_q_t apart;) /* q current that the first of two sets has more than their mean */
 } mismatch_in_t;
+
+/* Which axis the present window is of: MISMATCH_... */
+static inline uint8_t mismatch_axis(const mismatch_window_t *window, const mismatch_config_t *config)
+{
+#if PM_HAS(two_sets)
+    if (config->id == (uint8_t)MISMATCH_APART && window->windows < MISMATCH_IN_PHASE) {
+        return (uint8_t)MISMATCH_Q_AXIS;
+    }
+#endif
+    (void)window;
+    return config->id;
+}
+
+/* It is between two sets of windings. */
+static inline bool mismatch_is_apart(const mismatch_window_t *window, const mismatch_config_t *config)
+{
+#if PM_HAS(two_sets)
+    return mismatch_axis(window, config) == (uint8_t)MISMATCH_APART;
+#else
+    (void)window;
+    (void)config;
+    return false;
+#endif
+}
 
 /* Correction of the error signal. */
 static inline pm_q_t mismatch_eps(const mismatch_t *self, pm_dq_t i)

@@ -249,6 +249,9 @@ const char *config_fault(const plant_config_t *config)
         config->winding.connection == PLANT_OPEN) {
         fault = "sensor.comparator_reference: an open winding has no neutral";
     }
+    if (!fault && config->sensor.v_zero_between && config->winding.sets != 2) {
+        fault = "sensor.v_zero_between is for two sets";
+    }
     double tolerance = config->tolerance;
     if (!fault && tolerance != 0.0 && !(tolerance >= 1e-12 && tolerance <= 1e-2)) {
         fault = "tolerance must be 0 (default) or between 1e-12 and 0.01";

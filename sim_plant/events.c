@@ -91,7 +91,8 @@ static void lag_inputs(const circuit_t *c, const point_t *p, const circuit_nodes
 {
     *inputs = (lagged_t){.i_dc_A = nodes->i_dc_A};
     for (int set = 0; set < c->machine.winding.sets; set++) {
-        inputs->v_zero_V[set] = lags_zero_V(&c->lags, set, nodes->v_zero_V[set], nodes->v_leg_V);
+        inputs->v_zero_V[set] =
+            lags_zero_V(&c->lags, set, nodes->v_zero_V[set], nodes->v_leg_V, nodes->v_neutral_V);
     }
     for (int k = 0; k < c->bridge.legs; k++) {
         inputs->i_A[k] = circuit_leg_A(c, p, k);

@@ -7,6 +7,7 @@ void lags_init(lags_t *lags, const plant_sensor_t *sensor, int legs)
     bool in_line = sensor->shunt == PLANT_IN_LINE;
     *lags = (lags_t){.zero_s = sensor->v_zero_full_scale_V > 0.0 ? sensor->v_zero_filter_s : 0.0,
                      .current_s = in_line ? sensor->i_filter_s : 0.0,
+                     .between = sensor->v_zero_between,
                      .dc_s = sensor->i_dc_full_scale_A > 0.0 ? sensor->i_dc_filter_s : 0.0};
     for (int first = 0; first < legs; first += 3) {
         double sum = 0.0;
@@ -19,8 +20,12 @@ void lags_init(lags_t *lags, const plant_sensor_t *sensor, int legs)
     }
 }
 
-double lags_zero_V(const lags_t *lags, int set, double v_zero_V, const double v_leg_V[])
+double lags_zero_V(const lags_t *lags, int set, double v_zero_V, const double v_leg_V[],
+                   const double v_neutral_V[])
 {
+    if (lags->between && set == 0) {
+        return v_neutral_V[0] - v_neutral_V[1];
+    }
     for (int k = 3 * set; k < 3 * set + 3; k++) {
         v_zero_V += lags->unequal[k] * v_leg_V[k];
     }

@@ -21,6 +21,7 @@ typedef struct {
 
 typedef struct {
     double zero_s, current_s, dc_s; /* 0: none */
+    bool between;                   /* the first channel is: v_N1 - v_N2 */
     double unequal[PLANT_LEGS];     /* w_k - 1/3 */
     lagged_t y;
 } lags_t;
@@ -32,8 +33,9 @@ static inline bool lags_active(const lags_t *lags)
     return lags->zero_s > 0.0 || lags->current_s > 0.0 || lags->dc_s > 0.0;
 }
 
-/* Input of the differential channel of a set, from its zero sequence and its three terminals. */
-double lags_zero_V(const lags_t *lags, int set, double v_zero_V, const double v_leg_V[]);
+/* Input of the differential channel of a set, from its zero sequence, its three terminals and the star points. */
+double lags_zero_V(const lags_t *lags, int set, double v_zero_V, const double v_leg_V[],
+                   const double v_neutral_V[]);
 
 /* One step with the inputs at its ends. */
 void lags_advance(lags_t *lags, double duration_s, const lagged_t *before, const lagged_t *after);

@@ -135,6 +135,7 @@ typedef struct {
     /* Differential channel of each set, bipolar: the mean of the terminals, by a star of three resistors,
      * against the neutral (v_zero_V of plant_truth_t). */
     double v_zero_full_scale_V; /* codes span -fs ... +fs; 0: the board has none */
+    bool v_zero_between;        /* two sets: that of the first is between the two star points, v_N1 - v_N2 */
     double v_zero_gain_error;   /* relative */
     double v_zero_offset_V;     /* behind the gain */
     double v_zero_network_ohm;  /* each resistor of the star, */

@@ -27,7 +27,8 @@ static void see_nodes(const plant_t *plant, sensor_input_t *seen)
     seen->i_link_A = lags->dc_s > 0.0 ? lags->y.i_dc_A : nodes.i_dc_A;
     for (int set = 0; set < circuit->machine.winding.sets; set++) {
         seen->v_zero_V[set] = lags->zero_s > 0.0 ? lags->y.v_zero_V[set]
-                                                 : lags_zero_V(lags, set, nodes.v_zero_V[set], nodes.v_leg_V);
+                                                 : lags_zero_V(lags, set, nodes.v_zero_V[set], nodes.v_leg_V,
+                                                               nodes.v_neutral_V);
     }
 }
 

@@ -306,6 +306,7 @@ enum {
 #if PM_HAS(two_sets)
     OD_PARAMETER_M_D,
     OD_PARAMETER_M_Q,
+    OD_PARAMETER_NEUTRAL_CHANNEL,
 #endif
     OD_PARAMETER_I_PULSE,
     OD_PARAMETER_V_INJECTION,
@@ -345,7 +346,7 @@ enum {
     OD_PARAMETER_SALIENCY_PHASE,
     OD_PARAMETER_ASYMMETRY_LEARNING,
 #endif
-#if PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating)
+#if PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating) || PM_HAS(zero_pair_anti_rotating) || PM_HAS(zero_pair_rotating)
     OD_PARAMETER_ZERO_L_C0,
     OD_PARAMETER_ZERO_FORM,
     OD_PARAMETER_ZERO_FALLS,
@@ -355,7 +356,7 @@ enum {
     OD_PARAMETER_ZERO_SECOND_PHASE,
     OD_PARAMETER_ZERO_SECOND_EVEN,
 #endif
-#if PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating)
+#if PM_HAS(zero_anti_rotating) || PM_HAS(zero_rotating) || PM_HAS(zero_pulsating) || PM_HAS(zero_pair_anti_rotating) || PM_HAS(zero_pair_rotating)
     OD_PARAMETER_ZERO_DL_0_D,
     OD_PARAMETER_ZERO_DL_0_Q,
     OD_PARAMETER_ZERO_L_C0_Q,

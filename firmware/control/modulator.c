@@ -130,7 +130,7 @@ void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t
     write_shares(self, config, &u, PM_SHARE_HALF, pm_per_volt(link), lost_by(self, i_quarter), out);
 }
 
-#if PM_HAS(open_winding)
+#if PM_CARRIES(NEEDS_BRIDGES)
 void modulator_step_zero(modulator_t *self, const modulator_config_t *config, const modulator_zero_t *in,
                          pm_q_t v_dc, modulator_out_t *out)
 {

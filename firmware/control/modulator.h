@@ -87,7 +87,7 @@ void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t 
 void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
                     pm_ab_t i_quarter, modulator_out_t *out);
 
-#if PM_HAS(open_winding)
+#if PM_CARRIES(NEEDS_BRIDGES)
 /* A bridge whose legs may have a common part and whose currents a sum. */
 typedef struct {
     pm_ab_t v;

@@ -236,7 +236,18 @@ static void check_board(maker_t *m)
     }
 }
 
-#define VOLTAGE_MOST 200 /* of an open winding, over 201 */
+#if PM_CARRIES(NEEDS_BRIDGES)
+#define SHARE_MOST 200 /* over 201: below one */
+
+/* Length of the vector over v_dc that two bridges give: open_winding.h, two_sets.h. */
+static pm_num_t reach_of_two(const maker_t *m)
+{
+    if (m->params->winding == (int32_t)WINDING_OPEN) {
+        return pm_num(1);
+    }
+    return m->params->neutral_channel == 1 ? pm_num_ratio(1, 2) : pm_num_sqrt(pm_num_ratio(1, 3));
+}
+#endif
 
 static void make_limits(maker_t *m, drive_config_t *config)
 {
@@ -246,12 +257,13 @@ static void make_limits(maker_t *m, drive_config_t *config)
     config->v_share = fixed(m, pm_num_mul(si(m, DRIVE_PARAM_voltage_limit), pm_num_sqrt(pm_num_ratio(1, 3))),
                             UNIT_BITS, DRIVE_PARAM_voltage_limit);
     config->v_share = pm_min(config->v_share, modulator_reach(m, &config->modulator));
-    PM_IN_IMAGE(
-        open_winding, if (config->winding == (uint8_t)WINDING_OPEN) {
-            config->v_share = fixed(
-                m, least(si(m, DRIVE_PARAM_voltage_limit), pm_num_ratio(VOLTAGE_MOST, VOLTAGE_MOST + 1)),
-                UNIT_BITS, DRIVE_PARAM_voltage_limit);
-        })
+#if PM_CARRIES(NEEDS_BRIDGES)
+    if (m->params->winding != (int32_t)WINDING_STAR) {
+        const pm_num_t share = pm_num_mul(si(m, DRIVE_PARAM_voltage_limit), reach_of_two(m));
+        config->v_share = fixed(m, least(share, pm_num_ratio(SHARE_MOST, SHARE_MOST + 1)), UNIT_BITS,
+                                DRIVE_PARAM_voltage_limit);
+    }
+#endif
     config->machine.R_s = per_unit(m, DRIVE_PARAM_R_s, m->impedance);
     config->machine.L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
     config->machine.L_q = per_unit(m, DRIVE_PARAM_L_q, m->inductance);

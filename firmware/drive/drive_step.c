@@ -64,6 +64,7 @@ static inline obs_more_t measure_more(drive_t *drive, const drive_in_t *in)
 #if PM_HAS(two_sets) && PM_CARRIES(NEEDS_NEUTRAL)
     more.v_zero_second =
         neutral_signal(&drive->two_sets.neutral, &drive->config.neutral, in->more.v_neutral_second);
+    more.apart = drive->two_sets.z;
 #endif
 #if PM_HAS(open_winding)
     if (pm_rarely(drive->config.winding == (uint8_t)WINDING_OPEN)) {
@@ -74,6 +75,12 @@ static inline obs_more_t measure_more(drive_t *drive, const drive_in_t *in)
 #if PM_CARRIES(NEEDS_NEUTRAL)
     more.v_zero = neutral_signal(&drive->neutral, &drive->config.neutral, in->more.v_neutral) -
                   neutral_star(&drive->neutral, &drive->config.neutral, drive->v_acting);
+#endif
+#if PM_HAS(two_sets) && PM_CARRIES(NEEDS_NEUTRAL)
+    if (drive->config.two_sets.between) { /* v_N1 - v_N2, which is -(v_01 - v_02) */
+        more.v_zero_second = pm_half(more.v_zero);
+        more.v_zero = -more.v_zero_second;
+    }
 #endif
     return more;
 }
@@ -291,8 +298,13 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
         without_control(drive, in, out);
     } else {
         PM_IF_MEASURED(const obs_more_t more = measure_more(drive, in);)
+        const pm_ab_t *v = &drive->v_acting;
+#if PM_HAS(two_sets)
+        const pm_ab_t of_first = second_bridge_seen(drive);
+        v = &of_first;
+#endif
         const position_in_t seen = {
-            .v = &drive->v_acting, .i = drive->i_ab, .ahead = &drive->ahead, PM_IF_MEASURED(.more = &more)};
+            .v = v, .i = drive->i_ab, .ahead = &drive->ahead, PM_IF_MEASURED(.more = &more)};
         position_out_t frame;
         position_step(&drive->position, &drive->config.position, &seen, &frame);
         const pm_ab_t next = pm_pair_ab(&drive->v_next);

@@ -101,7 +101,9 @@ void reference_vector(drive_t *drive)
     const pm_q_t injected = position_injected(&drive->position);
     if (c->position.mismatch.id == (uint8_t)MISMATCH_D_AXIS) {
         drive->i_ref.d += injected;
-    } else {
+    } else if (!mismatch_is_apart(&drive->position.window, &c->position.mismatch)) {
         drive->i_ref.q = pm_clamp(i_q + injected, i_min, i_max);
+    } else {
+        /* two_sets.h has it */
     }
 }

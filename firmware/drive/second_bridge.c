@@ -27,6 +27,31 @@ void second_bridge_measure(drive_t *drive, const drive_in_t *in)
 #endif
 }
 
+#if PM_HAS(two_sets)
+/* Current that the sets have apart on purpose. */
+static pm_q_t apart(const drive_t *drive)
+{
+    const position_t *position = &drive->position;
+    const bool wanted = drive->stage == STAGE_VECTOR &&
+                        mismatch_is_apart(&position->window, &drive->config.position.mismatch);
+    return wanted ? position_injected(position) : 0;
+}
+#endif
+
+#if PM_HAS(two_sets)
+pm_ab_t second_bridge_seen(const drive_t *drive)
+{
+    const drive_config_t *c = &drive->config;
+    pm_ab_t v = drive->v_acting;
+    if (c->position.mismatch.id == (uint8_t)MISMATCH_APART) {
+        const pm_ab_t more = two_sets_unexplained(&drive->two_sets, &c->two_sets);
+        v.alpha += more.alpha;
+        v.beta += more.beta;
+    }
+    return v;
+}
+#endif
+
 void second_bridge_control(drive_t *drive, const position_out_t *frame, pm_ab_t v, pm_ab_t i_quarter,
                            drive_out_t *out)
 {
@@ -36,8 +61,13 @@ void second_bridge_control(drive_t *drive, const position_out_t *frame, pm_ab_t 
     (void)frame;
 #if PM_HAS(two_sets)
     if (c->winding == (uint8_t)WINDING_TWO_SETS) {
-        const two_sets_in_t in = {
-            .v = v, .i_quarter = i_quarter, .ahead = frame->ahead, .omega = frame->omega, .v_dc = v_dc};
+        const two_sets_in_t in = {.v = v,
+                                  .apart = drive->carrier ? frame->carrier.apart : (pm_ab_t){0, 0},
+                                  .i_quarter = i_quarter,
+                                  .ahead = frame->ahead,
+                                  .omega = frame->omega,
+                                  .v_dc = v_dc,
+                                  .z_q = apart(drive)};
         two_sets_step(&drive->two_sets, &c->two_sets, &drive->modulator, &c->modulator, &in, &bridges);
     }
 #endif

@@ -22,6 +22,11 @@ void second_bridge_control(drive_t *drive, const position_out_t *frame, pm_ab_t 
  * a short circuit on purpose. */
 void second_bridge_without(drive_t *drive, drive_out_t *out);
 
+#if PM_HAS(two_sets)
+/* The voltage that acted on what the observer looks at: the mean of the sets, or the first one. */
+pm_ab_t second_bridge_seen(const drive_t *drive);
+#endif
+
 void second_bridge_slow(drive_t *drive, pm_q_t omega);
 #endif
 

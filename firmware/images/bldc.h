@@ -62,6 +62,8 @@
 #define PM_WITHOUT_zero_pulsating 1
 #define PM_WITHOUT_random_square 1
 #define PM_WITHOUT_current_sine 1
+#define PM_WITHOUT_zero_pair_anti_rotating 1
+#define PM_WITHOUT_zero_pair_rotating 1
 #define PM_WITHOUT_third_harmonic 1
 
 #endif

@@ -43,6 +43,8 @@
 #define PM_WITHOUT_zero_rotating 1
 #define PM_WITHOUT_zero_pulsating 1
 #define PM_WITHOUT_current_sine 1
+#define PM_WITHOUT_zero_pair_anti_rotating 1
+#define PM_WITHOUT_zero_pair_rotating 1
 #define PM_WITHOUT_open_terminal 1
 #define PM_WITHOUT_terminal_mean 1
 #define PM_WITHOUT_third_harmonic 1

@@ -36,7 +36,8 @@ typedef struct {
     pm_q_t
         v_zero; /* mean of the terminals minus star point at k, behind its RC, per-unit (drive/neutral.h) */
 #if PM_CARRIES(NEEDS_SECOND_SET)
-    pm_q_t v_zero_second; /* the same of a second set, 30 degrees on */
+    pm_q_t v_zero_second; /* the same of a second set, 30 degrees on; */
+    pm_ab_t apart;        /* half of what the first set has more current than it, at k */
 #endif
 #endif
 } obs_more_t;

@@ -189,6 +189,7 @@ void derive_board_parameters(Setup &setup)
     derive(DRIVE_PARAM_winding, winding.connection == PLANT_OPEN ? WINDING_OPEN
                                 : winding.sets == 2              ? WINDING_TWO_SETS
                                                                  : WINDING_STAR);
+    derive(DRIVE_PARAM_neutral_channel, sensor.v_zero_between ? 1.0 : 0.0);
     if (sensor.v_zero_full_scale_V > 0.0) {
         derive(DRIVE_PARAM_neutral_full_scale, sensor.v_zero_full_scale_V);
         derive(DRIVE_PARAM_neutral_filter, sensor.v_zero_filter_s);

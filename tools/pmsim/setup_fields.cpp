@@ -114,6 +114,7 @@ const std::vector<Field> &setup_fields()
         PM_LIST("sensor", "v_neutral_offset_V", -1e3, 1e3, set, plant.sensor.v_offset_V + PLANT_LEGS),
         PM_FIELD("sensor", "i_filter_s", 0, 10e-3, optional, plant.sensor.i_filter_s),
         PM_FIELD("sensor", "v_zero_full_scale_V", 0, 1e4, optional, plant.sensor.v_zero_full_scale_V),
+        PM_FIELD("sensor", "v_zero_between", 0, 1, optional, plant.sensor.v_zero_between),
         PM_FIELD("sensor", "v_zero_gain_error", -0.5, 0.5, optional, plant.sensor.v_zero_gain_error),
         PM_FIELD("sensor", "v_zero_offset_V", -1e3, 1e3, optional, plant.sensor.v_zero_offset_V),
         PM_FIELD("sensor", "v_zero_network_ohm", 0, 1e9, optional, plant.sensor.v_zero_network_ohm),
