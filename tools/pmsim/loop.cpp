@@ -19,6 +19,13 @@ static bool refusal_expected(const Scenario &scenario)
     });
 }
 
+static bool asks_identified(const Scenario &scenario)
+{
+    return std::any_of(scenario.expect.begin(), scenario.expect.end(), [](const Expectation &expectation) {
+        return expectation.metric.rfind("identify_", 0) == 0;
+    });
+}
+
 static rig_t *create(const Scenario &scenario)
 {
     char error[200];
@@ -38,6 +45,7 @@ Loop::Loop(const Scenario &scenario)
     : rig_(create(scenario)), profile_(scenario, rig_.get()),
       period_s_(1.0 / scenario.setup.plant.inverter.f_pwm_Hz)
 {
+    sample_.rig.asks_identified = asks_identified(scenario);
 }
 
 void Loop::play()

@@ -78,6 +78,7 @@ typedef struct {
     double margin; /* of what the start has found, in sigma */
     int refusal;   /* why a procedure of this start has refused, PM_FAILED_...; 0: none has */
     bool driven;   /* any leg, in the output of this period */
+    bool asks_identified; /* by the caller: the next one is wanted; it costs as much as all the others */
     rig_identified_t identified;
 } rig_sample_t;
 

@@ -148,9 +148,11 @@ void rig_fill_sample(rig_scale_t *scale, const drive_t *drive, const drive_out_t
     sample->margin = (double)drive->sequence.margin / PM_SIGMA_ONE;
     sample->refusal = (int)status->refusal.reason;
     sample->driven = out->legs != PM_LEGS_OFF;
-    sample->identified = identified(scale, &drive->commissioning_report);
-    PM_IN_IMAGE(saliency_map, add_map(scale, &drive->saliency_map, &sample->identified);)
-    PM_IN_IMAGE(zero_inductance, add_neutral(scale, &drive->zero_inductance, &sample->identified);)
+    if (sample->asks_identified) {
+        sample->identified = identified(scale, &drive->commissioning_report);
+        PM_IN_IMAGE(saliency_map, add_map(scale, &drive->saliency_map, &sample->identified);)
+        PM_IN_IMAGE(zero_inductance, add_neutral(scale, &drive->zero_inductance, &sample->identified);)
+    }
 }
 
 void rig_record_legs(const drive_in_t *in, const drive_out_t *out, record_period_t *record)
