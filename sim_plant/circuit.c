@@ -14,7 +14,7 @@ void circuit_take_state(circuit_t *c, const machine_state_t *s, const machine_po
 {
     memcpy(&c->now.x[U], s->u, sizeof s->u);
     memcpy(&c->now.x[EDDY], s->eddy_A, sizeof s->eddy_A);
-    circuit_take(&c->machine, m, &c->now);
+    circuit_take(m, c->machine.winding.active, &c->now);
     c->field_known = false;
 }
 

@@ -151,7 +151,9 @@ double circuit_field_of_J(const circuit_t *circuit, const machine_state_t *state
 
 static inline machine_state_t circuit_machine_state(const point_t *p)
 {
-    machine_state_t s = {.rotor = p->rotor, .theta_e_rad = p->x[THETA_E]};
+    machine_state_t s;
+    s.rotor = p->rotor;
+    s.theta_e_rad = p->x[THETA_E];
     memcpy(s.u, &p->x[U], sizeof s.u);
     memcpy(s.eddy_A, &p->x[EDDY], sizeof s.eddy_A);
     return s;

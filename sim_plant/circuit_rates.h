@@ -6,10 +6,10 @@
 
 #include <math.h>
 
-/* What an evaluation of the machine leaves at a point. */
-static inline void circuit_take(const machine_t *machine, const machine_point_t *from, point_t *to)
+/* What an evaluation of the machine leaves at a point; n: the active coordinates, as in winding_at(). */
+static inline void circuit_take(const machine_point_t *from, int n, point_t *to)
 {
-    for (int a = 0; a < machine->winding.active; a++) {
+    for (int a = 0; a < n; a++) {
         to->i_A[a] = from->i_A[a];
     }
     to->torque_Nm = from->torque_Nm;

@@ -77,8 +77,15 @@ INLINE double resistors_W(const circuit_t *c, const circuit_legs_t *legs, int n)
 INLINE void legs_n(const circuit_t *c, const point_t *p, shape_t shape, circuit_legs_t *legs)
 {
     double v_dc_V = p->x[V_DC];
-    *legs = (circuit_legs_t){.i_dc_A = c->bridge.g_through_S * v_dc_V,
-                             .device_W = c->bridge.g_through_S * v_dc_V * v_dc_V};
+    legs->i_dc_A = c->bridge.g_through_S * v_dc_V;
+    legs->device_W = c->bridge.g_through_S * v_dc_V * v_dc_V;
+    legs->in_W = 0.0;
+    for (int a = 0; a < shape.active; a++) {
+        legs->v_V[a] = 0.0;
+    }
+    for (int k = 0; k < PLANT_LEGS; k++) {
+        legs->v_leg_V[k] = 0.0;
+    }
     for (int k = 0; k < shape.legs; k++) {
         add_leg(c, p, k, shape, legs);
     }
@@ -128,10 +135,9 @@ INLINE void swing_rates(const circuit_t *c, const circuit_legs_t *legs, double r
     for (int k = 0; k < PLANT_LEGS; k++) {
         rate[V_LEG(k)] = 0.0;
     }
-    for (int k = 0; k < c->bridge.legs && c->bridge.swinging != 0u; k++) {
-        if (c->bridge.leg[k] == LEG_SWINGING) {
-            rate[V_LEG(k)] = -legs->i_leg_A[k] * c->bridge.inv_c_leg_1_F;
-        }
+    for (unsigned swinging = c->bridge.swinging; swinging != 0u; swinging &= swinging - 1u) {
+        int k = bridge_first(swinging);
+        rate[V_LEG(k)] = -legs->i_leg_A[k] * c->bridge.inv_c_leg_1_F;
     }
 }
 
@@ -145,7 +151,7 @@ INLINE void general_n(const circuit_t *c, double t_s, point_t *p, shape_t shape,
     bool floating = c->bridge.floating != 0u;
     double omega_e = m->pole_pairs * p->x[OMEGA_MECH];
     machine_evaluate_n(m, &state, shape, floating || !m->loose, &point);
-    circuit_take(m, &point, p);
+    circuit_take(&point, shape.active, p);
     legs_n(c, p, shape, &legs);
     memset(&rate[U], 0, (ACTIVE + 2 * PLANT_SETS) * sizeof rate[U]);
     if (m->loose && !floating) {
@@ -175,7 +181,7 @@ INLINE void general_n(const circuit_t *c, double t_s, point_t *p, shape_t shape,
     rate[INT_MECH] = p->torque_Nm * p->x[OMEGA_MECH];
 }
 
-void circuit_general(const circuit_t *c, double t_s, point_t *p, double rate[ELEMENTS])
+WIDER void circuit_general(const circuit_t *c, double t_s, point_t *p, double rate[ELEMENTS])
 {
     const winding_t *w = &c->machine.winding;
     if (w->branch >= 0) {
@@ -194,10 +200,10 @@ INLINE void currents_n(const circuit_t *c, point_t *p, shape_t shape)
     machine_state_t state = circuit_machine_state(p);
     machine_point_t point;
     machine_evaluate_n(&c->machine, &state, shape, false, &point);
-    circuit_take(&c->machine, &point, p);
+    circuit_take(&point, shape.active, p);
 }
 
-void circuit_currents(const circuit_t *c, point_t *p)
+WIDER void circuit_currents(const circuit_t *c, point_t *p)
 {
     const winding_t *w = &c->machine.winding;
     if (w->branch >= 0) {

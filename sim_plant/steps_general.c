@@ -37,8 +37,8 @@ static double error_norm(const circuit_t *c, const point_t *from, const double m
 
 /* One step of length h of the Bogacki-Shampine pair. k1 is the rate at the start; k4, of the end, is the k1
  * of a next step if nothing switches. Returns the local error in units of the tolerance. */
-static double bogacki_shampine(const circuit_t *c, const point_t *from, double h, const double k1[],
-                               point_t *to, double k4[])
+WIDER static double bogacki_shampine(const circuit_t *c, const point_t *from, double h, const double k1[],
+                                     point_t *to, double k4[])
 {
     double k2[ELEMENTS], k3[ELEMENTS], move[ELEMENTS], miss[ELEMENTS];
     point_t p;
@@ -85,8 +85,8 @@ static double landing(const circuit_t *c, const point_t *from, double h, const d
 
 /* last: nobody needs the rates of the end. land: the step may end earlier, where a swinging terminal lands.
  * Returns its length. */
-static double heun(const circuit_t *c, const point_t *from, double h, const double k1[], bool last, bool land,
-                   point_t *to, double k3[])
+WIDER static double heun(const circuit_t *c, const point_t *from, double h, const double k1[], bool last,
+                         bool land, point_t *to, double k3[])
 {
     double k2[ELEMENTS], move[ELEMENTS];
     point_t p;
@@ -134,8 +134,8 @@ static bool turns_over(const circuit_t *c, const point_t *from, const point_t *t
 }
 
 /* A step of length *h, or less; returns its error, of Heun's method -1. */
-static double step(const circuit_t *c, double *h, const double rate[], bool last, bool land, point_t *to,
-                   double rate_end[])
+WIDER static double step(const circuit_t *c, double *h, const double rate[], bool last, bool land,
+                         point_t *to, double rate_end[])
 {
     if (brief(c, *h)) {
         double taken = heun(c, &c->now, *h, rate, last, land, to, rate_end);
@@ -148,7 +148,7 @@ static double step(const circuit_t *c, double *h, const double rate[], bool last
     return turns_over(c, &c->now, to) ? KINK * error : error;
 }
 
-static void retake(const circuit_t *c, const void *rate, double h, point_t *to)
+WIDER static void retake(const circuit_t *c, const void *rate, double h, point_t *to)
 {
     double rate_end[ELEMENTS];
     step(c, &h, rate, true, false, to, rate_end);
@@ -191,7 +191,7 @@ static void control_step(circuit_t *c, double h, double error)
 /* Takes the step that the error control allows, at most left_s; *rate is that of the start, and on return
  * of the end if nothing happened there. Returns the time advanced; *event when the kind of motion may have
  * changed at its end. */
-static double take_step(circuit_t *c, double left_s, double rate[], bool *event)
+WIDER static double take_step(circuit_t *c, double left_s, double rate[], bool *event)
 {
     point_t next;
     double rate_end[ELEMENTS];
@@ -227,7 +227,7 @@ static double take_step(circuit_t *c, double left_s, double rate[], bool *event)
     return h;
 }
 
-double steps_general(circuit_t *c, double left_s, bool *event)
+WIDER double steps_general(circuit_t *c, double left_s, bool *event)
 {
     double rate[ELEMENTS];
     c->field_known = false;

@@ -204,15 +204,6 @@ INLINE double step(const circuit_t *c, const start_t *s, double h, shape_t shape
     return part * error_norm(c, &miss, motion, shape, swings);
 }
 
-/* Compiled once more for processors with wider vectors: the same bits, as no product is contracted with a
- * sum. */
-#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && !defined(__clang__) &&         \
-    !defined(__SANITIZE_ADDRESS__)
-#define WIDER __attribute__((target_clones("default", "avx2")))
-#else
-#define WIDER
-#endif
-
 /* The same for any shape, where a step is taken again: take_steps() has one call of step(), compiled into it. */
 WIDER static double step_again(const circuit_t *c, const start_t *s, double h, point_t *to, field_t *f)
 {
