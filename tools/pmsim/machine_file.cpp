@@ -29,8 +29,16 @@ Setup load_machine_file(const std::string &path)
     return read_machine(Value::from_file(path));
 }
 
+Setup MachineFiles::load(const std::string &path)
+{
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto known = known_.find(path);
+    return known != known_.end() ? known->second
+                                 : known_.emplace(path, load_machine_file(path)).first->second;
+}
+
 // A machine file's path is relative to the file that names it.
-static Setup read_machine_of(const Map &document)
+static Setup read_machine_of(const Map &document, MachineFiles &files)
 {
     const Value machine = document.at("machine");
     if (machine.is_map()) {
@@ -41,7 +49,7 @@ static Setup read_machine_of(const Map &document)
     if (!fs::is_regular_file(path)) {
         machine.fail("there is no machine file " + path.string());
     }
-    return load_machine_file(path.string());
+    return files.load(path.string());
 }
 
 // Ratio, and nothing where the denominator is: 0 means that there is no such part.
@@ -98,10 +106,10 @@ void apply_settings(Setup &setup, const Settings &settings)
     }
 }
 
-Setup read_layers(const Map &document, const Settings &settings)
+Setup read_layers(const Map &document, const Settings &settings, MachineFiles &files)
 {
     const auto other = setting_value(settings, "machine"); // as a path from where the program runs
-    Setup setup = other ? load_machine_file(other->text()) : read_machine_of(document);
+    Setup setup = other ? files.load(other->text()) : read_machine_of(document, files);
     read_sections(setup, document, false);
     apply_settings(setup, settings);
     check_time_constants(setup);

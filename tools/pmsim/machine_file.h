@@ -4,6 +4,8 @@
 #ifndef PMSIM_MACHINE_FILE_H
 #define PMSIM_MACHINE_FILE_H
 
+#include <map>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -19,8 +21,19 @@ using Settings = std::vector<std::pair<std::string, std::string>>; // --set name
 Setup read_machine(const Value &value); // the content of a machine file
 Setup load_machine_file(const std::string &path);
 
+// Reads each file once: a sweep asks for the same one in every run.
+class MachineFiles
+{
+  public:
+    Setup load(const std::string &path);
+
+  private:
+    std::mutex mutex_;
+    std::map<std::string, Setup> known_;
+};
+
 // `machine:` of a document, its other sections and the settings.
-Setup read_layers(const Map &document, const Settings &settings);
+Setup read_layers(const Map &document, const Settings &settings, MachineFiles &files);
 
 // Refuses values, each within its limits, that together make the plant too stiff to be waited for.
 void check_time_constants(const Setup &setup);

@@ -57,7 +57,8 @@ PlantFile read_plant_file(const Value &document, const Settings &settings)
     check_settings(settings, known);
     const Variables values = first_run(map, settings);
     const Map run = open_scenario(document.with(&values));
-    file.setup = read_layers(run, settings);
+    MachineFiles files;
+    file.setup = read_layers(run, settings, files);
     file.theta_e_rad = start_angle(run, settings);
     return file;
 }

@@ -129,7 +129,8 @@ std::string ScenarioFile::title() const
 {
     const Map map = open_scenario(document_.with(&runs_.front().variables));
     const std::string title = map.at("title").text();
-    return with_name(title, title.find('$') == std::string::npos ? "" : read_layers(map, settings_).name);
+    return with_name(
+        title, title.find('$') == std::string::npos ? "" : read_layers(map, settings_, *machines_).name);
 }
 
 const std::vector<Run> &ScenarioFile::runs() const
@@ -171,7 +172,7 @@ void ScenarioFile::keep(const std::vector<std::string> &names)
 Scenario ScenarioFile::scenario(const Run &run) const
 {
     Variables variables = run.variables;
-    const Setup machine = read_layers(open_scenario(document_.with(&variables)), settings_);
+    const Setup machine = read_layers(open_scenario(document_.with(&variables)), settings_, *machines_);
     require_drive(machine);
     for (const auto &[name, value] : machine_variables(machine)) {
         variables.emplace(name, value);

@@ -4,6 +4,7 @@
 #define PMSIM_SCENARIO_FILE_H
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,6 +37,7 @@ class ScenarioFile
   private:
     Value document_;
     Settings settings_;
+    std::shared_ptr<MachineFiles> machines_ = std::make_shared<MachineFiles>();
     std::vector<Run> runs_;
 };
 
