@@ -183,7 +183,9 @@ INLINE void rates_at(const circuit_t *c, rotor_t rotor, const field_t *f, const 
     rate->follow[MOTION] =
         (pair_t){mechanics_rate(&c->mech, omega, f->torque_Nm), dclink_plain_rate(&c->link, v_dc, t->i_dc_A)};
     rate->follow[POWER] = (pair_t){v_dc, f->torque_Nm} * (pair_t){t->i_dc_A, omega};
-    rate->follow[POWER][0] += b->sources ? total(in_W) : 0.0;
+    if (b->sources) {
+        rate->follow[POWER][0] += total(in_W);
+    }
     rate->follow[LOSS] = totals(copper, device_W) * (pair_t){m->R_s_ohm, 1.0};
     if (b->g_winding_S > 0.0) {
         rate->follow[LOSS][0] += total(resistor_W);
@@ -294,7 +296,9 @@ INLINE void bends_at(const circuit_t *c, const pair_t i_A_s[], shape_t shape, bo
         product += cross(s->rate.flux_V[set], f->i_A[set]) + cross(f->flux[set], i_A_s[set]);
     }
     other_bends(c, m->torque_gain * product + m->pole_pairs * total(harmonic), total(i_dc_A_s), s);
-    s->bend.follow[POWER][0] += b->sources ? total(source_W_s) : 0.0;
+    if (b->sources) {
+        s->bend.follow[POWER][0] += total(source_W_s);
+    }
     s->bend.follow[LOSS] = totals(copper, device_W_s) * (pair_t){2.0 * m->R_s_ohm, 1.0};
     if (b->g_winding_S > 0.0) {
         s->bend.follow[LOSS][0] += total(resistor_W_s);
