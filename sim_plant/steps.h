@@ -20,6 +20,11 @@ INLINE double larger(double x, double y)
     return x > y ? x : y;
 }
 
+INLINE double smaller(double x, double y)
+{
+    return x < y ? x : y;
+}
+
 /* What a step shows: above zero where an event lies in it, of swinging terminals and of all else. */
 typedef struct {
     double swing, rest;

@@ -66,9 +66,10 @@ WIDER static double bogacki_shampine(const circuit_t *c, const point_t *from, do
 static double landing(const circuit_t *c, const point_t *from, double h, const double k1[], const double k2[])
 {
     double shortest = h;
-    for (int k = 0; k < c->bridge.legs && c->bridge.swinging != 0u; k++) {
+    for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
         double rate = k1[V_LEG(k)];
-        if (c->bridge.leg[k] != LEG_SWINGING || rate == 0.0) {
+        if (rate == 0.0) {
             continue;
         }
         double end_V = rate > 0.0 ? from->x[V_DC] + c->bridge.v_diode_V : -c->bridge.v_diode_V;
@@ -157,8 +158,9 @@ WIDER static void retake(const circuit_t *c, const void *rate, double h, point_t
 /* A swinging terminal moves nearly straight towards its diode: the step ends there. */
 static double arrival_s(const circuit_t *c, const double rate[], double h)
 {
-    for (int k = 0; k < c->bridge.legs && c->bridge.swinging != 0u; k++) {
-        if (c->bridge.leg[k] == LEG_SWINGING && rate[V_LEG(k)] != 0.0) {
+    for (unsigned legs = c->bridge.swinging; legs != 0u; legs &= legs - 1u) {
+        int k = bridge_first(legs);
+        if (rate[V_LEG(k)] != 0.0) {
             double end_V = rate[V_LEG(k)] > 0.0 ? c->now.x[V_DC] + c->bridge.v_diode_V : -c->bridge.v_diode_V;
             double arrival = (end_V - c->now.x[V_LEG(k)]) / rate[V_LEG(k)];
             h = arrival > 0.0 && arrival < h ? arrival : h;
@@ -171,7 +173,7 @@ static double arrival_s(const circuit_t *c, const double rate[], double h)
 static double next_step_s(const circuit_t *c, const double rate[], double left_s, bool *last)
 {
     double calm_s = c->bridge.swinging != 0u ? c->calm_swing_s : c->calm_s;
-    double h = steps_turn_s(c, rate[THETA_E], fmin(larger(c->step_s, calm_s), left_s));
+    double h = steps_turn_s(c, rate[THETA_E], smaller(larger(c->step_s, calm_s), left_s));
     double arrival = arrival_s(c, rate, h);
     *last = arrival < h || h > 0.999 * left_s;
     h = arrival < h ? arrival : h;
