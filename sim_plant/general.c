@@ -95,9 +95,13 @@ INLINE void legs_n(const circuit_t *c, const point_t *p, shape_t shape, circuit_
     legs->in_W += v_dc_V * legs->i_dc_A;
 }
 
-void circuit_legs(const circuit_t *c, const point_t *p, circuit_legs_t *legs)
+WIDER void circuit_legs(const circuit_t *c, const point_t *p, circuit_legs_t *legs)
 {
-    legs_n(c, p, machine_shape(&c->machine), legs);
+    if (c->machine.winding.active == STAR.active) {
+        legs_n(c, p, STAR, legs);
+    } else {
+        legs_n(c, p, machine_shape(&c->machine), legs);
+    }
 }
 
 INLINE void shaft_rates(const circuit_t *c, const point_t *p, double rate[ELEMENTS])

@@ -122,7 +122,7 @@ void machine_set(machine_t *machine, const plant_config_t *config, double windin
     set_bounds(machine);
 }
 
-void machine_evaluate(const machine_t *m, const machine_state_t *s, machine_point_t *p)
+WIDER void machine_evaluate(const machine_t *m, const machine_state_t *s, machine_point_t *p)
 {
     if (m->winding.active == 2) {
         machine_evaluate_n(m, s, (shape_t){2, 1, 3}, true, p);
@@ -179,14 +179,16 @@ static void plain_rates(const machine_t *m, const machine_state_t *s, const mach
     rate->eddy_A_s[1] = 0.0;
 }
 
-void machine_rates(const machine_t *m, const machine_state_t *s, const machine_point_t *p,
-                   double omega_e_rad_s, const double v_V[ACTIVE], machine_rate_t *rate)
+WIDER void machine_rates(const machine_t *m, const machine_state_t *s, const machine_point_t *p,
+                         double omega_e_rad_s, const double v_V[ACTIVE], machine_rate_t *rate)
 {
     if (m->plain) {
         plain_rates(m, s, p, omega_e_rad_s, v_V, rate);
-        return;
+    } else if (m->winding.active == 2) {
+        machine_rates_n(m, s, p, omega_e_rad_s, v_V, (shape_t){2, 1, 3}, rate);
+    } else {
+        machine_rates_n(m, s, p, omega_e_rad_s, v_V, machine_shape(m), rate);
     }
-    machine_rates_n(m, s, p, omega_e_rad_s, v_V, machine_shape(m), rate);
 }
 
 void machine_kick(const machine_t *m, machine_state_t *s, const machine_point_t *p,

@@ -5,7 +5,7 @@
 #include <string.h>
 
 /* A plain machine with every terminal tied or swinging */
-static void plain_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *nodes)
+INLINE void plain_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *nodes)
 {
     circuit_legs_t legs;
     circuit_legs(c, p, &legs);
@@ -14,7 +14,7 @@ static void plain_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *n
     nodes->v_neutral_V[0] = (legs.v_leg_V[0] + legs.v_leg_V[1] + legs.v_leg_V[2]) / 3.0;
 }
 
-static void set_nodes(const circuit_t *c, const circuit_legs_t *legs, rotor_t rotor, double omega_e,
+INLINE void set_nodes(const circuit_t *c, const circuit_legs_t *legs, rotor_t rotor, double omega_e,
                       const double i_A[ACTIVE], const double i_A_s[ACTIVE], circuit_nodes_t *nodes)
 {
     const winding_t *w = &c->machine.winding;
@@ -31,7 +31,7 @@ static void set_nodes(const circuit_t *c, const circuit_legs_t *legs, rotor_t ro
     }
 }
 
-static void all_nodes(const circuit_t *c, const point_t *p, const machine_state_t *state,
+INLINE void all_nodes(const circuit_t *c, const point_t *p, const machine_state_t *state,
                       const machine_point_t *point, circuit_nodes_t *nodes)
 {
     const machine_t *m = &c->machine;
@@ -62,7 +62,7 @@ static void symmetrical_nodes(const circuit_t *c, circuit_nodes_t *nodes)
     set_nodes(c, &legs, c->now.rotor, c->machine.pole_pairs * c->now.x[OMEGA_MECH], c->now.i_A, i_A_s, nodes);
 }
 
-static void two_phase_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *nodes)
+INLINE void two_phase_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *nodes)
 {
     double i_A_s[ACTIVE] = {0.0};
     circuit_legs_t legs;
@@ -97,7 +97,7 @@ void circuit_terminals(const circuit_t *c, const point_t *p, double v_leg_V[PLAN
     memcpy(v_leg_V, legs.v_leg_V, sizeof legs.v_leg_V);
 }
 
-void circuit_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *nodes)
+WIDER void circuit_nodes(const circuit_t *c, const point_t *p, circuit_nodes_t *nodes)
 {
     if (has_plain_nodes(c)) {
         plain_nodes(c, p, nodes);
