@@ -74,10 +74,14 @@ static inline int32_t largest(const pm_abc_t *leg)
     return c ? 4 : b ? 2 : 1;
 }
 
-/* Legs as shares of the period, around `centre`, with what they lose; i as lost_by() gives it. */
+/* Legs as shares of the period, around `centre`, with what they lose; i_zero: what each carries beside the vector, as lost_by() has it. */
 static inline void write_shares(const modulator_t *self, const modulator_config_t *config, const centred_t *u,
-                                int32_t centre, int32_t per_volt, pm_abc_t i, modulator_out_t *out)
+                                int32_t centre, int32_t per_volt, pm_ab_t i_quarter, int32_t i_zero,
+                                modulator_out_t *out)
 {
+    const pm_abc_t x = lost_by(self, i_quarter);
+    const pm_abc_t i = {
+        .a = x.a + i_zero, .b = x.b + i_zero, .c = x.c - i_zero}; /* c has the opposite sign */
     const int32_t whole = config->whole;
     const pm_pair_t lost = pm_pair(&self->near, &self->far);
     const int32_t a = zones_add(pm_mulh_add(centre, u->leg.a, per_volt), i.a, lost);
@@ -110,7 +114,7 @@ static inline void lower(modulator_t *self, const modulator_config_t *config, co
     if (centre + half > self->seen) {
         self->hidden += MODULATOR_NEXT * largest(&u->leg);
     }
-    write_shares(self, config, u, centre, per_volt, lost_by(self, i_quarter), out);
+    write_shares(self, config, u, centre, per_volt, i_quarter, 0, out);
 }
 
 void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,
@@ -127,7 +131,7 @@ void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t
         link = u.span;
         out->v = shorten(self, v, v_dc, pm_per_volt(link));
     }
-    write_shares(self, config, &u, PM_SHARE_HALF, pm_per_volt(link), lost_by(self, i_quarter), out);
+    write_shares(self, config, &u, PM_SHARE_HALF, pm_per_volt(link), i_quarter, 0, out);
 }
 
 #if PM_CARRIES(NEEDS_BRIDGES)
@@ -142,12 +146,9 @@ void modulator_step_zero(modulator_t *self, const modulator_config_t *config, co
     if (span > v_dc) {
         out->v = shorten(self, in->v, v_dc, per_volt);
     }
-    pm_abc_t i = lost_by(self, in->i_quarter);
-    const int32_t zero = pm_mulh(in->i_zero_quarter, self->zone_alpha);
-    i.a += zero;
-    i.b += zero;
-    i.c -= zero; /* has the opposite sign */
-    write_shares(self, config, &u, pm_mulh_add(PM_SHARE_HALF, in->v_zero, per_volt), per_volt, i, out);
+    const int32_t centre = pm_mulh_add(PM_SHARE_HALF, in->v_zero, per_volt);
+    const int32_t i_zero = pm_mulh(in->i_zero_quarter, self->zone_alpha);
+    write_shares(self, config, &u, centre, per_volt, in->i_quarter, i_zero, out);
 }
 #endif
 

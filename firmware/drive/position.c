@@ -4,22 +4,21 @@
 #include "firmware/math/trig.h"
 
 /* Optional stages: one branch per period for all of them. */
-PM_RARE static pm_q_t corrected_eps(position_t *self, const position_config_t *config,
-                                    const position_in_t *seen, pm_dq_t i, pm_q_t eps)
+PM_RARE static pm_q_t corrected_eps(position_t *self, const position_config_t *config, const pm_ab_t *v,
+                                    pm_dq_t i, pm_q_t eps)
 {
     if (config->speed.id != (uint8_t)SPEED_LOOP) {
-        speed_collect(&self->speed, pm_park(*seen->v, pm_dir(self->pll.theta)).q);
+        speed_collect(&self->speed, pm_park(*v, pm_dir(self->pll.theta)).q);
     }
     if (config->second_harmonic.id != SECOND_HARMONIC_STAYS) {
         eps = second_harmonic_step(&self->second_harmonic, &config->second_harmonic, pm_dir(self->pll.theta),
                                    eps);
     }
     if (config->mismatch.id != (uint8_t)MISMATCH_OFF) {
-        const mismatch_in_t at = {
-            .pll = &self->pll,
-            .k_theta = self->gains.k_theta,
-            .i = i,
-            PM_IN_IMAGE(two_sets, .apart = pm_park(seen->more->apart, pm_dir(self->pll.theta)).q)};
+        const mismatch_in_t at = {.pll = &self->pll,
+                                  .k_theta = self->gains.k_theta,
+                                  .i = i,
+                                  PM_IN_IMAGE(two_sets, .apart = self->apart)};
         eps =
             mismatch_step(&self->mismatch, position_window(self), &config->mismatch, &at, self->weight, eps);
     }
@@ -71,7 +70,8 @@ void position_step(position_t *self, const position_config_t *config, const posi
     }
     if (pm_rarely(config->corrects)) {
         self->pll = pll; /* through memory, so that otherwise it stays in registers */
-        eps = corrected_eps(self, config, at, i_dq, eps);
+        PM_IN_IMAGE(two_sets, self->apart = pm_park(at->more->apart, dir).q;)
+        eps = corrected_eps(self, config, at->v, i_dq, eps);
         pll = self->pll;
     }
     pm_pll_correct(&pll, &self->gains, eps);

@@ -69,6 +69,7 @@ typedef struct {
     /* the optional stages, between source and loop and for the speed, and what 1 kHz keeps */
     mismatch_window_t window; /* while no carrier is injected */
     mismatch_t mismatch;
+    PM_IN_IMAGE(two_sets, pm_q_t apart;) /* q current of the first of two sets beyond their mean */
     second_harmonic_t second_harmonic;
     loop_t loop;
     speed_t speed;
