@@ -188,7 +188,7 @@ class Drive
                             tone * std::cos(tone_rad_s * t_) + noise * gauss_(random_);
         const pm_dq_t measured = {fixed(i.real() / kBase_A, 28), fixed(i.imag() / kBase_A, 28)};
         pll_ = {turns(bench::wrapped(hat_)), fixed(hat_omega_ / kBase_rad_s, 28)};
-        const mismatch_in_t in = {&pll_, gains_.k_theta, measured};
+        const mismatch_in_t in = {&pll_, gains_.k_theta, measured, 0};
         const double eps = real(mismatch_step(&state, leads ? &window : nullptr, &config, &in, PM_ONE,
                                               fixed(bench::wrapped(seen - hat_), 28)));
         if (reference != nullptr) {
@@ -398,7 +398,7 @@ TEST(Mismatch, LargestInputsSaturate)
         for (int n = 0; n < 20000; ++n) {
             const pm_pll_t pll = {0, INT32_MAX};
             const pm_q_t i = window.injected; // arrives
-            const mismatch_in_t in = {&pll, 0, {i, i}};
+            const mismatch_in_t in = {&pll, 0, {i, i}, 0};
             for (int k = 0; k < kPeriods; ++k) {
                 mismatch_step(&state, &window, &c, &in, PM_ONE, n % 3 == 0 ? PM_ONE / 12 : -PM_ONE / 12);
             }
@@ -420,6 +420,84 @@ TEST(Mismatch, ASwingBeyondItsRangeSaturates)
         drive.run(10.0);
         EXPECT_LT(real(drive.state.k.q), -0.99) << share;
     }
+}
+
+// Two sets of windings (row 87): a rotor that nothing moves, and a source that errs by K i_q + K_a z_q, rad per base current.
+class Apart
+{
+  public:
+    mismatch_config_t config = config_of(MISMATCH_APART);
+    mismatch_t state = {};
+    mismatch_window_t window = {};
+    double K = 0, K_a = 0;
+    double i_q = 0.4;
+    double in_phase_s = 0, apart_s = 0; // for which each was injected
+
+    Apart(double alike)
+    {
+        config.swing = 0;
+        config.alike = fixed(alike, 28);
+        window.id = config.id;
+        window.omega = pll_.omega = fixed(0.3, 28);
+        window.i_q = window.i_record = fixed(i_q, 28);
+    }
+    void run(double seconds)
+    {
+        for (int k = 0; k < std::lround(seconds / kPeriod_s); ++k) {
+            period();
+        }
+    }
+
+  private:
+    void period()
+    {
+        const bool apart = mismatch_is_apart(&window, &config);
+        const double injected = real(window.injected);
+        const double q = i_q + (apart ? 0 : injected), z = apart ? injected : 0;
+        (apart ? apart_s : in_phase_s) += injected != 0 ? kPeriod_s : 0;
+        pll_.theta += static_cast<pm_angle_t>(pm_omega_to_angle(pll_.omega, kK_theta));
+        mismatch_in_t in = {};
+        in.pll = &pll_;
+        in.k_theta = kK_theta;
+        in.i = {0, fixed(q, 28)};
+        in.apart = fixed(z, 28);
+        (void)mismatch_step(&state, &window, &config, &in, PM_ONE, fixed(K * q + K_a * z, 28));
+        if (++count_ % kPeriods == 0) {
+            mismatch_slow(&state, &window, &config, &in);
+        }
+    }
+
+    const int32_t kK_theta = fixed(kBase_rad_s * kPeriod_s * 16 / (2 * kPi), 30);
+    pm_pll_t pll_ = {};
+    int count_ = 0;
+};
+
+TEST(MismatchApart, BothAreLearntInPhaseAndThenApart)
+{
+    for (const double alike : {1.0, 1.9}) {
+        Apart a(alike);
+        a.K = -0.11;
+        a.K_a = 0.06; // not in proportion
+        a.run(8.2);
+        EXPECT_NEAR(real(a.state.k.q), 0.11, 0.005) << alike;
+        EXPECT_NEAR(real(a.state.k_a), -0.06, 0.005) << alike;
+        EXPECT_NEAR(a.in_phase_s, MISMATCH_IN_PHASE * 0.125, 0.1);
+        EXPECT_GT(a.apart_s, 5.5);
+    }
+}
+
+// What both change by alike is followed without a current that makes torque.
+TEST(MismatchApart, WhatChangesAlikeIsFollowed)
+{
+    Apart a(1.9);
+    a.run(6.2);
+    const double in_phase_s = a.in_phase_s;
+    a.K_a = 0.05;
+    a.K = 1.9 * a.K_a;
+    a.run(2.0);
+    EXPECT_LT(real(a.state.k.q), -0.6 * a.K);
+    EXPECT_GT(real(a.state.k.q), -1.0 * a.K);
+    EXPECT_EQ(a.in_phase_s, in_phase_s);
 }
 
 } // namespace
