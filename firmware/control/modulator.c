@@ -135,20 +135,23 @@ void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t
 }
 
 #if PM_CARRIES(NEEDS_BRIDGES)
-void modulator_step_zero(modulator_t *self, const modulator_config_t *config, const modulator_zero_t *in,
-                         pm_q_t v_dc, modulator_out_t *out)
+pm_q_t modulator_step_zero(modulator_t *self, const modulator_config_t *config, const modulator_zero_t *in,
+                           pm_q_t v_dc, modulator_out_t *out)
 {
     const centred_t u = centred(in->v);
     const pm_q_t span = u.span + 2 * pm_magnitude(in->v_zero);
     const pm_q_t link = pm_max(span, v_dc);
     const int32_t per_volt = pm_per_volt(link);
+    pm_q_t v_zero = in->v_zero;
     out->v = in->v;
     if (span > v_dc) {
         out->v = shorten(self, in->v, v_dc, per_volt);
+        v_zero = pm_times_share(v_zero, self->limited);
     }
     const int32_t centre = pm_mulh_add(PM_SHARE_HALF, in->v_zero, per_volt);
     const int32_t i_zero = pm_mulh(in->i_zero_quarter, self->zone_alpha);
     write_shares(self, config, &u, centre, per_volt, in->i_quarter, i_zero, out);
+    return v_zero;
 }
 #endif
 

@@ -96,9 +96,10 @@ typedef struct {
     pm_q_t i_zero_quarter; /* a quarter of what each leg carries beside it */
 } modulator_zero_t;
 
-/* As modulator_step(), with shunts in the lines; where the legs do not reach as far, vector and common part are shortened. */
-void modulator_step_zero(modulator_t *self, const modulator_config_t *config, const modulator_zero_t *in,
-                         pm_q_t v_dc, modulator_out_t *out);
+/* As modulator_step(), with shunts in the lines; where the legs do not reach as far, vector and common part are shortened. Returns the
+ * common part that acts. */
+pm_q_t modulator_step_zero(modulator_t *self, const modulator_config_t *config, const modulator_zero_t *in,
+                           pm_q_t v_dc, modulator_out_t *out);
 #endif
 
 /* A period in `hidden`. */

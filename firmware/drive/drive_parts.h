@@ -23,10 +23,15 @@ static inline void drive_write_leg(uint16_t compare[2], int32_t on) /* 0 <= on <
 /* What a method asked for is asked for in that period alone. */
 static inline void drive_clear_instants(drive_out_t *out)
 {
-#if PM_CARRIES(PM_DONE_AT)
-    out->instants = (pm_instants_t){0};
-#else
     (void)out;
+#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
+    for (uint32_t n = 0; n < PM_SAMPLES; n++) {
+        out->instants.sample_at[n] = 0;
+    }
+#endif
+#if PM_CARRIES(NEEDS_COMMUTATE)
+    out->instants.commutate_at = 0;
+    out->instants.then = 0;
 #endif
 }
 

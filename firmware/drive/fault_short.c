@@ -12,7 +12,7 @@
 /* What is left of the flux at the fault when the current's angle counts. */
 #define FLUX_LEAST PM_Q(0.1)
 
-/* Phase EMF over link voltage, 1 / sqrt(3) and a sixteenth more or less. */
+/* Phase EMF of a star over link voltage, 1 / sqrt(3) and a sixteenth more or less. */
 #define BEGINS PM_UNIT(0.5773503 * 17 / 16)
 #define ENDS   PM_UNIT(0.5773503 * 15 / 16)
 
@@ -45,6 +45,23 @@ static pm_q_t link(const drive_t *drive)
     return pm_max(drive->status.v_dc, drive->config.protection.v_dc_min);
 }
 
+/* EMF of a phase above which it begins, and below which it ends; of an open winding each phase meets the link by itself. */
+static pm_q_t begins_at(const drive_t *drive)
+{
+    const pm_q_t v_dc = link(drive);
+    PM_IN_IMAGE(
+        open_winding, if (drive->config.open_winding.on) { return v_dc + v_dc / 16; })
+    return pm_unit(v_dc, BEGINS);
+}
+
+static pm_q_t ends_at(const drive_t *drive)
+{
+    const pm_q_t v_dc = link(drive);
+    PM_IN_IMAGE(
+        open_winding, if (drive->config.open_winding.on) { return v_dc - v_dc / 16; })
+    return pm_unit(v_dc, ENDS);
+}
+
 static bool begins(drive_t *drive, drive_fault_t fault)
 {
     const drive_config_t *c = &drive->config;
@@ -54,7 +71,7 @@ static bool begins(drive_t *drive, drive_fault_t fault)
     drive->fault_short =
         (fault_short_t){.flux = PM_ONE, .turn = pm_half(pm_omega_to_angle(omega, c->k_theta))};
     return c->fault_short.k != 0 && drive->stage >= STAGE_OPEN_LOOP &&
-           pm_mul_sat(c->machine.psi_m, pm_abs(omega)) > pm_unit(link(drive), BEGINS);
+           pm_mul_sat(c->machine.psi_m, pm_abs(omega)) > begins_at(drive);
 }
 
 PM_APART drive_stage_t fault_short_stage(drive_t *drive, drive_fault_t fault)
@@ -92,7 +109,7 @@ PM_APART void fault_short_step(drive_t *drive, drive_out_t *out)
 void fault_short_slow(drive_t *drive)
 {
     const drive_config_t *c = &drive->config;
-    const pm_q_t omega = pm_div(pm_unit(link(drive), ENDS), c->machine.psi_m);
+    const pm_q_t omega = pm_div(ends_at(drive), c->machine.psi_m);
     if (drive->temperature_dC >= c->protection.temp_trip_dC ||
         pm_abs(drive->fault_short.turn) < pm_half(pm_omega_to_angle(omega, c->k_theta))) {
         drive->stage = STAGE_OFF;

@@ -15,6 +15,9 @@
  * about what psi_m, by the magnets' temperature, and v_dc are known to: below the upper limit an open bridge charges the
  * link by 6 % at most, above the lower one it still might.
  *
+ * Of an open winding, whose phases meet the link by themselves, 1 stands for sqrt(3) in all of this; its second bridge closes the same
+ * switches, and i_0, up to psi_3 / L_0, is part of the current.
+ *
  * omega is the estimate, for POSITION_LOST the reference. From then on it is that of the current vector: in the
  * stationary frame the current of a shorted machine turns with the rotor, whatever the estimate says. The flux of before
  * stands still in that frame and can hold the current's angle back until it has decayed, at least with L_q / R_s: for

@@ -59,11 +59,11 @@ void open_winding_step(open_winding_t *self, const open_winding_config_t *config
         .v_zero = -pm_half(v_zero),
         .i_quarter = {.alpha = -i_quarter.alpha, .beta = -i_quarter.beta},
         .i_zero_quarter = -(self->i / 4)};
-    modulator_step_zero(modulator, modulator_config, &first, v_dc, &out->bridge[0]);
-    modulator_step_zero(modulator, modulator_config, &second, v_dc, &out->bridge[1]);
+    const pm_q_t one = modulator_step_zero(modulator, modulator_config, &first, v_dc, &out->bridge[0]);
+    const pm_q_t other = modulator_step_zero(modulator, modulator_config, &second, v_dc, &out->bridge[1]);
     out->v = (pm_ab_t){.alpha = out->bridge[0].v.alpha - out->bridge[1].v.alpha,
                        .beta = out->bridge[0].v.beta - out->bridge[1].v.beta};
-    self->v_next = v_zero;
+    self->v_next = one - other;
 }
 
 void open_winding_slow(open_winding_t *self, const open_winding_config_t *config, pm_q_t omega)

@@ -22,7 +22,7 @@
  * block commutation or a carrier that needs a star: refused.
  *
  * open_winding_slow() at 1 kHz; no division in a period but those of modulator_step(), which runs twice. State 40 bytes.
- * Tests: tests/unit/drive/open_winding_test.cpp, tests/scenario/open_winding.yaml. */
+ * Tests: tests/unit/drive/open_winding_test.cpp and open_winding_drive_test.cpp, tests/scenario/open_winding.yaml. */
 #ifndef DRIVE_OPEN_WINDING_H
 #define DRIVE_OPEN_WINDING_H
 
@@ -48,7 +48,7 @@ typedef struct {
 
 typedef struct {
     pm_q_t i;        /* i_0 at k */
-    pm_q_t v_acting; /* v_0 commanded at k-2: acts over [k-1, k) */
+    pm_q_t v_acting; /* v_0 of the step at k-2, as far as the legs reach: acts over [k-1, k) */
     pm_q_t v_next;   /* at k-1 */
     pm_q_t y, q;     /* what turns with 3 omega */
     pm_dir_t turn, lead;

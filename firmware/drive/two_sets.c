@@ -82,7 +82,7 @@ static void modulate(modulator_t *self, const modulator_config_t *config, bool p
     const pm_q_t least = pm_min(leg.a, pm_min(leg.b, leg.c));
     const modulator_zero_t in = {
         .v = v, .v_zero = pm_half(most + least), .i_quarter = i_quarter, .i_zero_quarter = 0};
-    modulator_step_zero(self, config, &in, v_dc, out);
+    (void)modulator_step_zero(self, config, &in, v_dc, out);
 }
 
 void two_sets_step(two_sets_t *self, const two_sets_config_t *config, modulator_t *modulator,

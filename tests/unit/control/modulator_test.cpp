@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 #include <vector>
 
 #include "firmware/params/parameters.h"
@@ -645,6 +646,64 @@ TEST(Modulator, ASplitThatDoesNotFitIsFlagged)
         for (const auto &leg : s.compare) {
             EXPECT_LE(leg[0], kCounts);
             EXPECT_LE(leg[1], kCounts);
+        }
+    }
+}
+
+// Without a common part of voltage and current it is modulator_step(), bit for bit; beyond the hexagon too.
+TEST(Modulator, ACommonPartOfNothingChangesNothing)
+{
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> share(0, 1);
+    int limited = 0;
+    for (const modulator_config_t &c : {plain(), compensating(), compensating(1000)}) {
+        for (int n = 0; n < 20000; ++n) {
+            const double v_dc = 0.1 + 0.8 * share(random);
+            const pm_ab_t v = bench::ab(std::polar(v_dc * share(random), 2 * bench::kPi * share(random)));
+            const pm_ab_t i =
+                bench::ab(std::polar(std::pow(share(random), 4) / 4, 2 * bench::kPi * share(random)));
+            modulator_t a = {}, b = {};
+            modulator_slow(&a, &c, fixed(v_dc, 28));
+            b = a;
+            modulator_out_t out = {}, zero = {};
+            modulator_step(&a, &c, v, fixed(v_dc, 28), i, &out);
+            const modulator_zero_t in = {v, 0, i, 0};
+            ASSERT_EQ(modulator_step_zero(&b, &c, &in, fixed(v_dc, 28), &zero), 0);
+            for (int leg = 0; leg < 3; ++leg) {
+                ASSERT_EQ(zero.on[leg], out.on[leg]) << n;
+            }
+            ASSERT_EQ(zero.v.alpha, out.v.alpha) << n;
+            ASSERT_EQ(zero.v.beta, out.v.beta) << n;
+            ASSERT_EQ(b.limited, a.limited) << n;
+            limited += a.limited != 0 ? 1 : 0;
+        }
+    }
+    EXPECT_GT(limited, 10000);
+}
+
+// On all legs alike, and shortened with the vector.
+TEST(Modulator, ACommonPartIsAddedToEachLeg)
+{
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> share(-1, 1);
+    const modulator_config_t c = plain();
+    for (int n = 0; n < 5000; ++n) {
+        const Complex v = std::polar(0.7 * kLink * share(random), bench::kPi * share(random));
+        const double zero = 0.2 * kLink * share(random);
+        const Legs u = phases(v);
+        const double fits = std::min(1.0, kLink / (u.top() - u.bottom() + 2 * std::fabs(zero)));
+        modulator_t self = {};
+        modulator_out_t out = {};
+        modulator_slow(&self, &c, fixed(kLink, 28));
+        const modulator_zero_t in = {bench::ab(v), fixed(zero, 28), {0, 0}, 0};
+        const pm_q_t acts = modulator_step_zero(&self, &c, &in, fixed(kLink, 28), &out);
+        ASSERT_NEAR(real(acts), zero * fits, 2 * kShorten * std::fabs(zero) + 1e-8) << v << zero;
+        ASSERT_LE(std::abs(Complex(real(out.v.alpha), real(out.v.beta)) - v * fits), 2 * kShorten)
+            << v << zero;
+        const Legs duty = reference(v * fits, kLink);
+        for (int leg = 0; leg < 3; ++leg) {
+            ASSERT_NEAR(out.on[leg], (duty.x[leg] + zero * fits / kLink) * kCounts, 2 * kLeg_counts)
+                << v << zero;
         }
     }
 }
