@@ -288,9 +288,8 @@ ENTRIES = (
  "harmonic's frequency; 0: drifts"), "11.4.1 #127"),
     Entry(0x2340, 0, "windings.count", "windings", "u8", "const", "", 0, 0, None, None, 6, False, False, "none", "none", {}, 'highest sub-index', ""),
     Entry(0x2340, 1, "winding", "windings", "i32", "off", "1", 0, 0, 0, 2, 0, False, True, "machine", "none", {0: 'a star', 1: 'open, both ends on a bridge each on one link: legs of the second carry the currents back', 2: 'two sets of three, the second 30 degrees on, with a bridge each'}, 'what the legs feed', "7.3.2 #90"),
-    Entry(0x2340, 2, "L_0", "windings", "i32", "off", "H", -9, 0, 0, 1000000000, 0, False, True, "machine", "none", {}, ('open winding: inductance against a current that is the same in all phases; '
- '0: not known'), "7.3.1 #89"),
-    Entry(0x2340, 3, "zero_current", "windings", "i32", "off", "1", 0, 0, 0, 1, 1, False, True, "machine", "none", {0: 'flows, by the third harmonic', 1: 'held at zero'}, 'open winding: the current that is the same in all phases', "7.3.4 #92"),
+    Entry(0x2340, 2, "L_0", "windings", "i32", "off", "H", -9, 0, 0, 1000000000, 0, False, True, "machine", "none", {}, 'open winding: inductance of the zero sequence; 0: not known', "7.3.1 #89"),
+    Entry(0x2340, 3, "zero_current", "windings", "i32", "off", "1", 0, 0, 0, 1, 1, False, True, "machine", "none", {0: 'flows, by the third harmonic', 1: 'held at zero'}, 'open winding: zero-sequence current', "7.3.4 #92"),
     Entry(0x2340, 4, "M_d", "windings", "i32", "off", "H", -9, 0, 0, 500000000, 0, False, True, "machine", "none", {}, 'two sets: mutual inductance between their d axes, which is in L_d', "7.2.1.1 #79"),
     Entry(0x2340, 5, "M_q", "windings", "i32", "off", "H", -9, 0, 0, 500000000, 0, False, True, "machine", "none", {}, 'the same of the q axes, which is in L_q', "7.2.1.1 #79"),
     Entry(0x2340, 6, "neutral_channel", "windings", "i32", "off", "1", 0, 0, 0, 1, 0, False, True, "machine", "none", {0: 'each star point against resistors at its terminals', 1: 'the two star points against one another'}, 'two sets: what the channels of the star points measure', "7.2.3.1 #82"),
