@@ -126,7 +126,6 @@ def check_inputs_are_safe(folder):
 def check_run_refuses(folder):
     """The closed loop needs what the plant alone does not."""
     for machine, why in (("dtp_400", "the drive cannot run two sets yet"),
-                         ("ow_400", "the drive cannot run an open winding yet"),
                          ("bldc_fan", "drive.pole_pairs is missing")):
         path = pathlib.Path(f"sim_plant/machines/{machine}.yaml").resolve()
         if "drive." in why:
