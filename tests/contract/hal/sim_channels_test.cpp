@@ -293,4 +293,50 @@ TEST(SimChannels, OneSwitchOfALeg)
     }
 }
 
+plant_config_t open_winding()
+{
+    plant_config_t config = plants::spm_400();
+    config.winding.connection = PLANT_OPEN;
+    config.winding.L_0_H = 2.25e-3;
+    config.mech.locked = true;
+    return config;
+}
+
+// A machine with six legs has one. A phase takes current where the duties of its legs differ, out of the one and into the other.
+TEST(SimChannels, ASecondBridge)
+{
+    EXPECT_EQ(hal_channels(&Port(plants::spm_400()).hal) & NEEDS_BRIDGES, 0U);
+    for (int differs = 0; differs < 3; ++differs) {
+        Port port(open_winding());
+        EXPECT_NE(hal_channels(&port.hal) & NEEDS_BRIDGES, 0U);
+        ASSERT_TRUE(hal_bridge_arm(&port.hal));
+        unequal_duties(port.out);
+        for (int leg = 0; leg < 3; ++leg) {
+            port.out.second[leg] =
+                static_cast<uint16_t>(port.out.compare[leg][0] - (leg == differs ? 400 : 0));
+        }
+        for (int k = 0; k < 20; ++k) {
+            port.step();
+        }
+        plant_truth_t truth;
+        plant_truth(port.plant.get(), &truth);
+        // 1.7 V for 1.8 ms, without resistance a third of it each by L_0, 2/3 by L: 1.0 A and what the others have of both
+        const double volt_s = 400.0 / kCounts * 36 * 18 * kPeriod_s;
+        for (int leg = 0; leg < 3; ++leg) {
+            const double share = leg == differs ? 2.0 / 3 : -1.0 / 3;
+            const double i_A = volt_s * (share / 3.385e-3 + 1.0 / 3 / 2.25e-3);
+            EXPECT_NEAR(truth.i_A[leg], i_A, 0.25) << differs << ' ' << leg;
+            EXPECT_NEAR(truth.i_A[leg + 3], -truth.i_A[leg], 1e-9) << differs << ' ' << leg;
+        }
+        port.out.legs = PM_LEGS_OFF;
+        for (int k = 0; k < 50; ++k) {
+            port.step();
+        }
+        plant_truth(port.plant.get(), &truth);
+        for (int leg = 0; leg < 6; ++leg) {
+            EXPECT_NEAR(truth.i_A[leg], 0, 1e-3) << differs << ' ' << leg;
+        }
+    }
+}
+
 } // namespace
