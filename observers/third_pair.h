@@ -46,6 +46,9 @@ void third_pair_slow(third_pair_t *self, const third_pair_config_t *config, cons
 
 void make_third_pair(maker_t *m, third_pair_config_t *c);
 
+/* What third_pair_flux.h needs as well. */
+void third_pair_check(maker_t *m);
+
 #ifdef __cplusplus
 }
 #endif

@@ -18,8 +18,8 @@ static void seed(third_pair_flux_t *self, const third_pair_flux_config_t *config
     const pm_q_t g = in->omega < 0 ? -config->g : config->g;
     const pm_q_t shrink = pm_div(pm_mul(config->third.psi_3, pm_div(PM_ONE, PM_ONE + pm_mul(g, g))),
                                  PM_ONE + pm_mul(at.x, at.x));
-    /* L (1 - j x) (1 + j g) */
-    const pm_dq_t turned = {.d = at.l.d + pm_mul(at.x, at.l.q), .q = at.l.q - pm_mul(at.x, at.l.d)};
+    /* L (1 - j x) (1 + j g), L = l.d - j l.q */
+    const pm_dq_t turned = {.d = at.l.d - pm_mul(at.x, at.l.q), .q = -at.l.q - pm_mul(at.x, at.l.d)};
     const pm_dq_t held = {.d = turned.d - pm_mul(g, turned.q), .q = turned.q + pm_mul(g, turned.d)};
     const pm_q_t re = pm_mul(shrink, held.d);
     const pm_q_t im = pm_mul(shrink, held.q);

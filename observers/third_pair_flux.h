@@ -5,7 +5,7 @@
  *   psi_01 + j psi_02 = (psi'_1 + j psi'_2) (1 - j g sgn omega)
  * The last line is exact at 3 omega: as there are both, no speed is differentiated and nothing is expected. The pair of third.h is
  * q = 3 omega psi_01, y = -3 omega psi_02. Against third_pair.h the noise is less and the ninth harmonic a third,
- *   (psi_9 / 3 psi_3) sin 12 theta
+ *   -(psi_9 / 3 psi_3) sin 12 theta
  * and an offset dv of a channel stays as dv / w_c. A sum is half a period ahead of its last sample, which x takes.
  *
  * Called each period; the result belongs to k. Tests: tests/unit/observers/third_test.cpp, tests/scenario/third_pair.yaml. */

@@ -10,7 +10,5 @@ void make_third_pair_flux(maker_t *m, third_pair_flux_config_t *c)
     c->third.rc = fixed(m, mul3(pm_num(3), pm_num_sub(third_filter(m), half), m->base.omega), Q_BITS,
                         DRIVE_PARAM_neutral_filter);
     c->g = fixed(m, si(m, DRIVE_PARAM_third_drift), Q_BITS, DRIVE_PARAM_third_drift);
-    if (m->params->third_notch != 0) {
-        refuse(m, DRIVE_PARAM_third_notch, "observer 12 alone has it");
-    }
+    third_pair_check(m);
 }
