@@ -53,7 +53,8 @@ constexpr int kPeriods = 400;
 // ends: at the distance that the source asks for, behind the beginning and ahead of the end.
 struct Seen : obs_in_t {
     pm_ab_t between, behind, ahead;
-    pm_q_t v_zero; // of the star point
+    pm_q_t v_zero;        // of the star point,
+    pm_q_t v_zero_second; // and of that of a second set
 };
 
 constexpr double kVdc_V = 300;
@@ -102,7 +103,7 @@ class Source
             bench::give_sample(&codes, 0, sample);
         }
         const pm_q_t v_dc = fixed(kVdc_V / kBase.v_V, 28);
-        const obs_more_t more = {&codes, {sample, {0, 0}}, &v_dc, seen.v_zero};
+        const obs_more_t more = {&codes, {sample, {0, 0}}, &v_dc, seen.v_zero, seen.v_zero_second};
         obs_in_t in = seen;
         in.more = &more;
         asked_[1] = asked_[0];
@@ -319,7 +320,10 @@ class Drive
         in.behind = bench::ab(i_behind_ / kBase.i_A);
         in.ahead = bench::ab(at_zero_voltage(-source_.within().second) / kBase.i_A);
         in.v = bench::ab(v_mean_ / kBase.v_V);
-        const double e_0 = bench::star_point_V(theta_, omega_, i * kBase.i_A * std::polar(1.0, -theta_));
+        const Complex i_dq_A = i * kBase.i_A * std::polar(1.0, -theta_);
+        const double e_0 = bench::star_point_V(theta_, omega_, i_dq_A);
+        const double e_02 = bench::star_point_V(theta_ - bench::kSecondSet_rad, omega_, i_dq_A);
+        in.v_zero_second = fixed(e_02 / kBase.v_V, 28);
         in.v_zero = fixed((source_.behind_filter() ? v_zero_ : e_0) / kBase.v_V, 28);
         in.i = bench::ab(i);
         in.dir = bench::direction(theta_ - error_);
@@ -491,6 +495,7 @@ TEST_P(ObserverContract, MirroredInputGivesMirroredOutput)
         x.dir.sin = -x.dir.sin;
         x.omega = -x.omega;
         x.i_dq.q = -x.i_dq.q;
+        x.v_zero_second = -x.v_zero_second; // a quarter of a cycle from the first
     }
     const std::vector<obs_out_t> a = replay(GetParam(), in), b = replay(GetParam(), mirrored);
     double largest = 0;
@@ -595,6 +600,7 @@ TEST_P(ObserverContract, CornersOfTheConvertersAreHarmless)
                 *i = bench::ab({end(4.0 / 3), end(4.0 / 3)});
             }
             x.v_zero = fixed(end(1), 28);
+            x.v_zero_second = fixed(end(1), 28);
         }
         source->reset(in[0]);
         for (int k = 0; k < 12; ++k) {

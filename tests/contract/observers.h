@@ -22,6 +22,17 @@ inline double star_point_V(double theta_rad, double omega_rad_s, Complex i_dq_A)
     return (kJ * 3.0 * omega_rad_s * flux * std::polar(1.0, 3 * theta_rad)).real();
 }
 
+// A second set of windings lies 30 degrees on; with one bridge there is none.
+constexpr double kSecondSet_rad = kPi / 6;
+
+inline void give_second_set(drive_params_t &p, int32_t observer)
+{
+    if (observer == OBSERVER_third_pair || observer == OBSERVER_third_pair_flux) {
+        p.winding = WINDING_TWO_SETS;
+        p.start_method = 2;
+    }
+}
+
 struct ObserverCase {
     std::string name;
     observer_config_t config;
@@ -63,6 +74,7 @@ inline ObserverCase observer_case(observer_id_t id, const char *name, const Mach
 {
     drive_params_t p = parameters(m, b);
     p.observer = static_cast<int32_t>(id);
+    give_second_set(p, p.observer);
     drive_config_t config = {};
     if (id == OBSERVER_zero_vector) { // sees its EMF at higher speeds only
         p.speed_low = static_cast<int32_t>(0.3 * p.speed_trip);

@@ -40,7 +40,8 @@ static void period(observer_id_t id, pm_ab_t v, pm_ab_t i)
     const pm_q_t v_dc = PM_Q(0.667);
     const pm_abc_t phase = pm_clarke_inverse(i);
     const pm_measure_t codes = {.sampled = 1, .i_sample = {{code(phase.a), code(phase.b), code(phase.c)}}};
-    const obs_more_t more = {.codes = &codes, .v_dc = &v_dc, .v_zero = PM_Q(0.003)};
+    const obs_more_t more = {
+        .codes = &codes, .v_dc = &v_dc, .v_zero = PM_Q(0.003), .v_zero_second = PM_Q(0.002)};
     const pm_dir_t dir = pm_dir(bench.pll.theta);
     bench.in = (obs_in_t){
         .v = v, .i = i, .dir = dir, .omega = bench.pll.omega, .i_dq = pm_park(i, dir), .more = &more};
@@ -63,6 +64,10 @@ static bool configure(observer_id_t id)
     drive_params_default(&params);
     params.observer = (int32_t)id;
     params.psi_3 = 7080000;
+    if (id == OBSERVER_third_pair || id == OBSERVER_third_pair_flux) { /* two sets of windings */
+        params.winding = (int32_t)WINDING_TWO_SETS;
+        params.start_method = 2;
+    }
     if (id == OBSERVER_zero_vector) { /* sees its EMF at higher speeds only */
         params.speed_high = params.speed_trip / 5 * 2;
         params.speed_max = params.speed_trip / 2;

@@ -9,7 +9,7 @@
 
 #include "firmware/params/parameters.h"
 #include "method_gains.h" // made by CMake: tests/unit/*/*_gains.h of all methods
-#include "tests/contract/bench.h"
+#include "tests/contract/observers.h"
 #include "tests/unit/math/samples.h"
 
 namespace
@@ -403,6 +403,7 @@ TEST(Config, LqBelowLdIsAccepted)
         drive_params_t p = changed({{DRIVE_PARAM_L_d, 80e-3}});
         p.observer = observer;
         p.psi_3 = 7080000; // for those that need it
+        bench::give_second_set(p, observer);
         if (observer == OBSERVER_zero_vector) {
             p.speed_high = p.speed_trip / 5 * 2;
             p.speed_max = p.speed_trip / 2;

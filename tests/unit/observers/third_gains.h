@@ -21,4 +21,16 @@ inline Names must_be_positive(const third_sogi_config_t &c)
     return must_be_positive(c.third);
 }
 
+inline Names must_be_positive(const third_pair_config_t &c)
+{
+    return must_be_positive(c.third);
+}
+
+inline Names must_be_positive(const third_pair_flux_config_t &c)
+{
+    Names names = must_be_positive(c.third);
+    names.push_back({"third_pair_flux g", c.g});
+    return names;
+}
+
 } // namespace gains

@@ -1,4 +1,5 @@
-// third.h, third_integration.h, third_sogi.h: the angle that a star point's voltage stands for, by METHODS.md 0.2 E3 behind an RC.
+// third.h, third_integration.h, third_sogi.h, third_pair.h, third_pair_flux.h: the angle that a star point's voltage stands for, by
+// METHODS.md 0.2 E3 behind an RC; for the pairs, those of two sets of windings.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -20,14 +21,18 @@ constexpr bench::Base kB = bench::kIpmBase;
 constexpr double kRc_s = 100e-6;
 // Second order in 3 omega T = 0.09: RC and half a period as one lag, the mean of two periods.
 constexpr double kExact_deg = 0.1;
-constexpr double kExpected = 0.2; // half of third_drift, as preset
+constexpr double kSeed_deg = 0.27; // (3 omega T)^2 / 2 of the flux, at 314 rad/s
+constexpr double kExpected = 0.2;  // half of third_drift, as preset
 const std::vector<observer_id_t> kAll = {OBSERVER_third_integration, OBSERVER_third_sogi,
-                                         OBSERVER_third_crossings};
+                                         OBSERVER_third_crossings, OBSERVER_third_pair,
+                                         OBSERVER_third_pair_flux};
+const std::vector<observer_id_t> kPairs = {OBSERVER_third_pair, OBSERVER_third_pair_flux};
 
 drive_params_t params(observer_id_t id)
 {
     drive_params_t p = bench::parameters(bench::kIpmLinear, kB);
     p.observer = id;
+    bench::give_second_set(p, id);
     p.neutral_full_scale = 15000;
     p.neutral_filter = 100000;
     p.speed_low = 3200;
@@ -50,12 +55,18 @@ struct Star {
     double error_rad = 0;
     Complex beside_V = 0; // turns with the rotor: of unlike phases
     double theta_rad = 0.3;
+    double psi_9_Wb = 0;
+    Complex offset_V = 0; // of the channel of the first set, and as imaginary part of the second's
 
-    double v_V() const
+    // behind the first set by `behind`
+    double v_V(double behind_rad = 0) const
     {
+        const double at = theta_rad - behind_rad;
         const Complex flux = bench::kPsi3_Wb - 0.5 * bench::kDL0_H * i_A;
-        const Complex e = 3.0 * kJ * omega_rad_s * flux * std::polar(1.0, 3 * theta_rad);
+        const Complex e = 3.0 * kJ * omega_rad_s * flux * std::polar(1.0, 3 * at);
+        const Complex e_9 = 9.0 * kJ * omega_rad_s * psi_9_Wb * std::polar(1.0, 9 * at);
         return (e / (1.0 + 3.0 * kJ * omega_rad_s * kRc_s)).real() +
+               (e_9 / (1.0 + 9.0 * kJ * omega_rad_s * kRc_s)).real() +
                (beside_V * std::polar(1.0, theta_rad)).real();
     }
 
@@ -65,7 +76,8 @@ struct Star {
         in.dir = bench::direction(theta_rad - error_rad);
         in.omega = fixed(omega_rad_s / kB.omega_rad_s, 28);
         in.i_dq = bench::dq(i_A / kB.i_A);
-        more->v_zero = fixed(v_V() / kB.v_V, 28);
+        more->v_zero = fixed((v_V() + offset_V.real()) / kB.v_V, 28);
+        more->v_zero_second = fixed((v_V(bench::kSecondSet_rad) + offset_V.imag()) / kB.v_V, 28);
         in.more = more;
         return in;
     }
@@ -115,6 +127,13 @@ struct Source {
     }
 };
 
+// The leak of third_pair_flux.h acts on sums, half a period old: what is left of it, rad.
+double lag(observer_id_t id, double omega_rad_s)
+{
+    constexpr double kG2 = 0.4 * 0.4; // third_drift, as preset
+    return id == OBSERVER_third_pair_flux ? omega_rad_s * kB.period_s / 2 * kG2 / (1 + kG2) : 0;
+}
+
 // Of an error that stays: what is expected of the flux errs too, and takes a part of it (third_integration.h).
 double kept(observer_id_t id)
 {
@@ -137,7 +156,8 @@ TEST(Third, SeesThePosition)
                     Star at{omega, i, error * kDegree};
                     Source source(params(id), at);
                     const auto seen = source.run(at, 10000);
-                    const double expected = std::sin(3 * error * kDegree) / 3 / kDegree * kept(id);
+                    const double expected =
+                        (std::sin(3 * error * kDegree) / 3 * kept(id) + lag(id, omega)) / kDegree;
                     const double more = ripple(id) * std::fabs(error);
                     EXPECT_NEAR(seen.mean, expected, kExact_deg)
                         << id << ' ' << omega << ' ' << i << ' ' << error;
@@ -215,7 +235,7 @@ TEST(Third, AMachineWithoutShowsNone)
         for (int k = 0; k < 4000; ++k) {
             at.theta_rad += at.omega_rad_s * kB.period_s;
             obs_in_t in = at.seen(&source.more);
-            source.more.v_zero = 0;
+            source.more.v_zero = source.more.v_zero_second = 0;
             obs_out_t out;
             observer_step(&source.state, &source.c, &in, &out);
         }
@@ -292,6 +312,154 @@ TEST(Third, KnowsNeitherResistanceNorInductances)
                 id == OBSERVER_third_sogi ? sizeof told.third_sogi : sizeof told.third_integration;
             EXPECT_EQ(std::memcmp(&told.third_sogi, &other.third_sogi, size), 0);
         }
+    }
+}
+
+// What follows each step, from the first on.
+template <typename See> void follow(Source &source, Star &at, int periods, See see)
+{
+    for (int k = 0; k < periods; ++k) {
+        at.theta_rad += at.omega_rad_s * kB.period_s;
+        const obs_in_t in = at.seen(&source.more);
+        obs_out_t out;
+        observer_step(&source.state, &source.c, &in, &out);
+        see(out);
+    }
+}
+
+// What the sums are seeded with is exact to the first order in 3 omega T.
+TEST(ThirdPair, TheSeedHasNoTransient)
+{
+    for (const observer_id_t id : kPairs) {
+        for (const double omega : {31.4, -157.0, 314.0}) {
+            for (const Complex i : {Complex{0, 0}, Complex{-2, 3}}) {
+                Star at{omega, i};
+                Source source(params(id), at);
+                follow(source, at, 200, [&](const obs_out_t &out) {
+                    ASSERT_NEAR((real(out.eps) - lag(id, omega)) / kDegree, 0, kSeed_deg)
+                        << id << ' ' << omega;
+                    ASSERT_NEAR(real(out.misfit), 0, 0.02) << id << ' ' << omega;
+                });
+            }
+        }
+    }
+}
+
+// What becomes of the flux psi e^{j order theta}, of which the third is taken for 1: the RC, and the leaky sum.
+Complex passes(observer_id_t id, double order, double omega)
+{
+    const double g = std::copysign(0.4, omega); // third_drift as preset
+    const Complex filter = (1.0 + 3.0 * kJ * omega * kRc_s) / (1.0 + order * kJ * omega * kRc_s);
+    if (id == OBSERVER_third_pair) {
+        return filter * order / 3.0; // the EMF's own
+    }
+    const double turn = omega * kB.period_s, leak = 3 * g * turn;
+    const Complex sum = order * kJ * turn / (1.0 - (1 - leak) * std::polar(1.0, -order * turn));
+    return filter * sum * (1.0 - kJ * g) * std::polar(1.0, -1.5 * turn);
+}
+
+// (psi_9 / psi_3) sin 12 theta by the EMFs, a third of it by the fluxes, with the other sign.
+TEST(ThirdPair, ANinthHarmonicAddsItsLaw)
+{
+    constexpr double kShare = 0.1, kTolerance = 0.02;
+    for (const observer_id_t id : kPairs) {
+        for (const double omega : {31.4, 157.0, -157.0}) {
+            Star at{omega, 0};
+            at.psi_9_Wb = kShare * bench::kPsi3_Wb;
+            Source source(params(id), at);
+            follow(source, at, 4000,
+                   [](const obs_out_t &) {}); // what the seed does not know of it has decayed
+            double worst = 0, most = 0;
+            follow(source, at, 2000, [&](const obs_out_t &out) {
+                const Complex z = passes(id, 3, omega) +
+                                  kShare * passes(id, -9, omega) * std::polar(1.0, -12 * at.theta_rad);
+                worst = std::max(worst, std::fabs(real(out.eps) - z.imag() / 3));
+                most = std::max(most, std::fabs(real(out.eps)));
+            });
+            const double law = kShare * (id == OBSERVER_third_pair ? 1 : 1.0 / 3);
+            EXPECT_LT(worst, kTolerance * law) << id << ' ' << omega;
+            EXPECT_NEAR(most, law, 0.15 * law) << id << ' ' << omega;
+        }
+    }
+}
+
+// An offset dv of a channel adds dv to the EMF and dv / w_c to a flux, w_c = 3 g omega.
+TEST(ThirdPair, AnOffsetAddsItsLaw)
+{
+    constexpr double kOffset_V = 0.05, kG = 0.4;
+    for (const observer_id_t id : kPairs) {
+        for (const double omega : {31.4, -157.0}) {
+            for (const Complex of : {Complex{kOffset_V, 0}, Complex{0, -kOffset_V}}) {
+                Star at{omega, 0};
+                at.offset_V = of;
+                Source source(params(id), at);
+                const double e = 3 * std::fabs(omega) * bench::kPsi3_Wb;
+                const double lift = id == OBSERVER_third_pair ? 1 : std::hypot(1, kG) / kG;
+                const double law_deg = kOffset_V * lift * std::hypot(1, 3 * omega * kRc_s) / e / 3 / kDegree;
+                const auto seen = source.run(at, 8000);
+                EXPECT_NEAR(seen.most, law_deg, 0.02 * law_deg + 0.02) << id << ' ' << omega;
+                EXPECT_NEAR(seen.mean, 0, kExact_deg) << id << ' ' << omega;
+            }
+        }
+    }
+}
+
+// The flux takes half a period off the filter: told so much more, it is ahead by atan(3 omega T / 2) / 3.
+TEST(ThirdPair, TwinWithHalfAPeriodTooMuchIsAheadByIt)
+{
+    for (const double omega : {100.0, 314.0, -314.0}) {
+        drive_params_t p = params(OBSERVER_third_pair_flux);
+        p.neutral_filter += 50000;
+        Star at{omega, 0};
+        Source source(p, at);
+        const double turn = std::atan(3 * omega * (kRc_s + kB.period_s / 2)) - std::atan(3 * omega * kRc_s);
+        const double expected = turn / 3 + lag(OBSERVER_third_pair_flux, omega);
+        EXPECT_NEAR(source.run(at, 4000).mean, expected / kDegree, kExact_deg) << omega;
+    }
+}
+
+// Then the pair turns the other way: no error is seen, and no third harmonic.
+TEST(ThirdPair, TwinWithTheSecondSetTurnedSeesNothing)
+{
+    constexpr int kTurns = 10, kPeriods = 4000;
+    for (const observer_id_t id : kPairs) {
+        for (const double error : {0.0, 10.0, -10.0}) {
+            for (const bool turned : {false, true}) {
+                Star at{2 * bench::kPi * kTurns / (kPeriods * kB.period_s), 0, error * kDegree};
+                Source source(params(id), at);
+                Complex mean = 0;
+                for (int k = 0; k < 2 * kPeriods; ++k) {
+                    at.theta_rad += at.omega_rad_s * kB.period_s;
+                    const obs_in_t in = at.seen(&source.more);
+                    source.more.v_zero_second *= turned ? -1 : 1;
+                    obs_out_t out;
+                    observer_step(&source.state, &source.c, &in, &out);
+                    mean += k < kPeriods ? 0 : bench::complex(out.vector) / double(kPeriods);
+                }
+                const Complex tells = turned ? 0 : std::polar(1.0, 3 * error * kDegree);
+                EXPECT_LT(std::abs(mean - tells), 0.01) << id << ' ' << error << mean;
+            }
+        }
+    }
+}
+
+TEST(ThirdPair, IsRefusedWithoutASecondSetAndWithANotch)
+{
+    for (const observer_id_t id : kPairs) {
+        drive_params_t p = params(id);
+        drive_config_t c = {};
+        p.winding = 0;
+        const drive_result_t one = drive_configure(&c, &p, PM_CHANNELS);
+        EXPECT_EQ(one.param, DRIVE_PARAM_observer);
+        EXPECT_STREQ(one.reason, "needs two sets of windings: winding 2");
+        p = params(id);
+        p.third_notch = 300;
+        EXPECT_EQ(drive_configure(&c, &p, PM_CHANNELS).param, DRIVE_PARAM_third_notch);
+        p.third_notch = 0;
+        for (const uint32_t missing : {NEEDS_SECOND_SET, NEEDS_NEUTRAL}) {
+            EXPECT_FALSE(drive_configure(&c, &p, PM_CHANNELS & ~missing).ok) << id << ' ' << missing;
+        }
+        EXPECT_TRUE(drive_configure(&c, &p, PM_CHANNELS).ok);
     }
 }
 
