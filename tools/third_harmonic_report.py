@@ -89,9 +89,9 @@ def machines(count):
 
 
 def chosen():
-    """Name -> (place in the list, words, needs)."""
+    """Name -> (place in the list, words, needs); the machine has one set of windings."""
     return {name: (n, words, needs) for n, (name, words, _, needs) in enumerate(methods("observers/observers.def"))
-            if name in FUNDAMENTAL or name.startswith("third_")}
+            if name in FUNDAMENTAL or (name.startswith("third_") and "SECOND_SET" not in needs)}
 
 
 TAKE = """## Which to take

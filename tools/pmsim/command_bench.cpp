@@ -78,7 +78,7 @@ void bench(const Options &options)
     std::printf("replay: %zu of %zu periods differ\n", different, periods.size());
 }
 
-// Machines with two bridges, fed open loop.
+// Six legs without the firmware, fed open loop.
 void bench_six_legs(int repeat)
 {
     const int periods = 20000;

@@ -64,7 +64,7 @@ const std::vector<std::string> &leg_names(); // a b c x y z
 // One value per leg, "[a, b, c]"; the rest of the six stay as they are.
 void read_legs(const Value &value, int legs, double min, double max, double *first);
 
-// Refuses a setup that the firmware cannot run: no rated values or parameters, more than three legs.
+// Refuses a setup that the firmware cannot run: no rated values or parameters, a single shunt.
 void require_drive(const Setup &setup);
 
 // What plant_create() says of the setup, as an error of the file and key that say it.
