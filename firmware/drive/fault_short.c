@@ -50,7 +50,7 @@ static pm_q_t begins_at(const drive_t *drive)
 {
     const pm_q_t v_dc = link(drive);
     PM_IN_IMAGE(
-        open_winding, if (drive->config.open_winding.on) { return v_dc + v_dc / 16; })
+        open_winding, if (drive->config.winding == (uint8_t)WINDING_OPEN) { return v_dc + v_dc / 16; })
     return pm_unit(v_dc, BEGINS);
 }
 
@@ -58,7 +58,7 @@ static pm_q_t ends_at(const drive_t *drive)
 {
     const pm_q_t v_dc = link(drive);
     PM_IN_IMAGE(
-        open_winding, if (drive->config.open_winding.on) { return v_dc - v_dc / 16; })
+        open_winding, if (drive->config.winding == (uint8_t)WINDING_OPEN) { return v_dc - v_dc / 16; })
     return pm_unit(v_dc, ENDS);
 }
 

@@ -333,7 +333,7 @@ struct Held {
 
     Held(const drive_params_t &p, double omega, double amplitude_V) : bridges(p), circuit(omega, amplitude_V)
     {
-        bridges.config.open_winding.on = true;
+        bridges.config.winding = WINDING_OPEN;
         open_winding_slow(&bridges.self, &bridges.zero, fixed(omega / kOmega, 28));
     }
 
@@ -496,7 +496,7 @@ TEST(OpenWinding, ASecondBridgeIsAskedOfTheBoard)
     drive_config_t config = {};
     const drive_result_t result = drive_configure(&config, &star, PM_CHANNELS & ~NEEDS_BRIDGES);
     EXPECT_TRUE(result.ok) << result.reason;
-    EXPECT_FALSE(config.open_winding.on);
+    EXPECT_EQ(config.winding, WINDING_STAR);
 }
 
 // Its currents tell what the channel of a star point does.
