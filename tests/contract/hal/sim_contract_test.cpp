@@ -75,14 +75,6 @@ TEST(HalContract, SimWithNeutralAndLinkCurrent)
     keeps_contract(config, 0, kAlways | NEEDS_NEUTRAL | NEEDS_DC_CURRENT);
 }
 
-TEST(HalContract, SimWithASecondBridge)
-{
-    plant_config_t config = plants::spm_400();
-    config.winding.connection = PLANT_OPEN;
-    config.winding.L_0_H = 2.25e-3;
-    keeps_contract(config, 0, kAlways | NEEDS_BRIDGES);
-}
-
 TEST(HalContract, SimWithoutWhatIsTaken)
 {
     keeps_contract(with_voltages(), ~0U, 0);
