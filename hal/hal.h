@@ -22,7 +22,6 @@
 #include <stdint.h>
 
 #include "firmware/drive/drive.h"
-#include "firmware/params/store.h"
 #include "hal/can_frame.h"
 
 #ifdef __cplusplus

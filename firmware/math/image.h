@@ -27,4 +27,13 @@
 #define PM_HAS(name)           PM_IS_PRESENT(PM_WITHOUT_##name)
 #define PM_IN_IMAGE(name, ...) PM_KEEP_IF(PM_HAS(name), __VA_ARGS__)
 
+/* Bytes of a page of the store (firmware/params/store.h). A board's is one of its flash, which holds what an image has; a program with every method
+ * has more to keep. */
+#ifndef STORE_PAGE
+#ifdef PM_IMAGE_HEADER
+#define STORE_PAGE 2048U
+#else
+#define STORE_PAGE 4096U
+#endif
+#endif
 #endif

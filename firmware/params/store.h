@@ -24,6 +24,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "firmware/math/image.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -33,15 +35,6 @@ typedef struct {
     int32_t value;
 } store_pair_t;
 
-/* Bytes of a page. A board's is one of its flash, which holds what an image has; a program with every method
- * has more to keep. */
-#ifndef STORE_PAGE
-#ifdef PM_IMAGE_HEADER
-#define STORE_PAGE 2048U
-#else
-#define STORE_PAGE 4096U
-#endif
-#endif
 #define STORE_WORDS     (STORE_PAGE / 4U)
 #define STORE_HEADER    4U /* words */
 #define STORE_SEALS     4U
