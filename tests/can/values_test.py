@@ -114,7 +114,7 @@ class Names(unittest.TestCase):
 
     def test_identity_on_the_bus_is_not_among_the_stored(self):
         self.assertNotIn("can_node_id", [e.name for e in names.stored()])
-        self.assertEqual({e.record for e in names.stored("machine")}, {"machine", "third"})
+        self.assertEqual({e.record for e in names.stored("machine")}, {"machine", "third", "windings"})
 
 
 class Files(unittest.TestCase):

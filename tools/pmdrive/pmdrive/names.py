@@ -11,7 +11,7 @@ RECORDS = {}
 for _entry in dictionary.ENTRIES:
     RECORDS.setdefault(_entry.record, []).append(_entry)
 PLACE = re.compile(r"(?:0x)?([0-9A-Fa-f]{4})h?(?::(?:0x)?([0-9A-Fa-f]{1,2})h?)?")
-DRIVE_RECORDS = ("board", "schematic", "machine", "control", "position", "sliding_mode", "ekf", "injection", "third", "six_step", "protections", "sensors")
+DRIVE_RECORDS = ("board", "schematic", "machine", "control", "position", "sliding_mode", "ekf", "injection", "third", "windings", "six_step", "protections", "sensors")
 
 
 def find(text):
