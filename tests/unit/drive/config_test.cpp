@@ -797,6 +797,12 @@ class Draw
             v = std::clamp(v, static_cast<double>(x.min), static_cast<double>(x.max));
             drive_param_set(&p, static_cast<drive_param_id_t>(id), static_cast<int32_t>(v));
         }
+        p.winding = n_ % 8 == 3 ? 1 : 0;
+        if (p.winding == 1) { // most else would be refused for what a star alone has
+            p.L_0 = std::max(p.L_0, p.L_d / 2);
+            p.start_method = 2;
+            p.flying_start = p.commutation = p.t_settle = p.regulator = 0;
+        }
         return p;
     }
 
@@ -919,7 +925,7 @@ double injection_gain(const drive_config_t &c, double i_q)
 }
 
 struct Survey {
-    int accepted = 0, injecting = 0;
+    int accepted = 0, injecting = 0, open = 0;
     std::map<std::string, int> bad, known;
 };
 
@@ -939,6 +945,11 @@ Survey survey(int draws)
         }
         s.known["speed kp"] += c.speed.pi.kp <= 0 ? 1 : 0;
         s.known["speed ki"] += c.speed.pi.ki <= 0 ? 1 : 0;
+        if (c.open_winding.on) {
+            ++s.open;
+            s.bad["k_p of the zero sequence"] += c.open_winding.k_p <= 0 ? 1 : 0;
+            s.bad["k_r of the zero sequence"] += c.open_winding.k_r <= 0 ? 1 : 0;
+        }
         if (c.injection) {
             ++s.injecting;
             const double i_rated = p.i_rated / static_cast<double>(p.i_full_scale);
@@ -1144,6 +1155,7 @@ TEST(Config, RandomSetsAreRefusedOrMakeSense)
     const Survey s = survey(kDraws);
     EXPECT_GT(s.accepted, kDraws / 20);
     EXPECT_GT(s.injecting, kDraws / 50);
+    EXPECT_GT(s.open, kDraws / 200);
     for (const auto &[name, count] : s.bad) {
         EXPECT_EQ(count, 0) << name << " of " << s.accepted;
     }
