@@ -103,7 +103,7 @@ class Source
             bench::give_sample(&codes, 0, sample);
         }
         const pm_q_t v_dc = fixed(kVdc_V / kBase.v_V, 28);
-        const obs_more_t more = {&codes, {sample, {0, 0}}, &v_dc, seen.v_zero, seen.v_zero_second};
+        const obs_more_t more = {&codes, {sample, {0, 0}}, &v_dc, seen.v_zero, seen.v_zero_second, {0, 0}};
         obs_in_t in = seen;
         in.more = &more;
         asked_[1] = asked_[0];

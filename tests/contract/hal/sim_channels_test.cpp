@@ -317,6 +317,7 @@ TEST(SimChannels, ASecondBridge)
             port.out.second[leg] =
                 static_cast<uint16_t>(port.out.compare[leg][0] - (leg == differs ? 400 : 0));
         }
+        port.out.second_legs = PM_LEGS_PWM;
         for (int k = 0; k < 20; ++k) {
             port.step();
         }
@@ -331,6 +332,7 @@ TEST(SimChannels, ASecondBridge)
             EXPECT_NEAR(truth.i_A[leg + 3], -truth.i_A[leg], 1e-9) << differs << ' ' << leg;
         }
         port.out.legs = PM_LEGS_OFF;
+        port.out.second_legs = PM_LEGS_OFF;
         for (int k = 0; k < 50; ++k) {
             port.step();
         }

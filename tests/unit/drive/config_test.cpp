@@ -945,7 +945,7 @@ Survey survey(int draws)
         }
         s.known["speed kp"] += c.speed.pi.kp <= 0 ? 1 : 0;
         s.known["speed ki"] += c.speed.pi.ki <= 0 ? 1 : 0;
-        if (c.open_winding.on) {
+        if (c.winding == WINDING_OPEN) {
             ++s.open;
             s.bad["k_p of the zero sequence"] += c.open_winding.k_p <= 0 ? 1 : 0;
             s.bad["k_r of the zero sequence"] += c.open_winding.k_r <= 0 ? 1 : 0;

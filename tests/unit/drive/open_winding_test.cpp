@@ -68,7 +68,7 @@ struct Bridges {
     open_winding_config_t zero;
     open_winding_t self = {};
     modulator_t modulator = {};
-    open_winding_out_t out = {};
+    bridges_t out = {};
     double v_dc;
 
     explicit Bridges(const drive_params_t &p, double link = kLink)

@@ -92,9 +92,11 @@ struct Sets {
         const two_sets_in_t in = {
             bench::ab(v),
             bench::ab(i / 4.0),
+            {0, 0},
             {fixed(std::cos(ahead_rad), 30), fixed(std::sin(ahead_rad), 30)},
             fixed(omega_pu, 28),
             v_dc,
+            0,
         };
         two_sets_step(&self, &c.two_sets, &modulator, &c.modulator, &in, &out);
     }

@@ -95,7 +95,9 @@ class Run
         const obs_more_t more = {&codes,
                                  {bench::ab(between_ / kBase.i_A), {0, 0}},
                                  nullptr,
-                                 bench::fixed(v_zero_V_ / kBase.v_V, 28)};
+                                 bench::fixed(v_zero_V_ / kBase.v_V, 28),
+                                 0,
+                                 {0, 0}};
         injection_in_t in = {};
         in.more = &more;
         in.i = now.i;
