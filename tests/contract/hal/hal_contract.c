@@ -228,6 +228,20 @@ static void check_channels(run_t *run)
         check_code(run, "no neutral voltage is mid-scale", more->v_neutral - MID_SCALE, -2000, 2000);
     }
 #endif
+#if PM_CARRIES(NEEDS_SECOND_SET)
+    if ((channels & NEEDS_SECOND_SET) != 0U) {
+        for (size_t leg = 0; leg < DRIVE_LEGS; leg++) {
+            check_code(run, "no current of a second set is mid-scale", more->i_second[leg] - MID_SCALE, -2000,
+                       2000);
+        }
+    }
+#endif
+#if PM_CARRIES(NEEDS_SECOND_SET) && PM_CARRIES(NEEDS_NEUTRAL)
+    if ((channels & NEEDS_SECOND_SET) != 0U && (channels & NEEDS_NEUTRAL) != 0U) {
+        check_code(run, "no neutral voltage of a second set is mid-scale", more->v_neutral_second - MID_SCALE,
+                   -2000, 2000);
+    }
+#endif
 #if PM_CARRIES(NEEDS_CAPTURES)
     check_code(run, "no edges with all legs low", more->captures, 0, 0);
 #endif

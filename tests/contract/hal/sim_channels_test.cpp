@@ -119,6 +119,48 @@ TEST(SimChannels, NeutralIsTheThirdHarmonicWithItsSign)
     EXPECT_GT(peak, 17.0);
 }
 
+// Those of the second bridge, each set having its own; 30 degrees on, three times that of the third harmonic.
+TEST(SimChannels, CurrentsAndNeutralOfASecondSet)
+{
+    plant_config_t config = machine();
+    const double psi_3_Wb = 0.02, omega_e = 300.0;
+    config.winding.sets = 2;
+    config.winding.emf[0] = {3, psi_3_Wb, 0.0};
+    Port still(config);
+    EXPECT_NE(hal_channels(&still.hal) & NEEDS_SECOND_SET, 0U);
+    ASSERT_TRUE(hal_bridge_arm(&still.hal));
+    unequal_duties(still.out);
+    const uint16_t second[3] = {4200, 4300, 4250};
+    std::copy(second, second + 3, still.out.second);
+    still.out.second_legs = PM_LEGS_PWM;
+    for (int k = 0; k < 20; ++k) {
+        still.step();
+    }
+    plant_truth_t truth;
+    plant_truth(still.plant.get(), &truth);
+    still.step();
+    for (int leg = 0; leg < 3; ++leg) {
+        EXPECT_NEAR(still.in.more.i_second[leg], current_code(truth.i_A[3 + leg]), 1.0) << leg;
+        EXPECT_GT(std::fabs(truth.i_A[3 + leg] - truth.i_A[leg]), 0.01) << "nothing to see";
+    }
+    still.out.second_legs = PM_LEGS_OFF;
+    for (int k = 0; k < 500; ++k) {
+        still.step();
+    }
+    EXPECT_NEAR(still.in.more.i_second[1], 32768, 1);
+    EXPECT_GT(std::abs(still.in.i_leg[1] - 32768), 10); // the first goes on
+
+    Port port(config);
+    plant_set_speed(port.plant.get(), omega_e / config.machine.pole_pairs);
+    port.step(); // from standstill
+    for (int k = 0; k < 100; ++k) {
+        plant_truth(port.plant.get(), &truth);
+        port.step();
+        const double v_V = -3 * omega_e * psi_3_Wb * std::cos(3 * truth.theta_e_rad);
+        EXPECT_NEAR(port.in.more.v_neutral_second - 32768.0, v_V / (2 * kFullScale_V) * 65536, 3.0) << k;
+    }
+}
+
 // Legs held against each other: their terminals are at the rails.
 TEST(SimChannels, TerminalsOfHeldLegs)
 {

@@ -75,6 +75,14 @@ TEST(HalContract, SimWithNeutralAndLinkCurrent)
     keeps_contract(config, 0, kAlways | NEEDS_NEUTRAL | NEEDS_DC_CURRENT);
 }
 
+TEST(HalContract, SimWithTwoSetsOfWindings)
+{
+    plant_config_t config = plants::ipm_1000();
+    config.winding.sets = 2;
+    config.sensor.v_zero_full_scale_V = 200;
+    keeps_contract(config, 0, kAlways | NEEDS_NEUTRAL | NEEDS_BRIDGES | NEEDS_SECOND_SET);
+}
+
 TEST(HalContract, SimWithoutWhatIsTaken)
 {
     keeps_contract(with_voltages(), ~0U, 0);

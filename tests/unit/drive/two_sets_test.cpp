@@ -633,9 +633,12 @@ TEST(TwoSetsDrive, WithoutControlTheSecondSetIsOpenButForAShortCircuit)
         drive_out_t out = {};
         out.legs = row.first;
         std::fill(out.second, out.second + DRIVE_LEGS, uint16_t{77});
+        x.drive().two_sets.regulator.d.integral = x.drive().two_sets.regulator.q.integral = 1000000;
         second_bridge_without(&x.drive(), &out);
         EXPECT_EQ(out.second_legs, row.second) << int{row.winding} << ' ' << row.stage;
         EXPECT_TRUE(std::all_of(out.second, out.second + DRIVE_LEGS, [](uint16_t on) { return on == 0; }));
+        EXPECT_EQ(x.drive().two_sets.regulator.d.integral, 0);
+        EXPECT_EQ(x.drive().two_sets.regulator.q.integral, 0);
     }
 }
 
