@@ -130,10 +130,10 @@ TEST(SimChannels, CurrentsAndNeutralOfASecondSet)
     EXPECT_NE(hal_channels(&still.hal) & NEEDS_SECOND_SET, 0U);
     ASSERT_TRUE(hal_bridge_arm(&still.hal));
     unequal_duties(still.out);
-    const uint16_t second[3] = {4200, 4300, 4250};
+    const uint16_t second[3] = {5400, 4300, 3100};
     std::copy(second, second + 3, still.out.second);
     still.out.second_legs = PM_LEGS_PWM;
-    for (int k = 0; k < 20; ++k) {
+    for (int k = 0; k < 200; ++k) {
         still.step();
     }
     plant_truth_t truth;
@@ -141,14 +141,14 @@ TEST(SimChannels, CurrentsAndNeutralOfASecondSet)
     still.step();
     for (int leg = 0; leg < 3; ++leg) {
         EXPECT_NEAR(still.in.more.i_second[leg], current_code(truth.i_A[3 + leg]), 1.0) << leg;
-        EXPECT_GT(std::fabs(truth.i_A[3 + leg] - truth.i_A[leg]), 0.01) << "nothing to see";
     }
+    EXPECT_GT(std::fabs(truth.i_A[3] - truth.i_A[0]), 0.1) << "nothing to see";
     still.out.second_legs = PM_LEGS_OFF;
     for (int k = 0; k < 500; ++k) {
         still.step();
     }
-    EXPECT_NEAR(still.in.more.i_second[1], 32768, 1);
-    EXPECT_GT(std::abs(still.in.i_leg[1] - 32768), 10); // the first goes on
+    EXPECT_NEAR(still.in.more.i_second[0], 32768, 1);
+    EXPECT_GT(std::abs(still.in.i_leg[0] - 32768), 100); // the first goes on
 
     Port port(config);
     plant_set_speed(port.plant.get(), omega_e / config.machine.pole_pairs);
