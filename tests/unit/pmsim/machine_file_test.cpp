@@ -159,10 +159,16 @@ TEST_P(DriveFiles, DriveParametersDescribeTheMachine)
     const Incremental zero = inductances(core, 0.0, 1e-6);
     EXPECT_EQ(setup.params->pole_pairs, m.pole_pairs);
     EXPECT_NEAR(si(DRIVE_PARAM_psi_m), m.psi_m_Wb, rounding * m.psi_m_Wb);
-    EXPECT_NEAR(si(DRIVE_PARAM_R_s), m.R_s_ohm + setup.plant.inverter.r_on_ohm, rounding * m.R_s_ohm);
+    const plant_winding_t &winding = setup.plant.winding;
+    const int switches = winding.connection == PLANT_OPEN ? 2 : 1;
+    EXPECT_NEAR(si(DRIVE_PARAM_R_s), m.R_s_ohm + switches * setup.plant.inverter.r_on_ohm,
+                rounding * m.R_s_ohm);
     EXPECT_NEAR(si(DRIVE_PARAM_J), setup.plant.mech.J_kgm2, rounding * setup.plant.mech.J_kgm2);
-    EXPECT_NEAR(si(DRIVE_PARAM_L_d), zero.L_d, rounding * zero.L_d);
-    EXPECT_NEAR(si(DRIVE_PARAM_L_q), zero.L_q, rounding * zero.L_q);
+    EXPECT_NEAR(si(DRIVE_PARAM_M_d), winding.M_d_H,
+                rounding * winding.M_d_H); // of two sets, which are one machine of L + M
+    EXPECT_NEAR(si(DRIVE_PARAM_M_q), winding.M_q_H, rounding * winding.M_q_H);
+    EXPECT_NEAR(si(DRIVE_PARAM_L_d), zero.L_d + winding.M_d_H, rounding * zero.L_d);
+    EXPECT_NEAR(si(DRIVE_PARAM_L_q), zero.L_q + winding.M_q_H, rounding * zero.L_q);
     EXPECT_NEAR(si(DRIVE_PARAM_i_rated), setup.rated.i_rated_A, rounding * setup.rated.i_rated_A);
     EXPECT_NEAR(si(DRIVE_PARAM_v_dc_nominal), setup.rated.v_dc_V, rounding * setup.rated.v_dc_V);
 }
@@ -185,9 +191,10 @@ TEST_P(DriveFiles, RatedInductancesAreThoseOfTheCore)
     const Core core(setup.plant.machine);
     const double i_q = setup.rated.i_rated_A;
     const Incremental rated = inductances(core, mtpa_i_d(*setup.params, i_q), i_q);
-    EXPECT_NEAR(si(DRIVE_PARAM_L_q_rated), rated.L_q_apparent, rounding * rated.L_q);
-    EXPECT_NEAR(si(DRIVE_PARAM_L_dh_rated), rated.L_d, rounding * rated.L_d);
-    EXPECT_NEAR(si(DRIVE_PARAM_L_qh_rated), rated.L_q, rounding * rated.L_q);
+    const double M_d = setup.plant.winding.M_d_H, M_q = setup.plant.winding.M_q_H;
+    EXPECT_NEAR(si(DRIVE_PARAM_L_q_rated), rated.L_q_apparent + M_q, rounding * rated.L_q);
+    EXPECT_NEAR(si(DRIVE_PARAM_L_dh_rated), rated.L_d + M_d, rounding * rated.L_d);
+    EXPECT_NEAR(si(DRIVE_PARAM_L_qh_rated), rated.L_q + M_q, rounding * rated.L_q);
     EXPECT_NEAR(si(DRIVE_PARAM_L_dqh_rated), rated.L_dq, 0.005 * rated.L_q);
     const Incremental half = inductances(core, mtpa_i_d(*setup.params, 0.5 * i_q), 0.5 * i_q);
     EXPECT_NEAR(si(DRIVE_PARAM_cross_half), half.L_dq / half.L_q, 0.002);
