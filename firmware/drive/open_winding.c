@@ -21,7 +21,7 @@ pm_q_t open_winding_signal(open_winding_t *self, const open_winding_config_t *co
     if (config->held) {
         return acted;
     }
-    return acted - pm_mul(config->R, self->i + before) - pm_mul_sat(config->L, self->i - before);
+    return acted - pm_mul(config->R, self->i + before) - bridges_induced(config->L, self->i - before);
 }
 
 /* Turned by its step; the pair is a signal and what lags it by a quarter of its cycle. */

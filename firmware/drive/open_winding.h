@@ -41,7 +41,7 @@ typedef struct {
     bool held;       /* zero_current 1 */
     pm_q_t k_p, k_r; /* per-unit */
     pm_q_t R;        /* half of it, per-unit */
-    pm_q_t L;        /* L_0 / T, per-unit */
+    int32_t L;       /* L_0 / T: bridges.h */
     pm_q_t turn;     /* 3 T w_base, rad at a speed of one */
     pm_q_t lead;     /* 3 (3/2 T + 1 / (2 pi f)) w_base, the same */
 } open_winding_config_t;

@@ -51,7 +51,7 @@ PM_APART void make_open_winding(maker_t *m, open_winding_config_t *c)
     c->k_p = gain(m, k_p, Q_BITS, DRIVE_PARAM_L_0);
     c->k_r = gain(m, mul3(k_p, pm_num_div(bandwidth, pm_num(8)), m->base.t_s), Q_BITS, DRIVE_PARAM_L_0);
     c->R = fixed(m, pm_num_div(si(m, DRIVE_PARAM_R_s), m->impedance), Q_BITS - 1, DRIVE_PARAM_R_s);
-    c->L = fixed(m, pm_num_div(si(m, DRIVE_PARAM_L_0), pm_num_mul(m->impedance, m->base.t_s)), Q_BITS,
+    c->L = fixed(m, pm_num_div(si(m, DRIVE_PARAM_L_0), pm_num_mul(m->impedance, m->base.t_s)), BRIDGES_L_BITS,
                  DRIVE_PARAM_L_0);
     c->turn = fixed(m, pm_num_mul(three, m->base.t_s), Q_BITS, DRIVE_PARAM_speed_trip);
     c->lead = fixed(m, pm_num_mul(three, delay), Q_BITS, DRIVE_PARAM_speed_trip);

@@ -41,7 +41,7 @@ pm_ab_t two_sets_measure(two_sets_t *self, const uint16_t code[PM_LEGS], pm_ab_t
 
 static pm_q_t unexplained(const two_sets_config_t *config, pm_q_t v, pm_q_t now, pm_q_t before)
 {
-    return v - pm_mul(config->R, now + before) - pm_mul_sat(config->L, now - before);
+    return v - pm_mul(config->R, now + before) - bridges_induced(config->L, now - before);
 }
 
 pm_ab_t two_sets_unexplained(const two_sets_t *self, const two_sets_config_t *config)

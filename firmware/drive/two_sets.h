@@ -38,7 +38,8 @@ extern "C" {
 
 typedef struct {
     bool between;                      /* neutral_channel 1 */
-    pm_q_t R, L;                       /* half of R; (L_q - M_q) / T of a set; per-unit */
+    pm_q_t R;                          /* half of it, per-unit */
+    int32_t L;                         /* (L_q - M_q) / T of a set: bridges.h */
     synchronous_pi_config_t regulator; /* of z, ... */
     synchronous_pi_config_t slowed;    /* ... while a carrier sets the sets apart: an eighth as fast */
 } two_sets_config_t;

@@ -70,8 +70,8 @@ PM_APART void make_two_sets(maker_t *m, two_sets_config_t *c)
     synchronous_pi_slow_down(&c->slowed, PM_UNIT_MAX / 8);
     m->result = of_z.result;
     c->R = fixed(m, pm_num_div(si(m, DRIVE_PARAM_R_s), m->impedance), Q_BITS - 1, DRIVE_PARAM_R_s);
-    c->L = fixed(m, pm_num_div(si(&of_z, DRIVE_PARAM_L_q), pm_num_mul(m->impedance, m->base.t_s)), Q_BITS,
-                 DRIVE_PARAM_L_q);
+    c->L = fixed(m, pm_num_div(si(&of_z, DRIVE_PARAM_L_q), pm_num_mul(m->impedance, m->base.t_s)),
+                 BRIDGES_L_BITS, DRIVE_PARAM_L_q);
 }
 
 #endif

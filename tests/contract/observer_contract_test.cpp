@@ -55,6 +55,7 @@ struct Seen : obs_in_t {
     pm_ab_t between, behind, ahead;
     pm_q_t v_zero;        // of the star point,
     pm_q_t v_zero_second; // and of that of a second set
+    pm_ab_t apart;        // half of what the first set has more current than it
 };
 
 constexpr double kVdc_V = 300;
@@ -63,6 +64,7 @@ constexpr uint16_t kCounts = 8500; // of half a period
 // Per-unit.
 struct Carrier {
     Complex v = 0, split = 0;
+    Complex apart = 0; // of a second set, beyond v
 };
 
 class Source
@@ -103,7 +105,8 @@ class Source
             bench::give_sample(&codes, 0, sample);
         }
         const pm_q_t v_dc = fixed(kVdc_V / kBase.v_V, 28);
-        const obs_more_t more = {&codes, {sample, {0, 0}}, &v_dc, seen.v_zero, seen.v_zero_second, {0, 0}};
+        const obs_more_t more = {&codes,      {sample, {0, 0}},   &v_dc,
+                                 seen.v_zero, seen.v_zero_second, seen.apart};
         obs_in_t in = seen;
         in.more = &more;
         asked_[1] = asked_[0];
@@ -182,7 +185,8 @@ class Injection : public Source
     }
     Carrier carrier() override
     {
-        return {bench::complex(carrier_.v) + made_, bench::complex(carrier_.split)};
+        return {bench::complex(carrier_.v) + made_, bench::complex(carrier_.split),
+                bench::complex(carrier_.apart)};
     }
 
   protected:
@@ -260,7 +264,7 @@ class Drive
         const Complex i = kJ * i_q_A;
         const Complex psi = {kMachine.psi_m_Wb, kMachine.L_q0_H * i_q_A};
         v_dq_ = kMachine.R_ohm * i + kJ * omega_ * psi;
-        psi_ = psi * std::polar(1.0, theta_);
+        psi_ = second_ = psi * std::polar(1.0, theta_);
         applying_ = commanded_ = v_dq_ * std::polar(1.0, theta_ + omega_ * kBase.period_s / 2);
         commanded_ *= std::polar(1.0, omega_ * kBase.period_s);
         i_past_ = current();
@@ -277,6 +281,7 @@ class Drive
         const Carrier carrier = source_.carrier();
         commanded_ = v_dq_ * std::polar(1.0, theta_ + turn) + carrier.v * kBase.v_V;
         split_commanded_ = carrier.split * kBase.v_V;
+        apart_commanded_ = carrier.apart * kBase.v_V;
         return in;
     }
 
@@ -314,8 +319,9 @@ class Drive
 
     Seen seen() const
     {
-        const Complex i = current() / kBase.i_A;
+        const Complex i = 0.5 * (current() + current(second_, theta_)) / kBase.i_A;
         Seen in = {};
+        in.apart = bench::ab(0.5 * (current() - current(second_, theta_)) / kBase.i_A);
         in.between = bench::ab(i_between_ / kBase.i_A);
         in.behind = bench::ab(i_behind_ / kBase.i_A);
         in.ahead = bench::ab(at_zero_voltage(-source_.within().second) / kBase.i_A);
@@ -323,7 +329,7 @@ class Drive
         const Complex i_dq_A = i * kBase.i_A * std::polar(1.0, -theta_);
         const double e_0 = bench::star_point_V(theta_, omega_, i_dq_A);
         const double e_02 = bench::star_point_V(theta_ - bench::kSecondSet_rad, omega_, i_dq_A);
-        in.v_zero_second = fixed(e_02 / kBase.v_V, 28);
+        in.v_zero_second = fixed((source_.behind_filter() ? v_zero_second_ : e_02) / kBase.v_V, 28);
         in.v_zero = fixed((source_.behind_filter() ? v_zero_ : e_0) / kBase.v_V, 28);
         in.i = bench::ab(i);
         in.dir = bench::direction(theta_ - error_);
@@ -368,17 +374,36 @@ class Drive
             psi_ = before + t * (v - kMachine.R_ohm * 0.5 * (i + current()));
             const double v_0 = (bench::kNeutral.flux_Wb(current(), theta_) - psi_0) / t;
             v_zero_ = bench::kNeutral.filtered(v_zero_, v_0, t);
+            run_second(v + apart_, t);
         }
         v_mean_ = applying_;
+        apart_ = apart_commanded_;
         applying_ = commanded_;
         split_ = split_commanded_;
+    }
+
+    // The second set, 30 degrees on, without mutual inductance; theta_ is that of the end of the step.
+    void run_second(Complex v, double t)
+    {
+        const double before_rad = theta_ - omega_ * t;
+        const Complex before = second_;
+        const Complex i = current(second_, before_rad);
+        second_ += t * (v - kMachine.R_ohm * i);
+        second_ = before + t * (v - kMachine.R_ohm * 0.5 * (i + current(second_, theta_)));
+        const auto flux_Wb = [](Complex i_A, double theta) {
+            const Complex own = i_A * std::polar(1.0, -bench::kSecondSet_rad);
+            return bench::kNeutral.flux_Wb(own, theta - bench::kSecondSet_rad);
+        };
+        const double v_0 = (flux_Wb(current(second_, theta_), theta_) - flux_Wb(i, before_rad)) / t;
+        v_zero_second_ = bench::kNeutral.filtered(v_zero_second_, v_0, t);
     }
 
     Source &source_;
     double omega_, error_, theta_;
     Complex v_dq_, psi_, applying_, commanded_, v_mean_ = 0, i_past_ = 0;
     Complex split_ = 0, split_commanded_ = 0, i_between_ = 0, i_behind_ = 0;
-    double v_zero_ = 0;
+    Complex second_, apart_ = 0, apart_commanded_ = 0;
+    double v_zero_ = 0, v_zero_second_ = 0;
 };
 
 std::vector<obs_out_t> replay(const Entry &e, const std::vector<Seen> &in)
@@ -601,6 +626,7 @@ TEST_P(ObserverContract, CornersOfTheConvertersAreHarmless)
             }
             x.v_zero = fixed(end(1), 28);
             x.v_zero_second = fixed(end(1), 28);
+            x.apart = bench::ab({end(4.0 / 3), end(4.0 / 3)});
         }
         source->reset(in[0]);
         for (int k = 0; k < 12; ++k) {

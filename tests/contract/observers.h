@@ -116,6 +116,10 @@ inline std::vector<InjectionCase> injection_cases(const Machine &m = kIpmLinear,
         p.start_method = 1;
         p.regulator = (traits & SOURCE_IN_REFERENCE) != 0 ? static_cast<int32_t>(REGULATOR_deadbeat) : 0;
         p.neutral_filter = static_cast<int32_t>(std::lround(kNeutral.filter_s * 1e9));
+        if (id == INJECTION_zero_pair_anti_rotating || id == INJECTION_zero_pair_rotating) {
+            p.winding = WINDING_TWO_SETS; // without mutual inductance
+            p.start_method = 3;
+        }
         drive_config_t config = {};
         const drive_result_t result = drive_configure(&config, &p, PM_CHANNELS);
         injection_config_t none = {};
