@@ -891,7 +891,7 @@ Names must_be_positive(const drive_config_t &c)
         x.push_back({"second harmonic k_p", c.position.second_harmonic.k_p});
     }
     if (c.position.mismatch.id != MISMATCH_OFF) {
-        x.push_back({"mismatch samples", c.position.mismatch.samples - 9});
+        x.push_back({"mismatch samples", c.position.mismatch.samples - 8}); // 100 Hz, steps of 1.1 ms
         x.push_back({"mismatch current", c.position.mismatch.i});
     }
     if (c.injection) {

@@ -28,7 +28,8 @@ drive_params_t with(int32_t injection)
 bool at_neutral(int32_t id)
 {
     return id == INJECTION_zero_anti_rotating || id == INJECTION_zero_rotating ||
-           id == INJECTION_zero_pulsating;
+           id == INJECTION_zero_pulsating || id == INJECTION_zero_pair_anti_rotating ||
+           id == INJECTION_zero_pair_rotating;
 }
 
 drive_config_t configure(const drive_params_t &p)
