@@ -36,9 +36,7 @@ static pm_q_t apart(const drive_t *drive)
                         mismatch_is_apart(&position->window, &drive->config.position.mismatch);
     return wanted ? position_injected(position) : 0;
 }
-#endif
 
-#if PM_HAS(two_sets)
 pm_ab_t second_bridge_seen(const drive_t *drive)
 {
     const drive_config_t *c = &drive->config;

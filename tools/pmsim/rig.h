@@ -73,11 +73,11 @@ typedef struct {
     double v_alpha_V, v_beta_V; /* the drive's idea of the voltage it applies */
     double v_dc_hat_V;
     double weight, quality;
-    bool settles;  /* injection, on the position that the search has found */
-    bool dragged;  /* align or open loop: the vector is imposed */
-    double margin; /* of what the start has found, in sigma */
-    int refusal;   /* why a procedure of this start has refused, PM_FAILED_...; 0: none has */
-    bool driven;   /* any leg, in the output of this period */
+    bool settles;         /* injection, on the position that the search has found */
+    bool dragged;         /* align or open loop: the vector is imposed */
+    double margin;        /* of what the start has found, in sigma */
+    int refusal;          /* why a procedure of this start has refused, PM_FAILED_...; 0: none has */
+    bool driven;          /* any leg, in the output of this period */
     bool asks_identified; /* by the caller: the next one is wanted; it costs as much as all the others */
     rig_identified_t identified;
 } rig_sample_t;

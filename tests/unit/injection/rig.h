@@ -92,12 +92,9 @@ class Run
         const double ahead = theta - error + 1.5 * omega * kBase.period_s;
         pm_measure_t codes = {};
         codes.sampled = sampled && given.size() > 1 && given[given.size() - 2].sample_at[0] != 0 ? 1 : 0;
-        const obs_more_t more = {&codes,
-                                 {bench::ab(between_ / kBase.i_A), {0, 0}},
-                                 nullptr,
-                                 bench::fixed(v_zero_V_ / kBase.v_V, 28),
-                                 0,
-                                 {0, 0}};
+        const obs_more_t more = {&codes,  {bench::ab(between_ / kBase.i_A), {0, 0}},
+                                 nullptr, bench::fixed(v_zero_V_ / kBase.v_V, 28),
+                                 0,       {0, 0}};
         injection_in_t in = {};
         in.more = &more;
         in.i = now.i;
