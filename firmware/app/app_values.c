@@ -15,8 +15,8 @@ _Static_assert(TRACE_SHIFT == PM_Q_BITS - 14, "of twice the base");
 int32_t app_in_units(pm_q_t x, pm_num_t base, int exponent)
 {
     int32_t value;
-    const pm_num_t si = pm_num_mul(pm_num_from_fixed(x, PM_Q_BITS), base);
-    (void)pm_num_to_fixed(pm_num_mul(si, pm_num_dec(1, exponent)), 0, &value);
+    const pm_num_t in_si = pm_num_mul(pm_num_from_fixed(x, PM_Q_BITS), base);
+    (void)pm_num_to_fixed(pm_num_mul(in_si, pm_num_dec(1, exponent)), 0, &value);
     return value;
 }
 

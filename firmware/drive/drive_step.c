@@ -298,10 +298,11 @@ void drive_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
         without_control(drive, in, out);
     } else {
         PM_IF_MEASURED(const obs_more_t more = measure_more(drive, in);)
-        const pm_ab_t *v = &drive->v_acting;
 #if PM_HAS(two_sets)
         const pm_ab_t of_first = second_bridge_seen(drive);
-        v = &of_first;
+        const pm_ab_t *v = &of_first;
+#else
+        const pm_ab_t *v = &drive->v_acting;
 #endif
         const position_in_t seen = {
             .v = v, .i = drive->i_ab, .ahead = &drive->ahead, PM_IF_MEASURED(.more = &more)};
