@@ -37,7 +37,7 @@
  * The first MISMATCH_IN_PHASE windows are those of the q-axis, which say k_q. The next tell k_a, and from MISMATCH_TRACKS on
  * what k_a changes by moves k_q as an L_q and M_q that change alike: by (L_q + M_q) / (L_q - M_q).
  *
- * Each control period: 49 instructions and a call. At 1 kHz: 30 when off, at most 161 otherwise. Range:
+ * Each control period: 49 instructions and a call, 57 in a program that has two sets of windings. At 1 kHz: 30 when off, at most 161 otherwise. Range:
  * |k| <= 1 per base current. Tests: tests/unit/observers/mismatch_test.cpp,
  * tests/scenario/mismatch_injection.yaml. */
 #ifndef OBSERVERS_MISMATCH_H
