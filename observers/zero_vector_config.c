@@ -54,7 +54,7 @@ void make_zero_vector(maker_t *m, zero_vector_config_t *c)
 {
     const pm_num_t dead = si(m, DRIVE_PARAM_dead_time);
     make_emf(m, &c->emf);
-    c->emf.k_filter = pm_min(2 * c->emf.k_filter, PM_FRAC(0.49)); /* a step in every second period */
+    c->emf.k_filter = 2 * pm_min(c->emf.k_filter, PM_FRAC(0.245)); /* a step in every second period */
     c->emf.resistance.k = 0;
     const pm_num_t saliency = pm_num_div(si(m, DRIVE_PARAM_L_q), si(m, DRIVE_PARAM_L_d));
     c->saliency = fixed(m, saliency, Q_BITS, DRIVE_PARAM_L_d);

@@ -134,7 +134,7 @@ static pm_q_t pushed(maker_t *m, pm_unit_t share)
 /* Of three currents that flow alike, half of i_max each. */
 static pm_q_t most_zero(maker_t *m)
 {
-    return per_unit(m, DRIVE_PARAM_i_max, m->base.i) / 2 * 3;
+    return pm_min(per_unit(m, DRIVE_PARAM_i_max, m->base.i), PM_Q_MAX / 2) / 2 * 3;
 }
 #endif
 
