@@ -55,7 +55,7 @@ void second_bridge_control(drive_t *drive, const position_out_t *frame, pm_ab_t 
 {
     const drive_config_t *c = &drive->config;
     const pm_q_t v_dc = drive->status.v_dc;
-    bridges_t bridges;
+    bridges_t bridges = {.v = {0, 0}};
     (void)frame;
 #if PM_HAS(two_sets)
     if (c->winding == (uint8_t)WINDING_TWO_SETS) {
