@@ -69,7 +69,12 @@ void open_winding_step(open_winding_t *self, const open_winding_config_t *config
 void open_winding_slow(open_winding_t *self, const open_winding_config_t *config, pm_q_t omega)
 {
     self->turn = pm_dir((pm_angle_t)pm_rad_to_angle(pm_mul(config->turn, omega)));
-    self->lead = pm_dir((pm_angle_t)pm_rad_to_angle(pm_mul(config->lead, omega)));
+    /* of the delay, and of the circuit under k_p that acts with it */
+    const pm_angle_t delay = (pm_angle_t)pm_rad_to_angle(pm_mul(config->delay, omega));
+    const pm_dir_t late = pm_dir(delay);
+    const pm_q_t turns = pm_mul_sat(config->ratio, omega); /* 3 omega over 2 pi f */
+    const pm_angle_t lag = pm_atan2(turns / 8 - pm_unit(PM_ONE / 8, late.sin), pm_unit(PM_ONE / 8, late.cos));
+    self->lead = pm_dir(delay + lag);
 }
 
 #endif

@@ -1,23 +1,31 @@
 /* A winding with both ends on a bridge: two bridges on one link and one carrier (METHODS.md 7.3, rows 89 to 92).
  *
- *   v   = v_1 - v_2,   v_1 = v / sqrt(3) e^{j 30},   v_2 = v / sqrt(3) e^{j 150}
+ *   v   = v_1 - v_2
+ *   v_1 = v / sqrt(3) e^{j 30}
+ *   v_2 = v / sqrt(3) e^{j 150}
  * Both have the same legs in another order, so that at each instant as many are high on one side as on the other, and what all
  * phases have in common, v_0, is none; |v| goes up to v_dc, sqrt(3) times that of a star. v_0 is made on purpose by half of it on
  * the legs of one bridge and minus half on those of the other. What dead time takes of a leg is given back by the leg's own
  * current, i + i_0 on one side and -(i + i_0) on the other: of unlike phases of the current it would make a v_0 as large as the
  * third harmonic at low speed.
  *
- *   v_0 = R i_0 + L_0 p i_0 + e_0,   e_0 = -3 omega psi_3 sin 3 theta,   i_0 = (i_A + i_B + i_C) / 3
+ *   v_0 = R i_0 + L_0 p i_0 + e_0
+ *   e_0 = -3 omega psi_3 sin 3 theta
+ *   i_0 = (i_A + i_B + i_C) / 3
  * zero_current 1   i_0 is held at zero, and v_0 is e_0, whatever R and L_0 are (row 92):
  *     v_0 = -k_p i_0 + y cos lead - q sin lead
- *   y, q turn with 3 omega T, y grows by -k_r i_0; k_p = 2 pi f L_0, f = current_bandwidth or a tenth of f_pwm, k_r = k_p pi f T / 4.
- *   lead = 3 omega (3/2 T + 1 / (2 pi f)), delay and lag of the current. Within a quarter of v_dc
+ *   y, q turn with 3 omega T, and y grows by -k_r i_0. With f = current_bandwidth or a tenth of f_pwm, whichever is less,
+ *     k_p = 2 pi f L_0
+ *     k_r = k_p pi f T / 4
+ *     d = 9/2 omega T                                                    delay of the voltage
+ *     lead = d + atan2(3 omega / (2 pi f) - sin d, cos d)                and lag of L_0 under k_p
+ *   v_0 stays within a quarter of v_dc.
  * zero_current 0   v_0 is none, i_0 flows, and tells it (row 91):
  *     e_0 = -R (i_0[k] + i_0[k-1]) / 2 - L_0 (i_0[k] - i_0[k-1]) / T
  *   R 10 % off is 1 degree at a fifth of rated speed
  * Either is the mean over [k-1, k): what third.h takes as the star point's voltage behind an RC of half a period.
  *
- * Currents of the first bridge's legs by sensors in the lines. i_0 counts in what each leg carries (i_trip), and where half of
+ * Currents of the first bridge's legs by sensors in the lines. i_0 counts in what each leg carries (i_trip) and in what heats the windings, and where half of
  * i_max of it flows for 2 ms that is a fault, SENSOR_SUM. Not with pulses, flying start, identification, regulators of switch states,
  * block commutation or a carrier that needs a star: refused.
  *
@@ -43,7 +51,8 @@ typedef struct {
     pm_q_t R;        /* half of it, per-unit */
     int32_t L;       /* L_0 / T: bridges.h */
     pm_q_t turn;     /* 3 T w_base, rad at a speed of one */
-    pm_q_t lead;     /* 3 (3/2 T + 1 / (2 pi f)) w_base, the same */
+    pm_q_t delay;    /* 9/2 T w_base, the same */
+    pm_q_t ratio;    /* 3 w_base / (2 pi f) */
 } open_winding_config_t;
 
 typedef struct {

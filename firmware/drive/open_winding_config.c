@@ -46,15 +46,14 @@ PM_APART void make_open_winding(maker_t *m, open_winding_config_t *c)
     const pm_num_t bandwidth = pm_num_mul(two_pi, f);
     const pm_num_t k_p = pm_num_div(pm_num_mul(bandwidth, si(m, DRIVE_PARAM_L_0)), m->impedance);
     const pm_num_t three = pm_num_mul(pm_num(3), m->base.omega);
-    const pm_num_t delay =
-        pm_num_add(pm_num_mul(pm_num_ratio(3, 2), m->base.t_s), pm_num_div(pm_num(1), bandwidth));
     c->k_p = gain(m, k_p, Q_BITS, DRIVE_PARAM_L_0);
     c->k_r = gain(m, mul3(k_p, pm_num_div(bandwidth, pm_num(8)), m->base.t_s), Q_BITS, DRIVE_PARAM_L_0);
     c->R = fixed(m, pm_num_div(si(m, DRIVE_PARAM_R_s), m->impedance), Q_BITS - 1, DRIVE_PARAM_R_s);
     c->L = fixed(m, pm_num_div(si(m, DRIVE_PARAM_L_0), pm_num_mul(m->impedance, m->base.t_s)), BRIDGES_L_BITS,
                  DRIVE_PARAM_L_0);
     c->turn = fixed(m, pm_num_mul(three, m->base.t_s), Q_BITS, DRIVE_PARAM_speed_trip);
-    c->lead = fixed(m, pm_num_mul(three, delay), Q_BITS, DRIVE_PARAM_speed_trip);
+    c->delay = fixed(m, mul3(three, pm_num_ratio(3, 2), m->base.t_s), Q_BITS, DRIVE_PARAM_speed_trip);
+    c->ratio = fixed(m, least(pm_num_div(three, bandwidth), pm_num(7)), Q_BITS, DRIVE_PARAM_speed_trip);
 }
 
 #endif

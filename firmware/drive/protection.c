@@ -161,11 +161,26 @@ void protection_slow(drive_t *drive)
     }
 }
 
+/* Square of the amplitude that heats as much as all phases do. */
+static pm_q_t heating(const drive_t *drive)
+{
+    const pm_ab_t i = drive->i_ab;
+    pm_q_t square = pm_mul(i.alpha, i.alpha) + pm_mul(i.beta, i.beta);
+#if PM_HAS(open_winding)
+    const pm_q_t zero = drive->open_winding.i;
+    square += 2 * pm_mul(zero, zero);
+#endif
+#if PM_HAS(two_sets)
+    const pm_ab_t z = drive->two_sets.z;
+    square += pm_mul(z.alpha, z.alpha) + pm_mul(z.beta, z.beta);
+#endif
+    return square;
+}
+
 void protection_heat(drive_t *drive)
 {
     const protection_config_t *c = &drive->config.protection;
-    const pm_ab_t i = drive->i_ab;
-    const pm_q_t square = is_live(drive) ? pm_mul(i.alpha, i.alpha) + pm_mul(i.beta, i.beta) : 0;
+    const pm_q_t square = is_live(drive) ? heating(drive) : 0;
     if (pm_lp1(&drive->heat, square, c->k_heat) > c->heat_max) {
         drive_trip(drive, DRIVE_FAULT_OVERLOAD);
     }

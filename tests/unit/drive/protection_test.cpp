@@ -598,6 +598,27 @@ TEST(Protection, WindingsAreOverloadedInEveryModeAfterTheirTime)
     }
 }
 
+// R i^2 of all phases: a zero-sequence current i_0 counts as sqrt(2) i_0 of the vector, what two sets have apart as itself.
+TEST(Protection, CurrentsBesideTheVectorHeatToo)
+{
+    const auto square = [](const std::function<void(drive_t &)> &change) {
+        Drive x(direct::params());
+        x.d.state = DRIVE_RUNNING;
+        x.d.stage = STAGE_VECTOR;
+        change(x.d);
+        protection_heat(&x.d);
+        return x.d.heat;
+    };
+    const auto vector = [](double share) {
+        return [share](drive_t &d) { d.i_ab.alpha = static_cast<pm_q_t>(share * PM_ONE); };
+    };
+    const pm_q_t zero = square([](drive_t &d) { d.open_winding.i = PM_ONE / 4; });
+    const pm_q_t apart = square([](drive_t &d) { d.two_sets.z = {PM_ONE / 4, PM_ONE / 8}; });
+    EXPECT_NEAR(zero, square(vector(std::sqrt(2.0) / 4)), 2);
+    EXPECT_NEAR(apart, square(vector(std::hypot(1.0 / 4, 1.0 / 8))), 2);
+    EXPECT_GT(zero, 0);
+}
+
 // The same of the bridge, which another board bears better or worse: i_bridge, t_bridge.
 TEST(Protection, TheBridgeIsOverloadedAfterItsTime)
 {
