@@ -5,7 +5,9 @@
  * zero sequence is that of the first with the other sign, but for the term with kappa, which has the same: the difference holds twice
  * the answer and none of kappa. With psi_0 of a set as in zero_sequence.h, u_2 = -j c i_2 e^{j 2 theta} in axes of the machine, so
  * that of half the difference
- *   x = (x_1 - x_2) / 2,   u = c i e^{j 2 theta^},   i = (i_1 + j i_2) / 2
+ *   x = (x_1 - x_2) / 2
+ *   u = c i e^{j 2 theta^}
+ *   i = (i_1 + j i_2) / 2
  * and all else is the measured form of zero_sequence.h: it needs neither the mutual inductance of the sets nor kappa, of which M
  * leaves some in the difference. The told form is not offered: the start aligns the rotor.
  * Half of the carrier is in the difference of the sets, against L - M: its current and torque ripple there. The control of the

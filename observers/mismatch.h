@@ -33,7 +33,9 @@
  *
  * Two sets of windings (METHODS.md 7.2.4.3, row 87): a current that one set has more and the other less makes no torque, and shows in
  * the angle that the first set alone sees (drive/two_sets.h)
- *   k_a = dL' / psi_a,   L' = L_q - M_q of a set, where i_q shows dL_q + dM_q
+ *   k_a = (dL_q - dM_q) / psi_a
+ * with L_q of one set, where i_q shows dL_q + dM_q.
+ *
  * The first MISMATCH_IN_PHASE windows are those of the q-axis, which say k_q. The next tell k_a, and from MISMATCH_TRACKS on
  * what k_a changes by moves k_q as an L_q and M_q that change alike: by (L_q + M_q) / (L_q - M_q).
  *

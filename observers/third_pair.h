@@ -1,7 +1,8 @@
 /* Third harmonic of two sets of windings by its EMFs (METHODS.md 11.5.2, 7.2.5; rows 131 and 88).
  *
  * The second set lies 30 degrees on, its third harmonic a quarter of a cycle:
- *   v_01 = -3 omega psi_3 sin 3 theta,   v_02 = 3 omega psi_3 cos 3 theta
+ *   v_01 = -3 omega psi_3 sin 3 theta
+ *   v_02 = 3 omega psi_3 cos 3 theta
  * so the pair of third.h is there without an integrator or a filter, y = v_01 and q = v_02, at any instant. A ninth harmonic has the
  * other sense, and adds
  *   (psi_9 / psi_3) sin 12 theta                   rad, before the loop

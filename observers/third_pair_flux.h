@@ -1,8 +1,10 @@
 /* Third harmonic of two sets of windings by its fluxes (METHODS.md 11.5.1, row 130).
  *
- *   psi_01 = psi_3 cos 3 theta,   psi_02 = psi_3 sin 3 theta
- *   psi'  += T (v_0 - w_c psi'),   w_c = g 3 |omega|,   g = third_drift
- *   psi_01 + j psi_02 = (psi'_1 + j psi'_2) (1 - j g sgn omega)
+ *   psi_01 = psi_3 cos 3 theta
+ *   psi_02 = psi_3 sin 3 theta
+ *   w_c = third_drift 3 |omega|
+ *   psi' += T (v_0 - w_c psi')
+ *   psi_01 + j psi_02 = (psi'_1 + j psi'_2) (1 - j third_drift sgn omega)
  * The last line is exact at 3 omega: as there are both, no speed is differentiated and nothing is expected. The pair of third.h is
  * q = 3 omega psi_01, y = -3 omega psi_02. Against third_pair.h the noise is less and the ninth harmonic a third,
  *   -(psi_9 / 3 psi_3) sin 12 theta
@@ -20,7 +22,7 @@ extern "C" {
 
 typedef struct {
     third_config_t third;
-    pm_q_t g;
+    pm_q_t g; /* third_drift */
 } third_pair_flux_config_t;
 
 typedef struct {

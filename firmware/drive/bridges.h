@@ -3,6 +3,11 @@
 #define DRIVE_BRIDGES_H
 
 #include "firmware/control/modulator.h"
+#include "firmware/params/types.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 /* The values of the parameter `winding`. */
 typedef enum {
@@ -23,5 +28,14 @@ typedef struct {
     modulator_out_t bridge[2]; /* their legs, in counts */
     pm_ab_t v;                 /* what acts on the machine of the drive's parameters */
 } bridges_t;
+
+#if PM_CARRIES(NEEDS_BRIDGES)
+/* Refuses what drives legs by itself and knows one bridge; config_windings.c. */
+void check_one_bridge(maker_t *m);
+#endif
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

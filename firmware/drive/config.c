@@ -130,14 +130,6 @@ static pm_q_t pushed(maker_t *m, pm_unit_t share)
     return at_most_twice(m, pm_num_div(dead_voltage(m), k_p), DRIVE_PARAM_dead_time);
 }
 
-#if PM_HAS(open_winding)
-/* Of three currents that flow alike, half of i_max each. */
-static pm_q_t most_zero(maker_t *m)
-{
-    return pm_min(per_unit(m, DRIVE_PARAM_i_max, m->base.i), PM_Q_MAX / 2) / 2 * 3;
-}
-#endif
-
 static void make_protection(maker_t *m, protection_config_t *c, pm_unit_t share, pm_q_t most)
 {
     const drive_params_t *p = m->params;
@@ -149,8 +141,6 @@ static void make_protection(maker_t *m, protection_config_t *c, pm_unit_t share,
     c->v_dc_span = c->v_dc_max - c->v_dc_min;
     c->v_dc_derate = per_unit(m, DRIVE_PARAM_v_dc_derate, m->base.v);
     c->i_sum = PM_Q(0.1);
-    PM_IN_IMAGE(
-        open_winding, if (p->winding == (int32_t)WINDING_OPEN) { c->i_sum = most_zero(m); })
     c->offset_max = fixed(m, pm_num_div(si(m, DRIVE_PARAM_offset_max), si(m, DRIVE_PARAM_i_full_scale)), 15,
                           DRIVE_PARAM_offset_max);
     c->heat_max = borne(pm_min(i_rated, 2 * PM_ONE));
@@ -236,19 +226,6 @@ static void check_board(maker_t *m)
     }
 }
 
-#if PM_CARRIES(NEEDS_BRIDGES)
-#define SHARE_MOST 200 /* over 201: below one */
-
-/* Length of the vector over v_dc that two bridges give: open_winding.h, two_sets.h. */
-static pm_num_t reach_of_two(const maker_t *m)
-{
-    if (m->params->winding == (int32_t)WINDING_OPEN) {
-        return pm_num(1);
-    }
-    return m->params->neutral_channel == 1 ? pm_num_ratio(1, 2) : pm_num_sqrt(pm_num_ratio(1, 3));
-}
-#endif
-
 static void make_limits(maker_t *m, drive_config_t *config)
 {
     config->k_theta = config->position.pll_low.k_theta;
@@ -258,11 +235,7 @@ static void make_limits(maker_t *m, drive_config_t *config)
                             UNIT_BITS, DRIVE_PARAM_voltage_limit);
     config->v_share = pm_min(config->v_share, modulator_reach(m, &config->modulator));
 #if PM_CARRIES(NEEDS_BRIDGES)
-    if (m->params->winding != (int32_t)WINDING_STAR) {
-        const pm_num_t share = pm_num_mul(si(m, DRIVE_PARAM_voltage_limit), reach_of_two(m));
-        config->v_share = fixed(m, least(share, pm_num_ratio(SHARE_MOST, SHARE_MOST + 1)), UNIT_BITS,
-                                DRIVE_PARAM_voltage_limit);
-    }
+    limit_windings(m, config);
 #endif
     config->machine.R_s = per_unit(m, DRIVE_PARAM_R_s, m->impedance);
     config->machine.L_d = per_unit(m, DRIVE_PARAM_L_d, m->inductance);
@@ -305,18 +278,6 @@ static void check_injected(maker_t *m, const drive_config_t *config)
                                     : "cannot add an injected voltage: start_method 2");
     }
 }
-
-#if PM_CARRIES(NEEDS_BRIDGES)
-static void make_windings(maker_t *m, drive_config_t *config)
-{
-    config->winding = (uint8_t)m->params->winding;
-    PM_IN_IMAGE(
-        open_winding,
-        if (config->winding == (uint8_t)WINDING_OPEN) { make_open_winding(m, &config->open_winding); })
-    PM_IN_IMAGE(
-        two_sets, if (config->winding == (uint8_t)WINDING_TWO_SETS) { make_two_sets(m, &config->two_sets); })
-}
-#endif
 
 drive_result_t drive_configure(drive_config_t *config, const drive_params_t *params, uint32_t channels)
 {

@@ -146,6 +146,12 @@ static inline uint8_t config_pole(const drive_config_t *config)
 void choose_start(maker_t *m, drive_config_t *config, uint32_t channels);
 void make_start(maker_t *m, drive_config_t *config);
 
+#if PM_CARRIES(NEEDS_BRIDGES)
+/* Of two bridges, config_windings.c: which winding they feed; then the limits that it moves. */
+void make_windings(maker_t *m, drive_config_t *config);
+void limit_windings(maker_t *m, drive_config_t *config);
+#endif
+
 /* channels: what the board has, hal_channels(). */
 drive_result_t drive_configure(drive_config_t *config, const drive_params_t *params, uint32_t channels);
 

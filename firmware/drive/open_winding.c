@@ -33,20 +33,24 @@ static void turn(open_winding_t *self)
     self->q = pm_shl(pm_mulh_add(pm_mulh(y, self->turn.sin), q, self->turn.cos), 1);
 }
 
-/* v_0 that holds i_0 at zero; beyond `most` nothing is gathered. */
-static pm_q_t hold(open_winding_t *self, const open_winding_config_t *config, pm_q_t most)
+/* v_0 that holds i_0 at zero; beyond `most` nothing is gathered, and the voltage counts as limited. */
+static pm_q_t hold(open_winding_t *self, const open_winding_config_t *config, pm_q_t most, int32_t *limited)
 {
     turn(self);
     self->y = pm_clamp(self->y - pm_mul(config->k_r, self->i), -most, most);
     const pm_q_t v = pm_shl(pm_mulh_sub(pm_mulh(self->y, self->lead.cos), self->q, self->lead.sin), 1);
-    return pm_clamp(v - pm_mul(config->k_p, self->i), -most, most);
+    const pm_q_t wanted = v - pm_mul(config->k_p, self->i);
+    if (pm_abs(wanted) > most) {
+        *limited = PM_SHARE_ONE;
+    }
+    return pm_clamp(wanted, -most, most);
 }
 
 void open_winding_step(open_winding_t *self, const open_winding_config_t *config, modulator_t *modulator,
                        const modulator_config_t *modulator_config, pm_ab_t v, pm_q_t v_dc, pm_ab_t i_quarter,
                        bridges_t *out)
 {
-    const pm_q_t v_zero = config->held ? hold(self, config, v_dc / 4) : 0;
+    const pm_q_t v_zero = config->held ? hold(self, config, v_dc / 4, &modulator->limited) : 0;
     const pm_ab_t half = {.alpha = pm_half(v.alpha), .beta = pm_half(v.beta)};
     const pm_ab_t across = {.alpha = pm_frac(v.beta, PER_ROOT_12), .beta = pm_frac(v.alpha, PER_ROOT_12)};
     const modulator_zero_t first = {

@@ -1,33 +1,20 @@
 #include "firmware/drive/open_winding.h"
 
-#include "firmware/control/regulator.h"
 #include "firmware/math/compiler.h"
 #include "firmware/params/maker.h"
-#include "injection/injection.h"
 
 #if PM_HAS(open_winding)
 
 #define SLOWEST 10 /* of f_pwm, the loop of i_0 */
 
-/* What drives legs by itself knows one bridge. */
 static void check(maker_t *m)
 {
-    static const char star[] = "needs a star: winding 0";
-    const drive_params_t *p = m->params;
-    if (p->L_0 == 0) {
+    if (m->params->L_0 == 0) {
         refuse(m, DRIVE_PARAM_L_0, "of an open winding must be known");
-    } else if (p->start_method != 2) {
+    } else if (m->params->start_method != 2) {
         refuse(m, DRIVE_PARAM_start_method, "an open winding is started by 2");
-    } else if (p->flying_start != 0) {
-        refuse(m, DRIVE_PARAM_flying_start, star);
-    } else if (p->commutation != 0) {
-        refuse(m, DRIVE_PARAM_commutation, star);
-    } else if ((regulator_traits((regulator_id_t)p->regulator) & REGULATOR_SWITCHES) != 0U) {
-        refuse(m, DRIVE_PARAM_regulator, star);
-    } else if (p->t_settle != 0) {
-        refuse(m, DRIVE_PARAM_t_settle, "an open winding needs shunts in the lines");
     } else {
-        /* it can be run */
+        check_one_bridge(m);
     }
 }
 

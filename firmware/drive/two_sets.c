@@ -52,7 +52,8 @@ pm_ab_t two_sets_unexplained(const two_sets_t *self, const two_sets_config_t *co
 
 /* The voltage that holds z at zero, or at z_q. The frame is that of where it acts: against where z was measured it is off by one and a half
  * periods, which the phase margin of the loop bears. */
-static pm_ab_t hold(two_sets_t *self, const two_sets_config_t *config, const two_sets_in_t *in)
+static pm_ab_t hold(two_sets_t *self, const two_sets_config_t *config, const two_sets_in_t *in,
+                    int32_t *limited)
 {
     const pm_half_dir_t dir = in->ahead;
     const regulator_in_t z = {
@@ -65,6 +66,9 @@ static pm_ab_t hold(two_sets_t *self, const two_sets_config_t *config, const two
     regulator_out_t u = {.limited = false};
     const bool apart = in->apart.alpha != 0 || in->apart.beta != 0;
     synchronous_pi_step(&self->regulator, apart ? &config->slowed : &config->regulator, &z, &u);
+    if (u.limited) {
+        *limited = PM_SHARE_ONE;
+    }
     const pm_dq_t v = {.d = pm_shl(u.v.d, 30 - PM_WIDE_BITS), .q = pm_shl(u.v.q, 30 - PM_WIDE_BITS)};
     return pm_park_inverse_quarter(v, dir);
 }
@@ -88,7 +92,7 @@ static void modulate(modulator_t *self, const modulator_config_t *config, bool p
 void two_sets_step(two_sets_t *self, const two_sets_config_t *config, modulator_t *modulator,
                    const modulator_config_t *modulator_config, const two_sets_in_t *in, bridges_t *out)
 {
-    const pm_ab_t v_z = hold(self, config, in);
+    const pm_ab_t v_z = hold(self, config, in, &modulator->limited);
     const pm_ab_t z = {.alpha = self->z.alpha / 4, .beta = self->z.beta / 4};
     const pm_ab_t v_1 = {.alpha = in->v.alpha + v_z.alpha, .beta = in->v.beta + v_z.beta};
     const pm_ab_t v_2 = {.alpha = in->v.alpha + in->apart.alpha - v_z.alpha,

@@ -8,7 +8,8 @@
  *   z = (i_1 - i_2) / 2     makes none: L_d - M_d, L_q - M_q and R. Fifth and seventh harmonics of the EMF drive it, and what
  *                           is unlike of the bridges; it is held at zero by PI in the same frame (synchronous_pi.h), within
  *                           an eighth of v_dc
- *   v_1 = v + v_z,  v_2 = (v - v_z) e^{-j 30}
+ *   v_1 = v + v_z
+ *   v_2 = (v - v_z) e^{-j 30}
  * Each leg's dead time is given back by its own current. A carrier is added to both sets.
  *
  * neutral_channel 1: one channel between the star points, no resistors,

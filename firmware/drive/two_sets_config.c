@@ -1,6 +1,5 @@
 #include "firmware/drive/two_sets.h"
 
-#include "firmware/control/regulator.h"
 #include "firmware/math/compiler.h"
 #include "firmware/params/maker.h"
 #include "injection/injection.h"
@@ -22,10 +21,8 @@ static bool is_third(int32_t observer)
            observer == (int32_t)OBSERVER_third_pair_flux;
 }
 
-/* What drives legs by itself knows one bridge. */
 static void check(maker_t *m)
 {
-    static const char one[] = "needs one set of windings: winding 0";
     const drive_params_t *p = m->params;
     if (2 * (int64_t)p->M_d >= p->L_d) {
         refuse(m, DRIVE_PARAM_M_d, "half of L_d or more: L_d is that of both sets, with M_d in it");
@@ -33,20 +30,12 @@ static void check(maker_t *m)
         refuse(m, DRIVE_PARAM_M_q, "half of L_q or more: L_q is that of both sets, with M_q in it");
     } else if (p->start_method < 2) {
         refuse(m, DRIVE_PARAM_start_method, "two sets are started by 2 or 3");
-    } else if (p->flying_start != 0) {
-        refuse(m, DRIVE_PARAM_flying_start, one);
-    } else if (p->commutation != 0) {
-        refuse(m, DRIVE_PARAM_commutation, one);
-    } else if ((regulator_traits((regulator_id_t)p->regulator) & REGULATOR_SWITCHES) != 0U) {
-        refuse(m, DRIVE_PARAM_regulator, one);
     } else if (p->start_method == 3 && is_of_one_star(p->injection)) {
         refuse(m, DRIVE_PARAM_injection, "reads one star: injection 12 or 13");
     } else if (p->neutral_channel == 1 && is_third(p->observer)) {
         refuse(m, DRIVE_PARAM_observer, "needs each star point: neutral_channel 0");
-    } else if (p->t_settle != 0) {
-        refuse(m, DRIVE_PARAM_t_settle, "two sets need shunts in the lines");
     } else {
-        /* they can be run */
+        check_one_bridge(m);
     }
 }
 

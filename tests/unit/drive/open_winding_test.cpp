@@ -452,6 +452,7 @@ TEST(OpenWinding, SaturatesAtAQuarterOfTheLinkAndRecovers)
         Held x(told(1.0), omega, 40.0);
         x.run(0.5);
         EXPECT_NEAR(x.most_V, kLink * kV / 4, 1e-3) << omega;
+        EXPECT_NE(x.bridges.modulator.limited, 0) << omega; // and says so
         x.circuit.amplitude_V = 3 * std::fabs(omega) * kPsi_3_Wb;
         x.circuit.i_A = 0;
         x.most_V = 0;
@@ -514,7 +515,7 @@ TEST(OpenWinding, TheThirdHarmonicNeedsNoChannelOfTheNeutral)
 
 TEST(OpenWinding, WhatKnowsOneBridgeIsRefused)
 {
-    const char *const star = "needs a star: winding 0";
+    const char *const star = "knows one bridge: winding 0";
     const struct {
         int32_t drive_params_t::*value;
         int32_t to;
@@ -527,7 +528,7 @@ TEST(OpenWinding, WhatKnowsOneBridgeIsRefused)
         {&drive_params_t::flying_start, 1, DRIVE_PARAM_flying_start, star},
         {&drive_params_t::commutation, 1, DRIVE_PARAM_commutation, star},
         {&drive_params_t::regulator, REGULATOR_finite_set, DRIVE_PARAM_regulator, star},
-        {&drive_params_t::t_settle, 1000, DRIVE_PARAM_t_settle, "an open winding needs shunts in the lines"},
+        {&drive_params_t::t_settle, 1000, DRIVE_PARAM_t_settle, "two bridges need shunts in the lines"},
     };
     for (const auto &x : cases) {
         drive_params_t p = ow::params();

@@ -328,6 +328,7 @@ TEST(TwoSets, ItsVoltageIsAnEighthOfTheLinkAndNoMore)
     for (int k = 0; k < 1000; ++k) {
         d.period(e);
     }
+    EXPECT_NE(d.x.modulator.limited, 0); // and says so
     EXPECT_NEAR(std::abs(d.z), (e - most) / d.R, 0.01 * (e - most) / d.R);
     for (int k = 0; k < 200; ++k) {
         d.period(0);
@@ -356,7 +357,7 @@ TEST(TwoSets, TheRegulatorIsThatOfTheDifference)
 
 TEST(TwoSets, IsRefusedByParameterAndReason)
 {
-    static const char one[] = "needs one set of windings: winding 0";
+    static const char one[] = "knows one bridge: winding 0";
     struct Row {
         std::function<void(drive_params_t &)> change;
         drive_param_id_t blamed;
@@ -374,7 +375,7 @@ TEST(TwoSets, IsRefusedByParameterAndReason)
         {[](drive_params_t &p) { p.flying_start = 1; }, DRIVE_PARAM_flying_start, one},
         {[](drive_params_t &p) { p.commutation = 1; }, DRIVE_PARAM_commutation, one},
         {[](drive_params_t &p) { p.t_settle = 500; }, DRIVE_PARAM_t_settle,
-         "two sets need shunts in the lines"},
+         "two bridges need shunts in the lines"},
     };
     for (int32_t id = 0; id < REGULATOR_COUNT; ++id) {
         if ((regulator_traits(static_cast<regulator_id_t>(id)) & REGULATOR_SWITCHES) != 0U) {
