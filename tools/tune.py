@@ -361,6 +361,24 @@ def careful(known, tolerance):
     return {name: (max(known[name] / (1 + tolerance), known["L_d"]), why) for name in ("L_q", "L_q_rated")}
 
 
+def two_bridges(x, machine, r_on):
+    """What an open winding or two sets are told beside or otherwise; none of a star."""
+    winding = x.get("winding", {})
+    if winding.get("connection") == "open":
+        return {"L_0": (float(winding["L_0_H"]), "of the zero sequence"),
+                "R_s": (machine["R_s"][0] + r_on, "winding and two switches")}
+    if int(winding.get("sets", 1)) < 2:
+        return {}
+    out = {name: (float(winding.get(key, 0.0)), "between the sets") for name, key in (("M_d", "M_d_H"), ("M_q", "M_q_H"))}
+    for name, mutual in (("L_d", "M_d"), ("L_dh_rated", "M_d"), ("L_q", "M_q"), ("L_q_rated", "M_q"), ("L_qh_rated", "M_q")):
+        out[name] = machine[name][0] + out[mutual][0], f"of both sets: {machine[name][1]}, and {mutual}"
+    return out
+
+
+ONE_BRIDGE = {"start_method": (2.0, "align and open loop: pulses know one bridge"),
+              "flying_start": (0.0, "a catch knows one bridge")}
+
+
 def drive(x, board, tolerance):
     """`drive:` as {name: (value, why)}, what is told above what is chosen."""
     def of(section, key):
@@ -378,6 +396,8 @@ def drive(x, board, tolerance):
         "leg_capacitance": (of("inverter", "c_leg_F"), "the inverter's"),
         "speed_max": (1.25 * of("rated", "speed_rated_rad_s"), tune.WHY["speed_max"]),
     }
+    bridges = two_bridges(x, machine, of("inverter", "r_on_ohm"))
+    machine.update(bridges)
     known = {name: told.get(name, value) for name, (value, _) in machine.items()}
     known["commutation"] = told.get("commutation", 0)
     known.update(from_board(x, {}, board))
@@ -392,6 +412,8 @@ def drive(x, board, tolerance):
         out["v_terminal_full_scale"] = of("sensor", "v_leg_full_scale_V"), "the sensor's"
         out["emf_shape"] = (1.0 if x.get("winding", {}).get("trapezoid_flat_deg") else 0.0), "the winding's; a sine if nothing is told"
     out["flying_start"] = 1.0, "a rotor that wind or its load turns is caught"
+    if bridges:
+        out.update(ONE_BRIDGE)
     if told.get("injection") in (carrier.ROTATING, carrier.PULSATING) and not SINE <= told.keys():
         out.update(sine(x, {**{name: value for name, (value, _) in out.items()}, **known, **told}))
     out.update((name, (value, "told")) for name, value in told.items())

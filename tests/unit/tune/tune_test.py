@@ -192,6 +192,17 @@ class Tune(unittest.TestCase):
         for name in ("L_d", "L_q", "L_q_rated", "L_dh_rated", "L_qh_rated", "L_dqh_rated", "cross_half"):
             self.assertAlmostEqual(found[name] / known[name], 1, delta=0.002, msg=name)
 
+    def test_two_bridges_are_told_their_winding(self):
+        """The machine files have the same values from elsewhere; pulses and a catch know one bridge."""
+        for name, more in (("dtp_400", ("M_d", "M_q")), ("ow_400", ("L_0",))):
+            machine = yaml.safe_load((ROOT / "sim_plant" / "machines" / f"{name}.yaml").read_text(encoding="utf-8"))
+            known = machine.pop("drive")
+            found = self.drive(machine)
+            for key in ("R_s", "L_d", "L_q", "L_q_rated", *more):
+                self.assertAlmostEqual(found[key] / known[key], 1, delta=0.005, msg=f"{name} {key}")
+            self.assertEqual((found["start_method"], found["flying_start"]), (2, 0))
+        self.assertNotIn("L_0", self.drive(motor("servo")))
+
     def test_saturation_that_is_told_gives_the_rest(self):
         told = motor("compressor")
         told["drive"] = {"L_q_rated": 10e-3}
