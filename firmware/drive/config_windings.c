@@ -52,7 +52,8 @@ void limit_windings(maker_t *m, drive_config_t *config)
     config->v_share = fixed(m, least(share, pm_num_ratio(SHARE_MOST, SHARE_MOST + 1)), UNIT_BITS,
                             DRIVE_PARAM_voltage_limit);
     if (config->winding == (uint8_t)WINDING_OPEN) { /* three currents that flow alike, half of i_max each */
-        config->protection.i_sum = config->i_max / 2 * 3;
+        const pm_q_t most = pm_min(config->i_max, PM_Q_MAX / 2); /* a larger one is refused */
+        config->protection.i_sum = most / 2 * 3;
     }
 }
 
