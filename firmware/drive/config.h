@@ -146,6 +146,13 @@ static inline uint8_t config_pole(const drive_config_t *config)
 void choose_start(maker_t *m, drive_config_t *config, uint32_t channels);
 void make_start(maker_t *m, drive_config_t *config);
 
+/* Of the imposed vector; then i_most, and i no larger, when the machine is known. */
+void make_open_loop(maker_t *m, open_loop_config_t *c);
+void limit_imposed(drive_config_t *config);
+
+/* share: of the bandwidth of current control, while injection leads; most: the largest current then. */
+void make_protection(maker_t *m, protection_config_t *c, pm_unit_t share, pm_q_t most);
+
 #if PM_CARRIES(NEEDS_BRIDGES)
 /* Of two bridges, config_windings.c: which winding they feed; then the limits that it moves. */
 void make_windings(maker_t *m, drive_config_t *config);
