@@ -2,10 +2,13 @@
 
 #if PM_CARRIES(NEEDS_NEUTRAL)
 
+#include "firmware/math/root.h"
 #include "firmware/math/window.h"
 
 /* Periods from a command to the sample that ends with its voltage. */
 #define SINCE 2U
+/* An answer of less than one over this of what it should be may be none. */
+#define PER_LEAST 4
 
 static pm_dir_t direction(const zero_t *self, const zero_config_t *config)
 {
@@ -51,6 +54,26 @@ void zero_rotating_step(zero_rotating_t *self, const zero_rotating_config_t *con
     self->x[zero->at + (zero->sign < 0 ? config->half : 0U)] = x;
     zero_close(zero, config, i, sample, out);
     out->carrier = excitation_of(carrier_along(pm_mulh(config->v_h, PM_FRAC(0.125)), axis));
+}
+
+/* m, at most 1. */
+static pm_q_t answer(const zero_rotating_t *self, const zero_rotating_config_t *config)
+{
+    int32_t sum = 0;
+    for (uint32_t n = 0; n < config->half; n++) {
+        const pm_q_t change = self->x[n] - self->x[n + config->half];
+        sum += pm_mulh(change, change);
+    }
+    return pm_sqrt(4 * pm_min(pm_div(sum, self->zero.power), PM_ONE / 4));
+}
+
+void zero_rotating_slow(zero_rotating_t *self, const zero_rotating_config_t *config, const obs_in_t *in)
+{
+    zero_slow(&self->zero, config, in);
+    const pm_q_t misfit = PER_LEAST * answer(self, config) - PM_ONE;
+    if (self->zero.warm == 0U && misfit < 0) {
+        self->zero.misfit = misfit;
+    }
 }
 
 /* 2/N sum x cos(angle + turn n), n = 0 in the period whose voltage has the phase 0; 1/N, Q32, is the step of the phase. */

@@ -135,6 +135,9 @@ void Profile::start_faults(const Event &event)
             plant_sensor(plant)->gain_error[leg] = (*event.sensor_gain_error)[leg];
         }
     }
+    if (event.v_zero_gain_error) {
+        plant_sensor(plant)->v_zero_gain_error = *event.v_zero_gain_error;
+    }
     if (event.hw_fault) {
         rig_set_hw_fault(rig_, *event.hw_fault);
     }

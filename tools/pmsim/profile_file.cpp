@@ -61,6 +61,7 @@ std::vector<std::string> event_keys()
                                      "free_speed",
                                      "clear_fault",
                                      "sensor_gain_error",
+                                     "v_zero_gain_error",
                                      "leg_fault",
                                      "short",
                                      "supply"};
@@ -198,6 +199,9 @@ Event read_event(const Value &value, const Setup &setup)
     event.clear_fault = read_flag(map, "clear_fault").value_or(false);
     event.sensor_offset_A = read_legs_of(map, "sensor_offset_A", setup);
     event.sensor_gain_error = read_legs_of(map, "sensor_gain_error", setup);
+    if (const auto error = map.find("v_zero_gain_error")) {
+        event.v_zero_gain_error = error->number(-1, 1);
+    }
     if (const auto slip = map.find("rotor_slip_deg")) {
         event.rotor_slip_rad = slip->number(-360, 360) * two_pi / 360.0;
     }

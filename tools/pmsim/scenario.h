@@ -54,6 +54,7 @@ struct Event {
     std::optional<bool> enable, locked, hw_fault;
     std::optional<int> mode;
     std::optional<std::array<double, PLANT_LEGS>> sensor_offset_A, sensor_gain_error;
+    std::optional<double> v_zero_gain_error;
     std::optional<double> rotor_slip_rad, estimate_turn_rad; // electrical
     std::optional<LegFault> leg_fault;
     std::optional<ShortCircuit> short_circuit;

@@ -64,6 +64,7 @@ class Run
     Complex disturbance_V = 0;     // in the stator, that nobody knows of
     double L_c0_H = 0;             // cross-coupling of the zero sequence
     double dL_0_d_H_A = 0, dL_0_q_H_A2 = 0, L_c0_q_H_A = 0; // what of it moves with the current
+    bool lead = true;                                       // to the star point
     bool sampled = true;                                    // samples that are asked for are taken
     std::vector<excitation_t> given;
 
@@ -93,7 +94,7 @@ class Run
         pm_measure_t codes = {};
         codes.sampled = sampled && given.size() > 1 && given[given.size() - 2].sample_at[0] != 0 ? 1 : 0;
         const obs_more_t more = {&codes,  {bench::ab(between_ / kBase.i_A), {0, 0}},
-                                 nullptr, bench::fixed(v_zero_V_ / kBase.v_V, 28),
+                                 nullptr, lead ? bench::fixed(v_zero_V_ / kBase.v_V, 28) : 0,
                                  0,       {0, 0}};
         injection_in_t in = {};
         in.more = &more;

@@ -292,6 +292,25 @@ TEST(ZeroSequence, AtStandstillTheCarrierAlongDIsNotBelieved)
     EXPECT_NEAR(settled({INJECTION_zero_anti_rotating, 500, ZERO_MEASURED}, 0).misfit, 0, kKappa + 0.05);
 }
 
+// Told twice or half of the answer it does not.
+TEST(ZeroSequence, ARotatingCarrierMissesALeadThatHasComeOff)
+{
+    for (const Choice &choice : {Choice{INJECTION_zero_rotating, 500, ZERO_MEASURED},
+                                 {INJECTION_zero_rotating, 500, ZERO_TOLD},
+                                 {INJECTION_zero_rotating, 500, ZERO_MEASURED, 0.5},
+                                 {INJECTION_zero_rotating, 500, ZERO_MEASURED, 2}}) {
+        for (const double theta : {0.1, 0.26, 0.4, 0.9}) {
+            rig::Run run(config(choice));
+            run.theta = theta;
+            EXPECT_NEAR(run.after(kSettled).misfit, 0, kKappa + 0.05)
+                << choice.form << ' ' << choice.dL_0_told << ' ' << theta;
+            run.lead = false;
+            EXPECT_EQ(run.after(60).misfit, -1)
+                << choice.form << ' ' << theta; // three periods of the carrier
+        }
+    }
+}
+
 TEST(ZeroSequence, CarriersAreThoseOfTheirHeaders)
 {
     const double frame = 0.4 + 0.3;
