@@ -103,6 +103,7 @@ struct drive {
     rest_t rest;
 #endif
     open_phase_t open_phase;
+    PM_IN_IMAGE(two_sets, open_phase_t second_open_phase;)
     fault_short_t fault_short;
 
     /* not of a control period */

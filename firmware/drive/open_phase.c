@@ -33,7 +33,7 @@ static bool is_missed(uint8_t missed[2], pm_q_t half_asked, pm_q_t sixteenth, pm
     return missed[0] > OPEN_PHASE_MS || missed[1] > OPEN_PHASE_MS;
 }
 
-bool open_phase_slow(open_phase_t *self, pm_q_t least, pm_ab_t wanted, pm_ab_t i)
+bool open_phase_slow(open_phase_t *self, pm_q_t least, pm_ab_t wanted, pm_ab_t i, pm_q_t i_zero)
 {
     const pm_q_t all = square(i);
     const pm_q_t asked = square(wanted);
@@ -42,8 +42,8 @@ bool open_phase_slow(open_phase_t *self, pm_q_t least, pm_ab_t wanted, pm_ab_t i
     }
     const pm_abc_t w = pm_clarke_inverse(wanted);
     const pm_abc_t leg = pm_clarke_inverse(i);
-    const bool a = is_missed(self->missed[0], asked / 2, all / 16, w.a, leg.a);
-    const bool b = is_missed(self->missed[1], asked / 2, all / 16, w.b, leg.b);
-    const bool c = is_missed(self->missed[2], asked / 2, all / 16, w.c, leg.c);
+    const bool a = is_missed(self->missed[0], asked / 2, all / 16, w.a, leg.a + i_zero);
+    const bool b = is_missed(self->missed[1], asked / 2, all / 16, w.b, leg.b + i_zero);
+    const bool c = is_missed(self->missed[2], asked / 2, all / 16, w.c, leg.c + i_zero);
     return a || b || c;
 }

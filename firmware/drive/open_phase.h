@@ -38,8 +38,8 @@ typedef struct {
 
 void open_phase_reset(open_phase_t *self);
 
-/* True: one does not conduct. least: of the square of the current. */
-bool open_phase_slow(open_phase_t *self, pm_q_t least, pm_ab_t wanted, pm_ab_t i);
+/* True: one does not conduct. least: of the square of the current; i_zero: what all three carry beside i, none in a star. */
+bool open_phase_slow(open_phase_t *self, pm_q_t least, pm_ab_t wanted, pm_ab_t i, pm_q_t i_zero);
 
 #ifdef __cplusplus
 }

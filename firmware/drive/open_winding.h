@@ -25,12 +25,17 @@
  *   R 10 % off is 1 degree at a fifth of rated speed
  * Either is the mean over [k-1, k): what third.h takes as the star point's voltage behind an RC of half a period.
  *
- * Currents of the first bridge's legs by sensors in the lines. i_0 counts in what each leg carries (i_trip) and in what heats the windings, and where half of
- * i_max of it flows for 2 ms that is a fault, SENSOR_SUM. Not with pulses, flying start, identification, regulators of switch states,
- * block commutation or a carrier that needs a star: refused.
+ * Currents of the first bridge's legs by sensors in the lines. i_0 counts in what each leg carries (i_trip) and in
+ * what heats the windings, and where half of i_max of it flows for 2 ms that is a fault, SENSOR_SUM. A phase that is
+ * open, or whose sensor shows nothing, is not held by the others as in a star: it is found by the voltage that nothing
+ * explains, within 3 ms, and where i_0 is held by its leg's current (open_phase.h). Where i_0 flows a switch that does
+ * not close is not found at light load. A sensor that is stuck lets ten times the rated current through until then:
+ * the hardware break of the bridge must act below that (docs/porting.md). Not with pulses, flying start,
+ * identification, regulators of switch states, block commutation or a carrier that needs a star: refused.
  *
- * open_winding_slow() at 1 kHz; no division in a period but those of modulator_step(), which runs twice. State 40 bytes.
- * Tests: tests/unit/drive/open_winding_test.cpp and open_winding_drive_test.cpp, tests/scenario/open_winding.yaml. */
+ * open_winding_slow() at 1 kHz; no division in a period but those of modulator_step(), which runs twice. State 44 bytes.
+ * Tests: tests/unit/drive/open_winding_test.cpp and open_winding_drive_test.cpp, tests/scenario/open_winding.yaml and
+ * fault_bridges_open.yaml. */
 #ifndef DRIVE_OPEN_WINDING_H
 #define DRIVE_OPEN_WINDING_H
 
@@ -61,6 +66,7 @@ typedef struct {
     pm_q_t v_next;   /* at k-1 */
     pm_q_t y, q;     /* what turns with 3 omega */
     pm_dir_t turn, lead;
+    uint8_t unexplained_ms; /* voltage that neither current nor speed asks for */
 } open_winding_t;
 
 #if PM_HAS(open_winding)

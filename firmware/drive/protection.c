@@ -1,5 +1,6 @@
 #include "firmware/drive/drive_parts.h"
 
+#include "firmware/drive/second_bridge.h"
 #include "firmware/math/filter.h"
 #include "firmware/math/root.h"
 #include "firmware/math/trig.h"
@@ -189,6 +190,16 @@ void protection_heat(drive_t *drive)
     }
 }
 
+static bool misses_phase(drive_t *drive, pm_q_t least, pm_ab_t wanted, pm_ab_t i)
+{
+#if PM_CARRIES(NEEDS_BRIDGES)
+    if (drive->config.winding != (uint8_t)WINDING_STAR) {
+        return second_bridge_misses_phase(drive, least, wanted, i);
+    }
+#endif
+    return open_phase_slow(&drive->open_phase, least, wanted, i, 0);
+}
+
 /* References and measured currents of a frame, whichever it is. Not where a carrier leaves control less than half of its
  * voltage, on a link that has sagged: then dead time has more of it than the direction of the current bears. */
 void protection_phases(drive_t *drive)
@@ -196,12 +207,13 @@ void protection_phases(drive_t *drive)
     const bool controlled = drive->stage == STAGE_VECTOR || drive->stage == STAGE_OPEN_LOOP;
     if (!controlled || drive->v_share < drive->config.v_share / 2) {
         open_phase_reset(&drive->open_phase);
+        PM_IN_IMAGE(two_sets, open_phase_reset(&drive->second_open_phase);)
         return;
     }
     const pm_dir_t dir = pm_dir(drive->stage == STAGE_VECTOR ? drive->position.pll.theta : drive->theta_open);
     const protection_config_t *c = &drive->config.protection;
-    if (open_phase_slow(&drive->open_phase, drive->carrier ? c->judged_carrier : c->judged,
-                        pm_park_inverse(drive->i_ref, dir), pm_park_inverse(drive->status.i, dir))) {
+    if (misses_phase(drive, drive->carrier ? c->judged_carrier : c->judged,
+                     pm_park_inverse(drive->i_ref, dir), pm_park_inverse(drive->status.i, dir))) {
         drive_trip(drive, DRIVE_FAULT_OPEN_PHASE);
     }
 }

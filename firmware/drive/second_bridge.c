@@ -6,6 +6,8 @@
 
 #if PM_CARRIES(NEEDS_BRIDGES)
 
+#define UNEXPLAINED_MS 2U
+
 static void write_second(const modulator_out_t *m, drive_out_t *out)
 {
     for (uint32_t leg = 0; leg < DRIVE_LEGS; leg++) {
@@ -89,6 +91,46 @@ void second_bridge_without(drive_t *drive, drive_out_t *out)
     out->second_legs = tied && out->legs != PM_LEGS_OFF ? PM_LEGS_PWM : PM_LEGS_OFF;
     PM_IN_IMAGE(open_winding, open_winding_reset(&drive->open_winding);)
     PM_IN_IMAGE(two_sets, two_sets_reset(&drive->two_sets, &drive->config.two_sets);)
+}
+
+#if PM_HAS(open_winding)
+/* Current and speed ask for the voltage, that of all phases with it, which has R and half of the EMF and v_dc / 16 to spare. Of a phase
+ * whose current is not seen it grows until they do not: nothing else holds that current. */
+static bool is_explained(const drive_t *drive)
+{
+    const pm_machine_t *machine = &drive->config.machine;
+    const pm_q_t i_max = drive->config.i_max;
+    const pm_q_t emf = pm_mul(pm_abs(drive->pll.omega), machine->psi_m + pm_mul(machine->L_q, i_max));
+    const pm_q_t most = 2 * pm_mul(machine->R_s, i_max) + emf + emf / 2 + drive->status.v_dc / 16;
+    const pm_q_t left = most - pm_abs(drive->open_winding.v_acting);
+    const pm_ab_t v = drive->v_acting;
+    return left > 0 && pm_mul(v.alpha, v.alpha) + pm_mul(v.beta, v.beta) <= pm_mul(left, left);
+}
+#endif
+
+bool second_bridge_misses_phase(drive_t *drive, pm_q_t least, pm_ab_t wanted, pm_ab_t i)
+{
+#if PM_HAS(two_sets)
+    if (drive->config.winding == (uint8_t)WINDING_TWO_SETS) {
+        const pm_ab_t z = drive->two_sets.z;
+        const pm_ab_t i_1 = {.alpha = i.alpha + z.alpha, .beta = i.beta + z.beta};
+        const pm_ab_t i_2 = {.alpha = i.alpha - z.alpha, .beta = i.beta - z.beta};
+        const bool first = open_phase_slow(&drive->open_phase, least, wanted, i_1, 0);
+        return open_phase_slow(&drive->second_open_phase, least, two_sets_backwards(wanted),
+                               two_sets_backwards(i_2), 0) ||
+               first;
+    }
+#endif
+#if PM_HAS(open_winding)
+    uint8_t *ms = &drive->open_winding.unexplained_ms;
+    *ms = is_explained(drive) ? 0U : (uint8_t)(*ms + 1U);
+    /* where i_0 flows it may be as large as what is wanted of a leg */
+    const bool missed = drive->config.open_winding.held &&
+                        open_phase_slow(&drive->open_phase, least, wanted, i, drive->open_winding.i);
+    return missed || *ms > UNEXPLAINED_MS;
+#else
+    return false;
+#endif
 }
 
 void second_bridge_slow(drive_t *drive, pm_q_t omega)

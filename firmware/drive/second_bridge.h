@@ -28,6 +28,9 @@ pm_ab_t second_bridge_seen(const drive_t *drive);
 #endif
 
 void second_bridge_slow(drive_t *drive, pm_q_t omega);
+
+/* open_phase_slow() of either bridge; i without a carrier. */
+bool second_bridge_misses_phase(drive_t *drive, pm_q_t least, pm_ab_t wanted, pm_ab_t i);
 #endif
 
 #ifdef __cplusplus

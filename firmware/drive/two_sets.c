@@ -15,7 +15,7 @@ static pm_ab_t onwards(pm_ab_t x)
                      .beta = 2 * pm_frac(x.beta, COS_30) + pm_half(x.alpha)};
 }
 
-static pm_ab_t backwards(pm_ab_t x)
+pm_ab_t two_sets_backwards(pm_ab_t x)
 {
     return (pm_ab_t){.alpha = 2 * pm_frac(x.alpha, COS_30) + pm_half(x.beta),
                      .beta = 2 * pm_frac(x.beta, COS_30) - pm_half(x.alpha)};
@@ -100,8 +100,8 @@ void two_sets_step(two_sets_t *self, const two_sets_config_t *config, modulator_
     const pm_ab_t i_1 = {.alpha = in->i_quarter.alpha + z.alpha, .beta = in->i_quarter.beta + z.beta};
     const pm_ab_t i_2 = {.alpha = in->i_quarter.alpha - z.alpha, .beta = in->i_quarter.beta - z.beta};
     modulate(modulator, modulator_config, config->between, v_1, in->v_dc, i_1, &out->bridge[0]);
-    modulate(modulator, modulator_config, config->between, backwards(v_2), in->v_dc, backwards(i_2),
-             &out->bridge[1]);
+    modulate(modulator, modulator_config, config->between, two_sets_backwards(v_2), in->v_dc,
+             two_sets_backwards(i_2), &out->bridge[1]);
     self->v_next = v_z;
     const pm_ab_t acts = onwards(out->bridge[1].v);
     out->v = (pm_ab_t){.alpha = pm_half(out->bridge[0].v.alpha + acts.alpha),

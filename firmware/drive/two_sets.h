@@ -21,8 +21,10 @@
  *   v_z - R z - (L_q - M_q) p z
  * none where these are right; with a current that the sets have apart on purpose it tells an observer what is wrong of them.
  *
- * Currents of all six legs by sensors in the lines; each set must have a sum of zero, and no leg more than i_trip. Not with pulses,
- * flying start, identification, regulators of switch states, block commutation or a carrier at a star point: refused.
+ * Currents of all six legs by sensors in the lines; each set must have a sum of zero, no leg more than i_trip, and
+ * each leg the current that is wanted of its set (open_phase.h): with one open the other set goes on turning the
+ * motor. Not with pulses, flying start, identification, regulators of switch states, block commutation or a carrier at
+ * a star point: refused.
  *
  * modulator_step() and the regulator run twice. State 60 bytes. Tests: tests/unit/drive/two_sets_test.cpp,
  * tests/scenario/two_sets.yaml. */
@@ -68,6 +70,9 @@ typedef struct {
 #if PM_HAS(two_sets)
 /* Before the first step with control; the zeros stay. */
 void two_sets_reset(two_sets_t *self, const two_sets_config_t *config);
+
+/* In the axes of the second set. */
+pm_ab_t two_sets_backwards(pm_ab_t x);
 
 /* The mean of i_1 and of the currents with these codes. */
 pm_ab_t two_sets_measure(two_sets_t *self, const uint16_t code[PM_LEGS], pm_ab_t i_1);

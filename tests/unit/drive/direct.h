@@ -113,9 +113,9 @@ struct Drive {
     }
 
     // Current mode needs no motor: calibration and align, then it runs.
-    void start_current_mode()
+    void start_current_mode(int32_t current_mA = 1000)
     {
-        command.current_mA = 1000;
+        command.current_mA = current_mA;
         enable(true, DRIVE_MODE_CURRENT);
         run_ms(110 + 310 + 10);
     }

@@ -69,7 +69,7 @@ int look(const Star &star, const Flow &run, int most = 2000)
         const Complex w = reference * turn;
         const Complex driven = run.share * follows * turn * std::polar(1.0, -run.behind_deg * kPi / 180);
         const Complex i = star.flows(driven) + Complex(noise(random), noise(random));
-        if (open_phase_slow(&self, fixed(kLeast, 28), bench::ab(w), bench::ab(i))) {
+        if (open_phase_slow(&self, fixed(kLeast, 28), bench::ab(w), bench::ab(i), 0)) {
             return ms;
         }
     }
@@ -168,7 +168,7 @@ TEST(OpenPhase, ALegMayBeMissedInFourOfFiveMilliseconds)
         open_phase_reset(&self);
         bool open = false;
         for (int ms = 0; ms < 1000 && !open; ++ms) {
-            open = open_phase_slow(&self, fixed(kLeast, 28), wanted, ms % of == 0 ? wanted : beside);
+            open = open_phase_slow(&self, fixed(kLeast, 28), wanted, ms % of == 0 ? wanted : beside, 0);
         }
         EXPECT_EQ(open, of == 8);
     }
