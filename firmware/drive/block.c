@@ -189,14 +189,18 @@ static bool is_fast(const block_t *self)
 }
 
 /* Of crossings that the voltage between the legs belies: at once where they would be an over-speed. */
-static bool is_wrong(drive_t *drive)
+PM_APART static bool is_wrong(drive_t *drive)
 {
     const block_config_t *c = &drive->config.block;
     block_t *self = &drive->block;
-    const pm_q_t taken = self->i < 0 ? -c->lost : c->lost;
-    const pm_q_t e = pm_mul(self->current.u - taken, drive->status.v_dc) - pm_mul(c->current.R_2, self->i);
+    const pm_q_t v_dc = drive->status.v_dc;
+    const pm_q_t driven = self->i < 0 ? -c->lost : c->lost;
+    const bool turns = pm_abs(self->i) < pm_mul(c->ripple, v_dc);
+    const pm_q_t taken = turns ? 0 : driven;
+    const pm_q_t unsure = turns ? pm_mul(c->lost, v_dc) : 0;
+    const pm_q_t e = pm_mul(self->current.u - taken, v_dc) - pm_mul(c->current.R_2, self->i);
     const pm_q_t emf = block_emf(drive);
-    const bool wrong = c->six_step.pattern.complementary && pm_abs(e - emf) > pm_half(emf);
+    const bool wrong = c->six_step.pattern.complementary && pm_abs(e - emf) > pm_half(emf) + unsure;
     self->wrong_ms = wrong ? (uint16_t)(self->wrong_ms + 1U) : 0U;
     return self->wrong_ms > WRONG_MS || (wrong && is_fast(self));
 }

@@ -53,6 +53,9 @@ void make_block(maker_t *m, block_config_t *c)
     const int32_t legs = pattern_chops_both(c->six_step.pattern.id) ? 2 : 1;
     const pm_num_t dead = pm_num_mul(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm));
     c->lost = fixed(m, pm_num_mul(pm_num(legs), dead), Q_BITS, DRIVE_PARAM_dead_time);
+    const pm_num_t L = pm_num_mul(pm_num(16 / legs), si(m, DRIVE_PARAM_L_d));
+    const pm_num_t ripple = pm_num_div(pm_num_mul(m->base.t_s, m->impedance), L);
+    c->ripple = fixed(m, least(ripple, pm_num(4)), Q_BITS, DRIVE_PARAM_L_d);
     make_line_current(m, &c->current);
     c->current.most = c->six_step.pattern.most;
     make_freewheeling(m, &c->freewheeling);

@@ -404,6 +404,27 @@ TEST(Block, AnOverSpeedThatTheVoltageBeliesIsNone)
     }
 }
 
+// A tenth of an ampere, and a ripple of more: the current turns in each period, and dead time takes nothing of the voltage, where
+// otherwise it may take more than half of the EMF.
+TEST(Block, ACurrentBelowItsRippleDoesNotBelieTheCrossings)
+{
+    Fan x(1.0, [](plant_config_t &c) {
+        c.machine.L_d0_H = c.machine.L_q0_H = 50e-6;
+        c.inverter.dead_time_s = 2.5e-6;
+    });
+    drive_params_t &p = x.params();
+    p.L_d = p.L_q = p.L_q_rated = p.L_dh_rated = p.L_qh_rated = 50000;
+    x.enable();
+    x.speed_rel(0.12);
+    x.run_s(1.5);
+    ASSERT_EQ(x.drive().stage, STAGE_SIX_STEP);
+    plant_set_load(x.plant(), -0.008);
+    x.run_s(0.5);
+    EXPECT_LT(drive_status(&x.drive())->i.q, 0);
+    EXPECT_EQ(x.drive().stage, STAGE_SIX_STEP);
+    EXPECT_EQ(x.drive().block_tries, 0);
+}
+
 TEST(Block, ARotorThatIsThrownBeyondItsTripIsAnOverSpeed)
 {
     Fan x;
