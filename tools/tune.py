@@ -375,8 +375,7 @@ def two_bridges(x, machine, r_on):
     return out
 
 
-ONE_BRIDGE = {"start_method": (2.0, "align and open loop: pulses know one bridge"),
-              "flying_start": (0.0, "a catch knows one bridge")}
+ONE_BRIDGE = {"flying_start": (0.0, "a catch knows one bridge")}
 
 
 def drive(x, board, tolerance):

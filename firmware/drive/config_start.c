@@ -27,9 +27,20 @@ static void make_find(maker_t *m, drive_config_t *config)
         })
 }
 
+/* Pulses know one bridge. */
+static bool pulses_serve(const drive_params_t *params)
+{
+#if PM_CARRIES(NEEDS_BRIDGES)
+    if (params->winding != 0) {
+        return false;
+    }
+#endif
+    return params->start_method != 3;
+}
+
 static sequence_id_t start_of(const drive_params_t *params, bool injection)
 {
-    if (!injection || params->start_method == 3) {
+    if (!injection || !pulses_serve(params)) {
         return SEQUENCE_align;
     }
 #if SEQUENCE_HAS_POLARITY

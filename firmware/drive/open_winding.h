@@ -30,8 +30,9 @@
  * open, or whose sensor shows nothing, is not held by the others as in a star: it is found by the voltage that nothing
  * explains, within 3 ms, and where i_0 is held by its leg's current (open_phase.h). Where i_0 flows a switch that does
  * not close is not found at light load. A sensor that is stuck lets ten times the rated current through until then:
- * the hardware break of the bridge must act below that (docs/porting.md). Not with pulses, flying start,
- * identification, regulators of switch states, block commutation or a carrier that needs a star: refused.
+ * the hardware break of the bridge must act below that (docs/porting.md). A start is an align, and injection follows
+ * it where there is saliency (start_method 0, 3). Not with pulses, flying start, identification, regulators of switch
+ * states, block commutation or a carrier that needs a star: refused.
  *
  * open_winding_slow() at 1 kHz; no division in a period but those of modulator_step(), which runs twice. State 44 bytes.
  * Tests: tests/unit/drive/open_winding_test.cpp and open_winding_drive_test.cpp, tests/scenario/open_winding.yaml and
@@ -58,6 +59,7 @@ typedef struct {
     pm_q_t turn;     /* 3 T w_base, rad at a speed of one */
     pm_q_t delay;    /* 9/2 T w_base, the same */
     pm_q_t ratio;    /* 3 w_base / (2 pi f) */
+    pm_q_t carrier;  /* its voltage */
 } open_winding_config_t;
 
 typedef struct {

@@ -11,8 +11,6 @@ static void check(maker_t *m)
 {
     if (m->params->L_0 == 0) {
         refuse(m, DRIVE_PARAM_L_0, "of an open winding must be known");
-    } else if (m->params->start_method != 2) {
-        refuse(m, DRIVE_PARAM_start_method, "an open winding is started by 2");
     } else {
         check_one_bridge(m);
     }
@@ -38,6 +36,7 @@ PM_APART void make_open_winding(maker_t *m, open_winding_config_t *c)
     c->R = fixed(m, pm_num_div(si(m, DRIVE_PARAM_R_s), m->impedance), Q_BITS - 1, DRIVE_PARAM_R_s);
     c->L = fixed(m, pm_num_div(si(m, DRIVE_PARAM_L_0), pm_num_mul(m->impedance, m->base.t_s)), BRIDGES_L_BITS,
                  DRIVE_PARAM_L_0);
+    c->carrier = per_unit(m, DRIVE_PARAM_v_injection, m->base.v);
     c->turn = fixed(m, pm_num_mul(three, m->base.t_s), Q_BITS, DRIVE_PARAM_speed_trip);
     c->delay = fixed(m, mul3(three, pm_num_ratio(3, 2), m->base.t_s), Q_BITS, DRIVE_PARAM_speed_trip);
     c->ratio = fixed(m, least(pm_num_div(three, bandwidth), pm_num(7)), Q_BITS, DRIVE_PARAM_speed_trip);

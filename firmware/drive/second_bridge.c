@@ -94,7 +94,7 @@ void second_bridge_without(drive_t *drive, drive_out_t *out)
 }
 
 #if PM_HAS(open_winding)
-/* Current and speed ask for the voltage, that of all phases with it, which has R and half of the EMF and v_dc / 16 to spare. Of a phase
+/* Current, speed and carrier ask for the voltage, that of all phases with it, which has R and half of the EMF and v_dc / 16 to spare. Of a phase
  * whose current is not seen it grows until they do not: nothing else holds that current. */
 static bool is_explained(const drive_t *drive)
 {
@@ -102,7 +102,8 @@ static bool is_explained(const drive_t *drive)
     const pm_q_t i_max = drive->config.i_max;
     const pm_q_t emf = pm_mul(pm_abs(drive->pll.omega), machine->psi_m + pm_mul(machine->L_q, i_max));
     const pm_q_t most = 2 * pm_mul(machine->R_s, i_max) + emf + emf / 2 + drive->status.v_dc / 16;
-    const pm_q_t left = most - pm_abs(drive->open_winding.v_acting);
+    const pm_q_t carrier = drive->carrier ? drive->config.open_winding.carrier : 0;
+    const pm_q_t left = most + carrier - pm_abs(drive->open_winding.v_acting);
     const pm_ab_t v = drive->v_acting;
     return left > 0 && pm_mul(v.alpha, v.alpha) + pm_mul(v.beta, v.beta) <= pm_mul(left, left);
 }

@@ -23,8 +23,8 @@
  *
  * Currents of all six legs by sensors in the lines; each set must have a sum of zero, no leg more than i_trip, and
  * each leg the current that is wanted of its set (open_phase.h): with one open the other set goes on turning the
- * motor. Not with pulses, flying start, identification, regulators of switch states, block commutation or a carrier at
- * a star point: refused.
+ * motor. A start is an align, and injection follows it where there is saliency (start_method 0, 3). Not with pulses,
+ * flying start, identification, regulators of switch states, block commutation or a carrier at a star point: refused.
  *
  * modulator_step() and the regulator run twice. State 60 bytes. Tests: tests/unit/drive/two_sets_test.cpp,
  * tests/scenario/two_sets.yaml. */

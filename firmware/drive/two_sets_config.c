@@ -7,13 +7,6 @@
 
 #if PM_HAS(two_sets)
 
-/* Which while both sets have a carrier errs by 8 degrees with M = 0.3 L. */
-static bool is_of_one_star(int32_t injection)
-{
-    return injection == (int32_t)INJECTION_zero_anti_rotating ||
-           injection == (int32_t)INJECTION_zero_rotating || injection == (int32_t)INJECTION_zero_pulsating;
-}
-
 static bool is_third(int32_t observer)
 {
     return observer == (int32_t)OBSERVER_third_integration || observer == (int32_t)OBSERVER_third_sogi ||
@@ -28,10 +21,6 @@ static void check(maker_t *m)
         refuse(m, DRIVE_PARAM_M_d, "half of L_d or more: L_d is that of both sets, with M_d in it");
     } else if (2 * (int64_t)p->M_q >= p->L_q) {
         refuse(m, DRIVE_PARAM_M_q, "half of L_q or more: L_q is that of both sets, with M_q in it");
-    } else if (p->start_method < 2) {
-        refuse(m, DRIVE_PARAM_start_method, "two sets are started by 2 or 3");
-    } else if (p->start_method == 3 && is_of_one_star(p->injection)) {
-        refuse(m, DRIVE_PARAM_injection, "reads one star: injection 12 or 13");
     } else if (p->neutral_channel == 1 && is_third(p->observer)) {
         refuse(m, DRIVE_PARAM_observer, "needs each star point: neutral_channel 0");
     } else {

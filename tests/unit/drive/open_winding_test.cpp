@@ -513,6 +513,28 @@ TEST(OpenWinding, TheThirdHarmonicNeedsNoChannelOfTheNeutral)
     EXPECT_EQ(refused(p, PM_CHANNELS & ~NEEDS_NEUTRAL).param, DRIVE_PARAM_observer);
 }
 
+// By itself, and asked to; what reads the star point has none.
+TEST(OpenWinding, InjectionFollowsAnAlign)
+{
+    for (const int start : {0, 3}) {
+        drive_params_t p = ow::params();
+        p.start_method = start;
+        p.L_q = p.L_q_rated = 3 * p.L_d / 2;
+        const drive_config_t c = ow::configured(p);
+        EXPECT_TRUE(c.injection) << start;
+        EXPECT_EQ(c.start, SEQUENCE_align) << start;
+        for (const int injection :
+             {INJECTION_zero_anti_rotating, INJECTION_zero_rotating, INJECTION_zero_pulsating}) {
+            p.injection = injection;
+            drive_config_t none = {};
+            const drive_result_t result = drive_configure(&none, &p, PM_CHANNELS);
+            EXPECT_FALSE(result.ok) << injection;
+            EXPECT_EQ(result.param, DRIVE_PARAM_injection);
+            EXPECT_STREQ(result.reason, "reads the star point of one set");
+        }
+    }
+}
+
 TEST(OpenWinding, WhatKnowsOneBridgeIsRefused)
 {
     const char *const star = "knows one bridge: winding 0";
@@ -523,8 +545,8 @@ TEST(OpenWinding, WhatKnowsOneBridgeIsRefused)
         const char *reason;
     } cases[] = {
         {&drive_params_t::L_0, 0, DRIVE_PARAM_L_0, "of an open winding must be known"},
-        {&drive_params_t::start_method, 0, DRIVE_PARAM_start_method, "an open winding is started by 2"},
-        {&drive_params_t::start_method, 1, DRIVE_PARAM_start_method, "an open winding is started by 2"},
+        {&drive_params_t::start_method, 1, DRIVE_PARAM_start_method,
+         "pulses know one bridge: take 0, 2 or 3"},
         {&drive_params_t::flying_start, 1, DRIVE_PARAM_flying_start, star},
         {&drive_params_t::commutation, 1, DRIVE_PARAM_commutation, star},
         {&drive_params_t::regulator, REGULATOR_finite_set, DRIVE_PARAM_regulator, star},
