@@ -21,7 +21,7 @@ void check_one_bridge(maker_t *m)
     if (p->start_method == 1) {
         refuse(m, DRIVE_PARAM_start_method, "pulses know one bridge: take 0, 2 or 3");
     } else if (p->start_method != 2 && is_of_one_star(p->injection)) {
-        refuse(m, DRIVE_PARAM_injection, "reads the star point of one set");
+        refuse(m, DRIVE_PARAM_injection, "reads one star: with two sets injection 12 or 13");
     } else if (p->flying_start != 0) {
         refuse(m, DRIVE_PARAM_flying_start, reason);
     } else if (p->commutation != 0) {

@@ -530,7 +530,7 @@ TEST(OpenWinding, InjectionFollowsAnAlign)
             const drive_result_t result = drive_configure(&none, &p, PM_CHANNELS);
             EXPECT_FALSE(result.ok) << injection;
             EXPECT_EQ(result.param, DRIVE_PARAM_injection);
-            EXPECT_STREQ(result.reason, "reads the star point of one set");
+            EXPECT_STREQ(result.reason, "reads one star: with two sets injection 12 or 13");
         }
     }
 }

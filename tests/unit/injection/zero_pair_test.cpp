@@ -243,7 +243,7 @@ TEST(ZeroPair, IsRefusedWithoutTwoSetsOrInTheToldForm)
     p = parameters({}, INJECTION_zero_rotating, 500);
     result = drive_configure(&c, &p, PM_ALL);
     EXPECT_EQ(result.param, DRIVE_PARAM_injection);
-    EXPECT_STREQ(result.reason, "reads one star: injection 12 or 13");
+    EXPECT_STREQ(result.reason, "reads one star: with two sets injection 12 or 13");
 }
 
 } // namespace
