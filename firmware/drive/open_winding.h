@@ -26,13 +26,18 @@
  * Either is the mean over [k-1, k): what third.h takes as the star point's voltage behind an RC of half a period.
  *
  * Currents of the first bridge's legs by sensors in the lines. i_0 counts in what each leg carries (i_trip) and in
- * what heats the windings, and where half of i_max of it flows for 2 ms that is a fault, SENSOR_SUM. A phase that is
- * open, or whose sensor shows nothing, is not held by the others as in a star: it is found by the voltage that nothing
- * explains, within 3 ms, and where i_0 is held by its leg's current (open_phase.h). Where i_0 flows a switch that does
- * not close is not found at light load. A sensor that is stuck lets ten times the rated current through until then:
- * the hardware break of the bridge must act below that (docs/porting.md). A start is an align, and injection follows
- * it where there is saliency (start_method 0, 3). Not with pulses, flying start, identification, regulators of switch
- * states, block commutation or a carrier that needs a star: refused.
+ * what heats the windings, and where half of i_max of it flows for 2 ms that is a fault, SENSOR_SUM.
+ *
+ * The other phases do not hold the current of one that is open, or whose sensor shows nothing, as in a star: control
+ * raises the voltage until it flows. That is OPEN_PHASE where for 3 ms
+ *   |v| + |v_0| > 2 R i_max + 3/2 |omega| (psi_m + L_q i_max) + v_dc / 16 + v_injection
+ * and where i_0 is held also by the leg's current (open_phase.h). A rotor that its load turns against an imposed
+ * vector strains the voltage as well: while one is imposed behind the align the fault is POSITION_LOST. Where i_0
+ * flows, a switch that does not close is not found at light load. A sensor that is stuck lets ten times the rated
+ * current through: the hardware break of the bridge must act below that (docs/porting.md).
+ *
+ * A start is an align, and injection follows it where there is saliency (start_method 0, 3). Pulses, flying start,
+ * identification, regulators of switch states, block commutation and carriers that need a star point are refused.
  *
  * open_winding_slow() at 1 kHz; no division in a period but those of modulator_step(), which runs twice. State 44 bytes.
  * Tests: tests/unit/drive/open_winding_test.cpp and open_winding_drive_test.cpp, tests/scenario/open_winding.yaml and

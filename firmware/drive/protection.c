@@ -190,11 +190,11 @@ void protection_heat(drive_t *drive)
     }
 }
 
-static bool misses_phase(drive_t *drive, pm_q_t least, pm_ab_t wanted, pm_ab_t i)
+static bool has_open_phase(drive_t *drive, pm_q_t least, pm_ab_t wanted, pm_ab_t i)
 {
 #if PM_CARRIES(NEEDS_BRIDGES)
     if (drive->config.winding != (uint8_t)WINDING_STAR) {
-        return second_bridge_misses_phase(drive, least, wanted, i);
+        return second_bridge_has_open_phase(drive, least, wanted, i);
     }
 #endif
     return open_phase_slow(&drive->open_phase, least, wanted, i, 0);
@@ -212,10 +212,17 @@ void protection_phases(drive_t *drive)
     }
     const pm_dir_t dir = pm_dir(drive->stage == STAGE_VECTOR ? drive->position.pll.theta : drive->theta_open);
     const protection_config_t *c = &drive->config.protection;
-    if (misses_phase(drive, drive->carrier ? c->judged_carrier : c->judged,
-                     pm_park_inverse(drive->i_ref, dir), pm_park_inverse(drive->status.i, dir))) {
+    if (has_open_phase(drive, drive->carrier ? c->judged_carrier : c->judged,
+                       pm_park_inverse(drive->i_ref, dir), pm_park_inverse(drive->status.i, dir))) {
         drive_trip(drive, DRIVE_FAULT_OPEN_PHASE);
     }
+#if PM_HAS(open_winding)
+    if (drive->config.winding == (uint8_t)WINDING_OPEN && second_bridge_is_strained(drive)) {
+        const bool imposed = drive->stage == STAGE_OPEN_LOOP && drive->state == DRIVE_RUNNING &&
+                             drive->command.mode < DRIVE_MODE_CURRENT;
+        drive_trip(drive, imposed ? DRIVE_FAULT_POSITION_LOST : DRIVE_FAULT_OPEN_PHASE);
+    }
+#endif
 }
 
 /* 1 below `from`, 0 above `to`. */

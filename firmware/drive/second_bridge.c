@@ -94,8 +94,7 @@ void second_bridge_without(drive_t *drive, drive_out_t *out)
 }
 
 #if PM_HAS(open_winding)
-/* Current, speed and carrier ask for the voltage, that of all phases with it, which has R and half of the EMF and v_dc / 16 to spare. Of a phase
- * whose current is not seen it grows until they do not: nothing else holds that current. */
+/* Current, speed and carrier ask for the voltage: open_winding.h. */
 static bool is_explained(const drive_t *drive)
 {
     const pm_machine_t *machine = &drive->config.machine;
@@ -107,9 +106,16 @@ static bool is_explained(const drive_t *drive)
     const pm_ab_t v = drive->v_acting;
     return left > 0 && pm_mul(v.alpha, v.alpha) + pm_mul(v.beta, v.beta) <= pm_mul(left, left);
 }
+
+bool second_bridge_is_strained(drive_t *drive)
+{
+    uint8_t *ms = &drive->open_winding.unexplained_ms;
+    *ms = is_explained(drive) ? 0U : (uint8_t)(*ms + 1U);
+    return *ms > UNEXPLAINED_MS;
+}
 #endif
 
-bool second_bridge_misses_phase(drive_t *drive, pm_q_t least, pm_ab_t wanted, pm_ab_t i)
+bool second_bridge_has_open_phase(drive_t *drive, pm_q_t least, pm_ab_t wanted, pm_ab_t i)
 {
 #if PM_HAS(two_sets)
     if (drive->config.winding == (uint8_t)WINDING_TWO_SETS) {
@@ -123,12 +129,9 @@ bool second_bridge_misses_phase(drive_t *drive, pm_q_t least, pm_ab_t wanted, pm
     }
 #endif
 #if PM_HAS(open_winding)
-    uint8_t *ms = &drive->open_winding.unexplained_ms;
-    *ms = is_explained(drive) ? 0U : (uint8_t)(*ms + 1U);
     /* where i_0 flows it may be as large as what is wanted of a leg */
-    const bool missed = drive->config.open_winding.held &&
-                        open_phase_slow(&drive->open_phase, least, wanted, i, drive->open_winding.i);
-    return missed || *ms > UNEXPLAINED_MS;
+    return drive->config.open_winding.held &&
+           open_phase_slow(&drive->open_phase, least, wanted, i, drive->open_winding.i);
 #else
     return false;
 #endif
