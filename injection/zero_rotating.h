@@ -14,10 +14,11 @@
  * at 1 kHz, 500 instructions with N = 20, the second twice that. A period may come between two of the samples and renew
  * one: it is of the same phase.
  *
- * The answer has the same size at any position, so one that is missing, as with a lead to the star point that has come off, is
- * seen: with x~ = x_k - x_k-h and P of either form
- *   m = 2 sqrt(mean of x~^2 / P)    1 without kappa, if dL_0 is told right, else within (1 - kappa) / (1 + kappa) of it
- * misfit is 4 m - 1 where m is below 1/4.
+ * The answer has the same size at any position. So it shows a lead to the star point that has come off: with P of either form,
+ *   x~ = x_k - x_k-h
+ *   m = 2 sqrt(mean of x~^2 / P)
+ *   misfit = 4 m - 1                where m < 1/4
+ * m is 1 without kappa where dL_0 is told right, and with kappa between (1 - kappa) / (1 + kappa) and its inverse.
  *
  * Forms, eps, other misfit, delay: zero_sequence.h. Functions as injection.h says.
  * Tests: tests/unit/injection/zero_sequence_test.cpp, tests/scenario/zero_rotating.yaml. */

@@ -12,9 +12,12 @@
  * From then on angle and speed come from the zero crossings:
  *   theta = theta of the last crossing + (t - t_z) / turn
  * The voltage must be that of the speed, on average: (u - lost) v_dc - 2 R i within half of the EMF, with what the dead
- * time of one or both legs takes, else crossings are believed that are none, as of a rotor that was stopped. Below half of its ripple,
- * at most v_dc T / (16 L), twice that where both legs chop, the current turns within a period, and dead time may take anything between
- * `lost` and -lost. Where diodes carry the off time u v_dc is not the voltage, and this is not looked at.
+ * time of one or both legs takes, else crossings are believed that are none, as of a rotor that was stopped. A current
+ * below half of its largest ripple,
+ *   v_dc T / (16 L)     one leg chops
+ *   v_dc T / (8 L)      both do
+ * may change its sign within each period: dead time then takes anything from -lost to lost, and that much more is allowed.
+ * Where diodes carry the off time u v_dc is not the voltage, and this is not looked at.
  *
  * A turn whose crossings are not where they belong ends it (missed_crossings): all legs off in the same period. With
  * flying_start the rotor is looked for, caught by the vector path and given back; without, or after resync_tries, the fault

@@ -7,7 +7,8 @@
 
 #define SHARE_MOST 200 /* over 201: below one */
 
-/* Which an open winding has not, and of two sets errs by 8 degrees while both have a carrier, with M = 0.3 L. */
+/* Sources that read one star point: an open winding has none, and with two sets they err by 8 degrees while both have a
+ * carrier, at M = 0.3 L. */
 static bool is_of_one_star(int32_t injection)
 {
     return injection == (int32_t)INJECTION_zero_anti_rotating ||

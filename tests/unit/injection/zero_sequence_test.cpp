@@ -292,8 +292,8 @@ TEST(ZeroSequence, AtStandstillTheCarrierAlongDIsNotBelieved)
     EXPECT_NEAR(settled({INJECTION_zero_anti_rotating, 500, ZERO_MEASURED}, 0).misfit, 0, kKappa + 0.05);
 }
 
-// Told twice or half of the answer it does not.
-TEST(ZeroSequence, ARotatingCarrierMissesALeadThatHasComeOff)
+// And an answer of half or twice the size, of a dL_0 that is told wrong, is not taken for one.
+TEST(ZeroSequence, ARotatingCarrierShowsALeadThatHasComeOff)
 {
     for (const Choice &choice : {Choice{INJECTION_zero_rotating, 500, ZERO_MEASURED},
                                  {INJECTION_zero_rotating, 500, ZERO_TOLD},
