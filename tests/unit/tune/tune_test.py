@@ -173,6 +173,47 @@ class Tune(unittest.TestCase):
         told["sensor"] = {"i_full_scale_A": 5}
         self.refused(told, "cannot measure")
 
+    def test_a_link_too_low_for_rated_current_is_warned_of(self):
+        """12 ohm and 0.6 A take 7.2 V, 12 V give 6.93. Half of rated current must flow; an open winding has sqrt(3) times the voltage."""
+        told = motor("gimbal")
+        told["electrical"]["R_s_ohm"] = 12
+        told["rated"].update(i_rated_A=0.6, speed_rated_rad_s=20, v_dc_V=12)
+        result = self.tune(told)
+        self.assertEqual(result.returncode, 0)
+        self.assertIn("drive:", result.stdout)
+        for word in (f"warning: {self.told}: rated.i_rated_A = 0.6 takes 7.2 V", "rated.v_dc_V = 12 gives 6.93 V, v_dc/sqrt(3)",
+                     "drives 0.577 A", "v_dc_V above 12.5"):
+            self.assertIn(word, result.stderr)
+        told["electrical"]["R_s_ohm"] = 11.5
+        self.assertEqual(self.tune(told).stderr, "")
+        told["electrical"]["R_s_ohm"] = 23
+        self.assertEqual(self.tune(told).returncode, 0)
+        told["electrical"]["R_s_ohm"] = 23.2
+        self.refused(told, "motor.yaml:", "rated.i_rated_A = 0.6 takes 13.9 V", "v_dc_V above 24.1")
+        told["electrical"]["R_s_ohm"], told["winding"] = 19.9, {"connection": "open", "L_0_H": 1e-3}
+        self.assertEqual(self.tune(told).stderr, "")
+
+    def test_a_link_too_low_for_rated_speed_is_warned_of(self):
+        """EMF 13.2 V at 40 rad/s, 12.12 V with half of rated current against the magnet; 6 V give 3.46, 22 V 12.7."""
+        told = motor("hub motor")
+        told["rated"]["v_dc_V"] = 6
+        result = self.tune(told)
+        self.assertEqual(result.returncode, 0)
+        self.assertIn("drive:", result.stdout)
+        for word in (f"warning: {self.told}: rated.speed_rated_rad_s = 40 has 13.2 V of EMF",
+                     "enough for 10.5 rad/s, 11.4 with i_fw_max = 10",
+                     "v_dc_V well above 22.9", "speed_rated_rad_s below 10.5"):
+            self.assertIn(word, result.stderr)
+        self.assertEqual(len(result.stderr.splitlines()), 2)
+        told["rated"]["v_dc_V"] = 22
+        self.assertEqual(self.tune(told).stderr, "")
+        told["drive"] = {"i_fw_max": 0}
+        self.assertIn("enough for 38.5 rad/s", self.tune(told).stderr)
+
+    def test_motors_on_their_link_have_no_warning(self):
+        for name in MOTORS:
+            self.assertEqual(self.tune(motor(name)).stderr, "", name)
+
     def drive(self, told, *words):
         return yaml.safe_load(self.tune(told, *words).stdout)["drive"]
 
