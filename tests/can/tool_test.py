@@ -170,8 +170,14 @@ class Values(Bench):
 
     def test_the_parameter_in_the_way_is_named(self):
         _, err = self.command("set", "i_max=9.5", code=1)
-        self.assertIn("i_max (2200h:01), by i_trip (2600h:01)", err)
+        self.assertIn("i_max (2200h:01), by i_trip (2600h:01): does not go", err)
         self.assertIn("0604 0043h", err)
+        self.assertIn("change i_trip in the same `pmdrive set`; the bus does not carry the reason: `pmsim run", err)
+
+    def test_a_parameter_is_not_in_its_own_way(self):
+        _, err = self.command("set", "i_trip=4", code=1)
+        self.assertIn("i_trip (2600h:01): does not go with other values", err)
+        self.assertIn("change what it has to fit in the same `pmdrive set`; the bus does not carry the reason: `pmsim run", err)
 
     def test_what_is_still_to_be_done(self):
         self.node["parameters_ready"] = 3
@@ -337,7 +343,13 @@ class Sets(Bench):
         self.assertEqual((self.node["R_s"], self.node["i_max"], self.node["i_trip"]), (6000000, 5000, 9000))
         self.assertEqual(self.node["parameter_batch"], 0)
         _, err = self.command("load", self.write("i_max: 40 A\n"), "--yes", code=1)
-        self.assertIn("nothing was changed: i_trip was not among the changes; it does not go with i_max", err)
+        self.assertIn("nothing was changed: i_trip was not among the changes; it does not go with i_max; the bus does not carry the reason: `pmsim run", err)
+        many = "".join(f"{name}: {value}\n" for name, value in (
+            ("R_s", 7), ("L_d", 0.04), ("L_q", 0.07), ("psi_m", 0.1), ("J", 1e-3), ("pole_pairs", 2), ("i_max", 40)))
+        _, err = self.command("load", self.write(many), "--yes", code=1)
+        self.assertIn("it does not go with one of the 7 changes;", err)
+        _, err = self.command("load", self.write(many + "i_trip: 30 A\n"), "--yes", code=1)
+        self.assertIn("mend i_trip, or what it has to fit among the other 7 changes;", err)
 
     def test_read_back(self):
         """A drive that takes a value without keeping it does not go unnoticed."""

@@ -17,6 +17,8 @@ OPEN = int.from_bytes(b"open", "little")
 TOGETHER = 0x06040043  # abort code of the check of all parameters together
 STORE_S = 5.0  # most that flash takes
 NAMED = 6  # changed values in an error
+REASON = ("the bus does not carry the reason: `pmsim run SCENARIO.yaml --set machine=MACHINE.yaml` says it, "
+          "with the drive's values in the machine file, and --set NAME=VALUE for each that changes")
 TRIES = 10  # where another client of the drive is answered in between
 GROUPS = ("all", "communication", "application", "machine")
 # Statusword: (mask, value): state of CiA 402
@@ -49,12 +51,14 @@ def fault_text(code):
 def _advice(culprit, changed):
     """What to mend when the drive has refused values together."""
     others = [entry.name for entry in changed if entry is not culprit]
-    named = ", ".join(others[:NAMED]) + (f" and {len(others) - NAMED} more" if len(others) > NAMED else "")
     if not others:
-        return f"nothing was changed: mend {culprit.name}, or those that it has to fit"
+        return f"nothing was changed: mend {culprit.name}, or those that it has to fit; {REASON}"
+    named = ", ".join(others) if len(others) <= NAMED else ""
     if culprit in changed:
-        return f"nothing was changed: mend {culprit.name}, or what it has to fit among {named}"
-    return f"nothing was changed: {culprit.name} was not among the changes; it does not go with {named}"
+        among = named or f"the other {len(others)} changes"
+        return f"nothing was changed: mend {culprit.name}, or what it has to fit among {among}; {REASON}"
+    against = named or f"one of the {len(others)} changes"
+    return f"nothing was changed: {culprit.name} was not among the changes; it does not go with {against}; {REASON}"
 
 
 class Drive:
@@ -156,7 +160,11 @@ class Drive:
             if entry.name == "parameter_batch":
                 raise Refused(f"{culprit.label}, of all together", error.code, culprit.index, culprit.sub,
                               _advice(culprit, changed)) from None
-            raise Refused(f"{entry.label}, by {culprit.label}", error.code, entry.index, entry.sub) from None
+            if culprit is entry:
+                raise Refused(entry.label, error.code, entry.index, entry.sub,
+                              f"change what it has to fit in the same `pmdrive set`; {REASON}") from None
+            raise Refused(f"{entry.label}, by {culprit.label}", error.code, entry.index, entry.sub,
+                          f"change {culprit.name} in the same `pmdrive set`; {REASON}") from None
 
     def get(self, name):
         """A Decimal in the unit of the dictionary, or text."""
