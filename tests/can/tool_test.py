@@ -336,6 +336,14 @@ class Sets(Bench):
         self.command("set", "i_max=21 A", "i_trip=31 A")
         self.assertEqual((self.node["i_max"], self.node["i_trip"]), (21000, 31000))
 
+    def test_a_whole_machine_file(self):
+        path = self.write("name: My motor\nelectrical: {R_s_ohm: 5.9}\ndrive:\n  R_s: 7.0\ninverter:\n  f_pwm_Hz: 20000\n")
+        out, _ = self.command("load", path, "--yes")
+        self.assertIn("a.yaml is a machine file: `drive:` alone is read", out)
+        self.assertEqual(self.node["R_s"], 7000000)
+        self.assertIn("is a machine file", self.command("diff", path)[0])
+        self.assertEqual(self.json("diff", path), [[]])
+
     def test_refused_together_is_undone(self):
         _, err = self.command("load", self.write("R_s: 7 ohm\ni_max: 40 A\ni_trip: 30 A\n"), "--yes", code=1)
         self.assertIn("i_trip (2600h:01), of all together", err)

@@ -1,4 +1,5 @@
 """Values, names and files of the host tool: what people write and read against what is on the bus."""
+import re
 import sys
 import tempfile
 import unittest
@@ -126,6 +127,30 @@ class Files(unittest.TestCase):
     def test_as_a_machine_file_has_it(self):
         values = files.parse("drive:\n  R_s: 6.0      # measured\n\n  # L\n  L_d: 43.0e-3  # D: #1\n", "x")
         self.assertEqual({e.name: raw for e, raw in values.items()}, {"R_s": 6000000, "L_d": 43000000})
+
+    def test_of_a_machine_file_the_section_drive(self):
+        text = ("---\nname: My motor  # of a friend\nelectrical: {R_s_ohm: 5.9}\nwinding: {connection: star}\n\nrated:\n  i_rated_A: 4\n"
+                "drive:    # told\n  R_s: 6.0\n\n# L\n  L_d: 43.0e-3\nsensor:\n  bits: 12\nwinding:\n  emf:\n  - {order: 3}\n- x\n")
+        notes = []
+        values = files.parse(text, "motor.yaml", notes.append)
+        self.assertEqual({e.name: raw for e, raw in values.items()}, {"R_s": 6000000, "L_d": 43000000})
+        self.assertIn("motor.yaml is a machine file: `drive:` alone is read", notes[0])
+        files.parse("R_s: 6\n", "a.yaml", notes.append)
+        self.assertEqual(len(notes), 1)
+        for path in sorted((ROOT / "sim_plant/machines").glob("*.yaml")):
+            section = path.read_text(encoding="utf-8").split("\ndrive:")[1]
+            known = dict(re.findall(r"^  (\w+): *(\S+)", section, re.M))
+            found = {e.name: float(e.physical(raw)) for e, raw in files.read(path).items()}
+            self.assertEqual(found.keys(), known.keys(), path.name)
+            for name, value in found.items():
+                self.assertAlmostEqual(value, float(known[name]), delta=0.01 * abs(value), msg=f"{path.name} {name}")
+
+    def test_mistakes_in_a_machine_file(self):
+        self.refused("name: M\ndrive:\n  R_z: 3\n", "a.yaml:3: no object is called `R_z`")
+        self.refused("name: M\nelectrical: {R_s_ohm: 5.9}\n", "a.yaml: a machine file without a section `drive:`\n  `pmsim tune`")
+        self.refused("name: M\ndrive: {R_s: 3}\n", "a.yaml:2: drive: its values stand below it")
+        self.refused("R_s: 3\ndrive:\n  L_d: 3e-3\n", "a.yaml:1: R_s stands outside `drive:`")
+        self.refused("drive:\n  L_d: 3e-3\nR_s: 3\n", "a.yaml:3: R_s stands outside `drive:`")
 
     def refused(self, text, words):
         with self.assertRaises(UsageError) as caught:

@@ -11,11 +11,11 @@ def add(command):
     sub.add_argument("names", nargs="*", help="only these objects or records")
     sub.add_argument("--out", help="file (standard output)")
     sub = command("load", "set the values of a file, check all together, read back", load)
-    sub.add_argument("file")
+    sub.add_argument("file", help="`name: value unit` a line, as `dump` writes it; or a machine file, of which `drive:` is read")
     sub.add_argument("--dry-run", action="store_true", help="only show what would change")
     sub.add_argument("--yes", action="store_true", help="do not ask")
     sub = command("diff", "what differs from a file, or from the defaults", diff)
-    sub.add_argument("file", nargs="?", help="file (the defaults)")
+    sub.add_argument("file", nargs="?", help="file as of `load` (the defaults)")
     for name, text, function in (("save", "keep the present values over a reset", save),
                                  ("restore", "have the defaults after the next reset: asks", restore)):
         sub = command(name, text, function)
@@ -40,7 +40,7 @@ def _defaults(drive):
 
 
 def diff(arguments, drive, out):
-    values = files.read(arguments.file) if arguments.file else _defaults(drive)
+    values = files.read(arguments.file, out.line) if arguments.file else _defaults(drive)
     changes = drive.diff(values, out.progress)
     show_changes(changes, out, ("drive", "file" if arguments.file else "default"))
     if not changes:
@@ -48,7 +48,7 @@ def diff(arguments, drive, out):
 
 
 def load(arguments, drive, out):
-    values = files.read(arguments.file)
+    values = files.read(arguments.file, out.line)
     changes = drive.load(values, dry_run=True)
     show_changes(changes, out, ("before", "after"))
     if not changes:

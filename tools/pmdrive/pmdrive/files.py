@@ -1,4 +1,5 @@
-"""Files of values: one `name: value unit` a line, # before a comment. So written, a file is YAML as well."""
+"""Files of values: one `name: value unit` a line, # before a comment. So written, a file is YAML as well. Of a machine file, which has
+sections, the values are those of `drive:`."""
 import re
 from pathlib import Path
 
@@ -14,13 +15,36 @@ def _comment(text):
     return text[: match.start()] if match else text
 
 
-def parse(text, shown):
-    """{entry: integer}; errors name file and line."""
-    out, lines = {}, {}
-    for number, line in enumerate(text.splitlines(), 1):
-        line = _comment(line)
-        if not line.strip() or line.strip() in ("drive:", "---"):
+def _drive(lines, shown):
+    """Of a machine file's lines those of `drive:`; None of a file without sections."""
+    words = [line.split(":")[0] for _, line in lines]
+    if "drive" not in words:
+        if {"name", "electrical"} <= set(words):
+            raise UsageError(f"{shown}: a machine file without a section `drive:`", "`pmsim tune` completes it")
+        return None
+    out, inside = [], False
+    for number, line in lines:
+        if line[0].isspace():
+            out += [(number, line)] if inside else []
             continue
+        inside = line == "drive:"
+        match = LINE.fullmatch(line)
+        if match and match[1] == "drive":
+            raise UsageError(f"{shown}:{number}: drive: its values stand below it, `name: value` a line each")
+        if match and match[1] in names.BY_NAME and match[2][0] not in "{[":  # `winding` is a section as well
+            raise UsageError(f"{shown}:{number}: {match[1]} stands outside `drive:`", "indent it below `drive:`")
+    return out
+
+
+def parse(text, shown, note=None):
+    """{entry: integer}; errors name file and line. `note` is told when it is a machine file."""
+    out, lines = {}, {}
+    there = [(number, _comment(line).rstrip()) for number, line in enumerate(text.splitlines(), 1)]
+    there = [(number, line) for number, line in there if line.strip() not in ("", "---")]
+    drive = _drive(there, shown)
+    if drive and note:
+        note(f"{shown} is a machine file: `drive:` alone is read, the board's scales and f_pwm stay the drive's")
+    for number, line in there if drive is None else drive:
         match = LINE.fullmatch(line)
         if not match:
             raise UsageError(f"{shown}:{number}: not a line of the form `name: value`: {line.strip()}")
@@ -38,9 +62,9 @@ def parse(text, shown):
     return out
 
 
-def read(path):
+def read(path, note=None):
     try:
-        values = parse(Path(path).read_text(encoding="utf-8-sig"), path)
+        values = parse(Path(path).read_text(encoding="utf-8-sig"), path, note)
     except OSError as error:
         raise UsageError(f"{path}: {error.strerror}") from None
     except UnicodeDecodeError as error:
