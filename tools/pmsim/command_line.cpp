@@ -6,6 +6,9 @@
 
 #include <CLI/CLI.hpp>
 
+#include "tools/pmsim/text.h"
+#include "tools/pmsim/yaml_reader.h"
+
 namespace pmsim
 {
 
@@ -46,7 +49,19 @@ Option *Option::range(int low, int high)
 
 Option *Option::words(const std::map<std::string, int> &values)
 {
-    option->transform(CLI::CheckedTransformer(values));
+    std::vector<std::string> known;
+    for (const auto &[word, number] : values) {
+        known.push_back(word);
+    }
+    const auto replace = [values, known](std::string &text) {
+        const auto found = values.find(text);
+        if (found == values.end()) {
+            return "\"" + text + "\" is none of " + join(known, ", ") + did_you_mean(nearest(text, known));
+        }
+        text = std::to_string(found->second);
+        return std::string();
+    };
+    option->type_name(join(known, "|"))->transform(CLI::Validator(replace, ""));
     return this;
 }
 
@@ -152,10 +167,30 @@ void CommandLine::require_subcommand()
     app->require_subcommand(1);
 }
 
+// CLI11 says "A subcommand is required", whatever stands in its place.
+void CommandLine::refuse_unknown_command() const
+{
+    const std::vector<std::string> words = app->remaining();
+    if (app->get_require_subcommand_min() == 0 || !app->get_subcommands().empty() || words.empty()) {
+        return;
+    }
+    if (words.front()[0] == '-') {
+        throw InputError("unknown option \"" + words.front() + "\"; --help lists all");
+    }
+    std::vector<std::string> known;
+    for (const CLI::App *command : app->get_subcommands([](const CLI::App *) { return true; })) {
+        known.push_back(command->get_name());
+    }
+    throw InputError(unknown("command", words.front(), known));
+}
+
 std::optional<int> CommandLine::parse(int argc, char **argv)
 {
     try {
         app->parse(argc, argv);
+    } catch (const CLI::RequiredError &error) {
+        refuse_unknown_command();
+        return app->exit(error) == 0 ? 0 : 2;
     } catch (const CLI::ParseError &error) {
         return app->exit(error) == 0 ? 0 : 2;
     }

@@ -91,8 +91,11 @@ class CommandLine : public Command
     void require_subcommand();
 
     // Reads the words and runs the callback of the command. An exit code where the program is to end now: help was
-    // wanted, or the words are wrong (2), which has been said.
+    // wanted, or the words are wrong (2), which has been said. Throws InputError of a word that is no command.
     std::optional<int> parse(int argc, char **argv);
+
+  private:
+    void refuse_unknown_command() const;
 };
 
 // The exit code, or 2, which is then said, where standard output did not take all that was printed.

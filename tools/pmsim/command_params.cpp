@@ -19,7 +19,7 @@ extern "C" {
 namespace pmsim
 {
 
-// Between the limits the defaults, or the values of a machine.
+// Between the limits the defaults, or the values of a machine; below a choice what its numbers mean.
 static void print_parameters(const char *title, const drive_params_t &params)
 {
     std::printf("%-24s %-7s %12s %12s %12s  %s\n", "name", "unit", "min", title, "max", "help");
@@ -29,6 +29,9 @@ static void print_parameters(const char *title, const drive_params_t &params)
         std::printf("%-24s %-7s %12s %12s %12s  %s\n", info.name, drive_param_text[id].unit,
                     format(parameter_si(id, info.min)).c_str(), format(parameter_si(params, id)).c_str(),
                     format(parameter_si(id, info.max)).c_str(), drive_param_text[id].help);
+        for (const ParameterChoice &choice : parameter_choices(id)) {
+            std::printf("%5d  %s\n", choice.value, choice.meaning);
+        }
     }
 }
 
@@ -98,8 +101,9 @@ static void print_metrics()
 void add_params_command(Command &app)
 {
     Command *command = app.add_subcommand(
-        "params", "Print the drive's parameters: name, unit, range, default or a machine's "
-                  "value, help; or make the page of them that a board is given");
+        "params",
+        "Print the drive's parameters: name, unit, range, default or a machine's "
+        "value, help, what the numbers of a choice mean; or make the page of them that a board is given");
     auto options = std::make_shared<PageOptions>();
     Option *machine =
         command->add_option("--machine", options->machine, "machine file whose parameters to take");

@@ -83,22 +83,31 @@ bool belongs_to_inverter(const std::string &name)
     return name == "f_pwm" || name == "timer_counts";
 }
 
-// ": 0 fields; 1 blocks" of a parameter that is a choice.
-static std::string choices(drive_param_id_t id)
+std::vector<ParameterChoice> parameter_choices(drive_param_id_t id)
 {
     static const struct {
         drive_param_id_t id;
-        const char *text;
+        ParameterChoice choice;
     } values[] = {
-#define PM_VALUE(name, value, meaning) {DRIVE_PARAM_##name, #value " " meaning},
+#define PM_VALUE(name, value, meaning) {DRIVE_PARAM_##name, {value, meaning}},
 #include "tools/pmsim/parameter_values.def"
 #undef PM_VALUE
     };
-    std::vector<std::string> found;
+    std::vector<ParameterChoice> found;
     for (const auto &value : values) {
         if (value.id == id) {
-            found.emplace_back(value.text);
+            found.push_back(value.choice);
         }
+    }
+    return found;
+}
+
+// ": 0 fields; 1 blocks" of a parameter that is a choice.
+static std::string choices(drive_param_id_t id)
+{
+    std::vector<std::string> found;
+    for (const ParameterChoice &choice : parameter_choices(id)) {
+        found.push_back(std::to_string(choice.value) + " " + choice.meaning);
     }
     return found.empty() ? "" : ": " + join(found, "; ");
 }

@@ -58,6 +58,13 @@ std::optional<drive_param_id_t> find_parameter(const std::string &name);
 double parameter_si(drive_param_id_t id, int32_t raw);
 double parameter_si(const drive_params_t &params, drive_param_id_t id);
 
+// What the values of a parameter that is a choice mean; none of others.
+struct ParameterChoice {
+    int value;
+    const char *meaning;
+};
+std::vector<ParameterChoice> parameter_choices(drive_param_id_t id);
+
 // For values pmsim derives itself, e.g. from the inverter; rounded and clamped to the range.
 void set_parameter_si(drive_params_t &params, drive_param_id_t id, double si);
 

@@ -9,6 +9,7 @@ import sys
 import tempfile
 
 PMSIM = sys.argv[1]
+PARAMETER_VALUES = pathlib.Path(__file__).parents[3] / "tools/pmsim/parameter_values.def"
 SCENARIO = """title: small
 machine: {machine}
 start: {{theta_e_deg: $angle}}
@@ -39,7 +40,10 @@ def check_help():
         assert command in text, command
         expect_exit(0, command, "--help")
     expect_exit(2)
-    expect_exit(2, "rum")
+    assert 'unknown command "rum"; did you mean "run"?' in expect_exit(2, "rum").stderr
+    wrong = expect_exit(2, "frobnicate", "x.yaml").stderr
+    assert wrong.startswith('pmsim: unknown command "frobnicate"; known: run, board,'), wrong
+    assert 'pmsim: unknown option "--versoin"; --help lists all\n' == expect_exit(2, "--versoin").stderr
     expect_exit(2, "run")
     expect_exit(2, "run", "--no-such-option", "x.yaml")
 
@@ -48,8 +52,16 @@ def check_tables():
     assert "152 implemented" in expect_exit(0, "methods").stdout
     assert len(expect_exit(0, "methods", "--class", "pwm").stdout.splitlines()) == 3  # head, row 48, sum
     assert "persistent" in expect_exit(0, "methods", "--classes").stdout
-    expect_exit(2, "methods", "--class", "none")
-    assert "flux_bandwidth" in expect_exit(0, "params").stdout
+    wrong = expect_exit(2, "methods", "--class", "pusles").stderr
+    assert wrong.startswith('--class: "pusles" is none of benchmark, freewheeling, fundamental,'), wrong
+    assert 'did you mean "pulses"?' in wrong, wrong
+    params = expect_exit(0, "params").stdout
+    assert "flux_bandwidth" in params
+    values = params.split("\ninjection ")[1].split("\n")[1:16]  # of the parameter injection
+    assert values[4] == "    4  sine along d, its own phase measured: quiet, little moved by the inverter", values
+    assert values[13].startswith("   13  voltages at the neutrals") and not values[14].startswith(" "), values
+    indented = [line for line in params.splitlines() if line.startswith(" ")]
+    assert len(indented) == PARAMETER_VALUES.read_text().count("\nPM_VALUE(")
     assert "angle_error_mean_deg" in expect_exit(0, "metrics").stdout
 
 
