@@ -643,6 +643,11 @@ class Identification(Bench):
         _, err = self.command("identify", "--yes", code=1)
         self.assertIn("the rotor does not follow", err)
         self.assertIn("free the shaft", err)
+        self.assertIn("of a motor with saliency less, where it is above psi_m/(2 (L_q - L_d))", err)
+        self.node.identify_reason = 1
+        _, err = self.command("identify", "--yes", code=1)
+        self.assertIn("no current at the highest voltage", err)
+        self.assertIn("a phase may be open, or the link cannot drive the current, R_s i above 0.45 v_dc: less --current", err)
         self.assertEqual(self.node["R_s"], names.find("R_s").preset)
         self.assertEqual(self.node.lib.cia402_on(self.node.profile), 0)
 

@@ -27,10 +27,12 @@ RESULTS = {
 }
 DONE, FAILED = 2, 3
 WHAT_TO_DO = {
-    1: "check the motor's wires and i_rated; a phase may be open",
+    1: "check the motor's wires and i_rated; a phase may be open, or the link cannot drive the current, R_s i above 0.45 v_dc: "
+       "less --current",
     2: "check the motor's wires: a phase is open or loose",
     3: "check the current sensors' scale, i_full_scale and v_full_scale",
-    4: "free the shaft, take its load off, or allow more current: --current",
+    4: "free the shaft, take its load off, or allow more --current; of a motor with saliency less, where it is above "
+       "psi_m/(2 (L_q - L_d)): beyond that the vector holds the rotor less, from twice that on not at all",
     5: "it was stopped, or a fault came: `pmdrive faults`",
     6: "a round machine has no saliency to map; nothing at the star point: is it led out?",
     7: "lock the shaft",
