@@ -1,6 +1,7 @@
 #include "injection/injection.h"
 
 #include "firmware/math/compiler.h"
+#include "firmware/math/filter.h"
 #include "firmware/math/image.h"
 #include "firmware/math/measure.h"
 
@@ -14,6 +15,9 @@ void injection_reset(injection_t *self, const injection_config_t *config, const 
 {
 #if PM_HAS(injection_stages)
     injection_stages_reset(&self->stages, &config->stages);
+#endif
+#if INJECTION_LOW_PASS
+    self->eps = 0;
 #endif
     switch (config->id) {
 #define PM_METHOD(name, help, traits, needs)                                                                 \
@@ -48,20 +52,29 @@ static inline void step_of(injection_t *self, const injection_config_t *config, 
     }
 }
 
+static inline void step_in_stages(injection_t *self, const injection_config_t *config,
+                                  const injection_in_t *in, injection_out_t *out)
+{
+#if PM_HAS(injection_stages)
+    if (config->stages.on) {
+        injection_in_t turned;
+        injection_stages_before(&self->stages, &config->stages, in, &turned);
+        step_of(self, config, &turned, out);
+        injection_stages_after(&self->stages, &config->stages, in, out);
+        return;
+    }
+#endif
+    step_of(self, config, in, out);
+}
+
 PM_APART void injection_step_other(injection_t *self, const injection_config_t *config,
                                    const injection_in_t *in, injection_out_t *out)
 {
-#if PM_HAS(injection_stages)
-    if (!config->stages.on) {
-        step_of(self, config, in, out);
-        return;
+    step_in_stages(self, config, in, out);
+#if INJECTION_LOW_PASS
+    if (config->smooth != 0) {
+        out->eps = pm_lp1(&self->eps, out->eps, config->smooth);
     }
-    injection_in_t turned;
-    injection_stages_before(&self->stages, &config->stages, in, &turned);
-    step_of(self, config, &turned, out);
-    injection_stages_after(&self->stages, &config->stages, in, out);
-#else
-    step_of(self, config, in, out);
 #endif
 }
 

@@ -14,10 +14,18 @@
  *   x_limits(maker)                       what the source asks of the loops while it leads
  *   x_answer(maker)                       amplitude of the answer at 45 degrees of error without load, in A
  *                                         of one sample with the noise of one sample
+ *
+ * The error signal goes to the loop through 1 / (1 + s / w_c) (4.5.2, row 45), of sources that ask for it (x_limits()) or with the
+ * parameter `injection_filter`. With loop gains K_p = 2 zeta w_n, K_i = w_n^2 and T_d from position to error signal the loop is
+ * stable with
+ *   w_c > w / tan(atan(K_p w / K_i) - w T_d)
+ *   w: where |K_p j w + K_i| = w^2 sqrt(1 + (w / w_c)^2); without delay w_c > K_i / K_p. Below it swings up.
+ *
  * In period k the step takes the current sampled at k and gives the voltage for [k+1, k+2).
  *
  * Cost of the dispatch: three instructions for the default, which is compiled into the caller; a call for
- * the others. Tests: tests/contract/observer_contract_test.cpp runs all of the list. */
+ * the others. Tests: tests/contract/observer_contract_test.cpp runs all of the list,
+ * tests/scenario/injection_filter.yaml. */
 #ifndef INJECTION_INJECTION_H
 #define INJECTION_INJECTION_H
 
@@ -41,9 +49,16 @@ typedef enum {
 #define INJECTION_NEUTRAL                                                                                    \
     (PM_CARRIES(NEEDS_NEUTRAL) && PM_HAS(zero_anti_rotating) && !PM_HAS(injection_stages))
 
+/* Some source has a window over a carrier, or the low-pass a parameter. */
+#define INJECTION_LOW_PASS                                                                                   \
+    (PM_HAS(injection_stages) || PM_HAS(rotating_sine) || PM_HAS(pulsating_sine) || PM_HAS(stationary_sine))
+
 typedef struct {
     injection_id_t id;
-    bool inlined;   /* INJECTION_INLINE without stages; only in images with those */
+    bool inlined; /* INJECTION_INLINE without stages and low-pass; only in images with those */
+#if INJECTION_LOW_PASS
+    pm_frac_t smooth; /* w_c T_s / (1 + w_c T_s); 0: no low-pass */
+#endif
     pm_q_t reserve; /* voltage amplitude that control leaves to the carrier */
     union {
 #define PM_METHOD(name, help, traits, needs) PM_IN_IMAGE(name, name##_config_t name;)
@@ -63,6 +78,9 @@ typedef struct {
     };
 #if PM_HAS(injection_stages)
     injection_stages_t stages;
+#endif
+#if INJECTION_LOW_PASS
+    pm_q_t eps; /* behind the low-pass */
 #endif
 } injection_t;
 

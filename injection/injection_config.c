@@ -49,6 +49,25 @@ uint32_t injection_traits(injection_id_t id)
     return id < INJECTION_COUNT ? traits_of[id] : 0U;
 }
 
+#if INJECTION_LOW_PASS
+static pm_frac_t smoothing(maker_t *m)
+{
+    pm_num_t f_Hz = injection_limits(m).low_pass;
+    drive_param_id_t from = DRIVE_PARAM_injection_bandwidth;
+#if PM_HAS(injection_stages)
+    if (m->params->injection_filter != 0) {
+        f_Hz = si(m, DRIVE_PARAM_injection_filter);
+        from = DRIVE_PARAM_injection_filter;
+    }
+#endif
+    if (f_Hz.m == 0) {
+        return 0;
+    }
+    const pm_num_t step = mul3(PM_NUM_TWO_PI, f_Hz, m->base.t_s);
+    return gain(m, pm_num_div(step, pm_num_add(pm_num(1), step)), FRAC_BITS, from);
+}
+#endif
+
 void make_injection(maker_t *m, injection_config_t *c)
 {
     check_carrier(m);
@@ -66,11 +85,14 @@ void make_injection(maker_t *m, injection_config_t *c)
         refuse(m, DRIVE_PARAM_injection, "is not in this image");
         break;
     }
+#if INJECTION_LOW_PASS
+    c->smooth = smoothing(m);
+#endif
 #if PM_HAS(injection_stages)
     const bool is_square = c->id == INJECTION_pulsating_square;
     const bool is_sine = c->id == INJECTION_pulsating_sine;
     make_injection_stages(m, &c->stages, is_square || is_sine, is_sine ? sine_flux(m) : flux_of_period(m));
-    c->inlined = c->id == INJECTION_INLINE && !c->stages.on;
+    c->inlined = c->id == INJECTION_INLINE && !c->stages.on && c->smooth == 0;
 #endif
 }
 

@@ -1,6 +1,5 @@
 #include "injection/injection_stages.h"
 
-#include "firmware/math/filter.h"
 #include "firmware/math/image.h"
 #include "firmware/math/trig.h"
 
@@ -11,7 +10,6 @@
 void injection_stages_reset(injection_stages_t *self, const injection_stages_config_t *config)
 {
     self->frame = pm_dir(0);
-    self->eps = 0;
     self->gain = config->saliency.gain_0;
 }
 
@@ -66,9 +64,6 @@ void injection_stages_after(injection_stages_t *self, const injection_stages_con
     }
     if (config->unlike) {
         eps -= pm_small_gain(pm_small(swing(self->as_b, -self->as_a, twice)), self->gain);
-    }
-    if (config->k != 0) {
-        eps = pm_lp1(&self->eps, eps, config->k);
     }
     out->eps = eps;
 }

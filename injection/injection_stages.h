@@ -15,14 +15,10 @@
  *     c, a, b by least mean squares at 1 kHz with 0.4 s, while the rotor turns faster than 2 rad/s electrical; kept below that:
  *     eps -= gain (b cos 2 theta^ - a sin 2 theta^)
  *     Of a carrier along d alone; those of the stator are refused.
- *   low-pass (4.5.2, row 45): eps through 1 / (1 + s / w_c). With loop gains K_p = 2 zeta w_n, K_i = w_n^2 and T_d from
- *     position to error signal the loop is stable with
- *     w_c > w / tan(atan(K_p w / K_i) - w T_d)
- *     w: where |K_p j w + K_i| = w^2 sqrt(1 + (w / w_c)^2); without delay w_c > K_i / K_p. Below it swings up.
  *
  * injection_stages_before(), _after(): each period 70 instructions with all; _slow(): 1 kHz. Not in a period: what was
  * learnt outlasts a reset of the source, not that of the position. Tests: tests/unit/injection/injection_stages_test.cpp,
- * tests/scenario/cross_coupling_direct.yaml, saliencies.yaml, inductance_asymmetry.yaml, injection_filter.yaml. */
+ * tests/scenario/cross_coupling_direct.yaml, saliencies.yaml, inductance_asymmetry.yaml. */
 #ifndef INJECTION_INJECTION_STAGES_H
 #define INJECTION_INJECTION_STAGES_H
 
@@ -40,14 +36,12 @@ typedef struct {
     bool twelfth; /* their error is of that order, else of the sixth */
     bool unlike;  /* phases */
     pm_q_t a, b;  /* I_k of several saliencies: a cos + b sin */
-    pm_frac_t k;  /* of the low-pass; 0: none */
     pm_q_t omega_least;
     saliency_config_t saliency;
 } injection_stages_config_t;
 
 typedef struct {
     pm_dir_t frame; /* theta_v - theta^ */
-    pm_q_t eps;     /* behind the low-pass */
     int32_t gain;   /* rad per unit of current, Q20 */
     pm_q_t c;       /* of h_d: mean; 0: not known yet */
     pm_q_t as_a, as_b;

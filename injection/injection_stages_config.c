@@ -30,16 +30,6 @@ static void make_several(maker_t *m, injection_stages_config_t *c)
     c->b = n < 0 ? -pm_unit(i_k, phase.cos) : pm_unit(i_k, phase.cos);
 }
 
-/* w_c T_s / (1 + w_c T_s) */
-static void make_low_pass(maker_t *m, injection_stages_config_t *c)
-{
-    if (m->params->injection_filter != 0) {
-        const pm_num_t step = pm_num_mul(angular(m, DRIVE_PARAM_injection_filter), m->base.t_s);
-        c->k =
-            gain(m, pm_num_div(step, pm_num_add(pm_num(1), step)), FRAC_BITS, DRIVE_PARAM_injection_filter);
-    }
-}
-
 void make_injection_stages(maker_t *m, injection_stages_config_t *c, bool across, pm_num_t flux)
 {
     *c = (injection_stages_config_t){.direct = across && m->params->cross_coupling_comp == 2,
@@ -53,9 +43,8 @@ void make_injection_stages(maker_t *m, injection_stages_config_t *c, bool across
         refuse(m, DRIVE_PARAM_asymmetry_learning, "needs a carrier along d: injection 0 or 4");
     }
     make_several(m, c);
-    make_low_pass(m, c);
     c->omega_least = fixed(m, pm_num_div(OMEGA_LEAST, m->base.omega), Q_BITS, DRIVE_PARAM_speed_trip);
-    c->on = c->direct || c->several || c->unlike || c->k != 0;
+    c->on = c->direct || c->several || c->unlike;
 }
 
 #endif

@@ -2,8 +2,8 @@
 
 #include "firmware/math/root.h"
 
-/* A transient of the current must not turn the correction further than the inverter could: rad. */
-#define RHO_MOST PM_Q(0.5)
+/* rad: so that p times that fits. */
+#define RHO_MOST PM_Q(1)
 
 void rotating_sine_reset(rotating_sine_t *self, const rotating_sine_config_t *config, const obs_in_t *in)
 {
@@ -74,8 +74,9 @@ void rotating_sine_slow(rotating_sine_t *self, const rotating_sine_config_t *con
         self->misfit = pm_div(pm_hypot(positive.d, positive.q) - i_p, i_p);
         if (config->positive_sequence) {
             const pm_q_t measured = pm_angle_to_rad((int32_t)pm_atan2(positive.q, positive.d));
-            const pm_q_t beyond = pm_clamp(measured - config->rho_m0, -RHO_MOST, RHO_MOST);
-            rho += pm_mul(share(self, config, in->i_dq, i_p), beyond);
+            const pm_q_t seen = pm_clamp(measured - config->rho_m0, -RHO_MOST, RHO_MOST);
+            const pm_q_t beyond = pm_mul(share(self, config, in->i_dq, i_p), seen);
+            rho += pm_clamp(beyond, -config->most, config->most);
         }
     }
     const pm_q_t turn = rho - saliency_shift(&config->saliency, i_q);

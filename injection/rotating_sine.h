@@ -13,7 +13,10 @@
  *   p     = 3/4 + (1 / (2 kappa) - 3/4) |i_f|^2 / (|i_f|^2 + I_p^2),  kappa = I_n / I_p
  *   eps   = gain(i_q) Im[negative e^{j (2 rho' - theta_m)}],  gain = 1 / (2 I_n)
  * Without load all phases are governed by the carrier and p = 3/4; under load one phase at a time crosses zero.
- * Of a nearly round machine, kappa < 0.1, the second amplifies every error of rho_0: p stays 3/4.
+ * Of a nearly round machine, kappa < 0.1, the second amplifies every error of rho_0: p stays 3/4. The part with p
+ * is at most what dead time, devices and an R that is half as large again take of the carrier, since p, up to 8, magnifies
+ * what a transient of i_f does to rho_m:
+ *   5/4 v_lost / V_h + rho_0 / 2
  *
  * Compensation of dead time before the carrier (5.6.4.1, row 62): by the fundamental current alone it does nothing
  * for the carrier, which moves the legs through their zone by itself; with `injection_pre_comp`, where the image has the option counted_carrier, it goes by the
@@ -23,7 +26,7 @@
  *
  * eps is exact for small e and 1/2 sin 2e beyond. misfit: the positive sequence against I_p(i_q), relative. The
  * bandwidths that sine.h allows must also suit the machine: with those of the
- * scenario, 7 Hz for the position and 2 Hz for the speed, a compressor of 2e-4 kg m2 loses its position under a
+ * scenario, 12 Hz for the position and 3 Hz for the speed, a compressor of 2e-4 kg m2 loses its position under a
  * load of 0.3 s rise. Each period 120 instructions, 44 more to count the carrier in; rho' at 1 kHz.
  * State 400 bytes. Functions as injection.h says. Tests: tests/unit/injection/rotating_sine_test.cpp,
  * tests/scenario/rotating_sine.yaml. */
@@ -42,6 +45,7 @@ typedef struct {
     saliency_config_t saliency;
     pm_q_t rho_0;           /* rad */
     pm_q_t rho_m0;          /* rho_0 (1 + kappa^2) */
+    pm_q_t most;            /* of what the positive sequence adds to rho_0 */
     bool with_load;         /* p depends on the load */
     bool positive_sequence; /* rho' from rho_m; else rho_0 alone */
     bool counted_in;        /* the compensation of dead time is told the current of the carrier */

@@ -18,6 +18,15 @@ static pm_num_t seen_share(const maker_t *m)
     return pm_num_add(pm_num(1), square(kappa));
 }
 
+/* What dead time and devices can take of the carrier, and R where it is half as large again. */
+static pm_num_t most_beyond(const maker_t *m)
+{
+    const pm_num_t lost = pm_num_add(dead_voltage(m), si(m, DRIVE_PARAM_device_drop));
+    const pm_num_t of_inverter =
+        pm_num_mul(pm_num_div(lost, si(m, DRIVE_PARAM_v_injection)), pm_num_ratio(5, 4));
+    return pm_num_add(of_inverter, pm_num_mul(rho(m), pm_num_ratio(1, 2)));
+}
+
 /* Below I_p the carrier governs the signs of the currents, and a compensation by the fundamental disturbs both
  * sequences there. */
 injection_limits_t rotating_sine_limits(const maker_t *m)
@@ -45,6 +54,7 @@ void make_rotating_sine(maker_t *m, rotating_sine_config_t *c)
     make_saliency_sequence(m, &c->saliency, sine_flux(m));
     c->rho_0 = fixed(m, rho(m), Q_BITS, DRIVE_PARAM_R_s);
     c->rho_m0 = fixed(m, pm_num_mul(rho(m), seen_share(m)), Q_BITS, DRIVE_PARAM_R_s);
+    c->most = fixed(m, most_beyond(m), Q_BITS, DRIVE_PARAM_v_injection);
     c->with_load = load_counts(m);
     c->positive_sequence = m->params->injection_post_comp != 0;
     c->counted_in = m->params->injection_pre_comp != 0;

@@ -12,14 +12,17 @@
  *
  * Where it holds (METHODS.md 5.8; rows 65 to 67; predicted by tools/pmdrive/pmdrive/carrier.py, measured in
  * docs/results/safe_area.md; tools/tune.py chooses V_h, f_h and loops by it):
- *   noise  sigma = (I_qu / 2 I_n) sqrt(c 2/3 (sigma_n^2 + 1/12) w_n (zeta + 1 / (4 zeta)) / f_pwm)   rad
+ *   noise  sigma = (I_qu / 2 I_n) sqrt(c 2/3 (sigma_n^2 + 1/12) B / f_pwm)   rad
+ *          B     = (K_p^2 + K_i) / (2 (K_p - K_i / w_s)),  K_p = 2 zeta w_n,  K_i = w_n^2
  *          I_qu: step of the converter; sigma_n: noise in steps; c: 2 along d, 1 rotating
- *   load   up to where the second loop through the window is stable: a fundamental current that changes passes the
- *          window at f_h, the position loop turns the frame with it, and i_f in a frame that trembles at f_h is read
- *          as an answer; its gain goes with (i_f / I_n)^2 (w_n / omega_h)^2
+ *   load   up to where the second loop through the window is stable: a frame that trembles at omega_h / 2 trembles i_f
+ *          with it, of which the window, a whole period of the carrier, passes two thirds as an answer; the position
+ *          loop turns the frame by that. Its gain goes with (i_f / I_n) (w_n / omega_h), so the error signal passes a
+ *          low-pass before the loop (injection.h), which leaves a quarter:
+ *            w_s = max(omega_h / 8, 4 w_n)
  *
  * The samples in it are (N - 1) / 2 periods old, and so is the mean of the current: current control is slowed
- * while the source leads, to a phase of 0.4 rad, and the position loop may have 0.3 rad. */
+ * while the source leads, to a phase of 0.4 rad, and the position loop may have 0.2 rad, as the low-pass takes as much and more. */
 #ifndef INJECTION_SINE_H
 #define INJECTION_SINE_H
 

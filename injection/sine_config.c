@@ -38,9 +38,18 @@ static pm_num_t bandwidth(const maker_t *m, pm_num_t phase)
     return pm_num_div(phase, pm_num_mul(PM_NUM_TWO_PI, delay(m)));
 }
 
+/* Hz; w_s of sine.h. */
+static pm_num_t low_pass(const maker_t *m)
+{
+    const pm_num_t of_carrier = pm_num_div(si(m, DRIVE_PARAM_f_pwm), pm_num(8 * periods(m)));
+    const pm_num_t of_loop = pm_num_mul(pm_num(4), si(m, DRIVE_PARAM_injection_bandwidth));
+    return pm_num_cmp(of_carrier, of_loop) > 0 ? of_carrier : of_loop;
+}
+
 injection_limits_t sine_limits(const maker_t *m)
 {
-    return (injection_limits_t){.pll_max = bandwidth(m, pm_num_ratio(3, 10)),
+    return (injection_limits_t){.low_pass = low_pass(m),
+                                .pll_max = bandwidth(m, pm_num_ratio(2, 10)),
                                 .current_max = bandwidth(m, pm_num_ratio(4, 10))};
 }
 

@@ -91,6 +91,7 @@ typedef struct {
 typedef struct {
     pm_num_t pll_max;     /* largest bandwidth of the position loop; more is refused */
     pm_num_t current_max; /* bandwidth of current control while the carrier is on; faster control is slowed */
+    pm_num_t low_pass;    /* of the error signal, where `injection_filter` says none */
     pm_num_t swing;       /* A, by which a leg's edges are off the mean current, mean of two periods */
     pm_num_t comp_zone;   /* A, that the zone of the dead time's compensation must have at least; 0: none */
 } injection_limits_t;

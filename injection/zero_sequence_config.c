@@ -221,7 +221,7 @@ polarity_carrier_t zero_rotating_polarity(maker_t *m, const zero_rotating_config
                                 .reversed = m->params->zero_falls == 1};
 }
 
-/* eps is h periods old; 0.3 rad of phase, as sine.h. The current is h / 2 periods old. */
+/* eps is h periods old; 0.3 rad of phase. The current is h / 2 periods old. */
 static pm_num_t bandwidth(const maker_t *m, pm_num_t phase, int32_t half_periods)
 {
     return pm_num_div(pm_num_mul(pm_num(2), phase), mul3(PM_NUM_TWO_PI, pm_num(half_periods), m->base.t_s));

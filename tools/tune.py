@@ -490,7 +490,7 @@ def sine(x, d):
            f"{errors[pick]:.1f} predicted")
     behind = tune.LAG * (2 * math.pi * loop) ** 2 / d["pole_pairs"]
     return {"v_injection": (pick[0], why), "f_injection": (pick[1], why),
-            "injection_bandwidth": (loop, "the fastest of 10 and 7 Hz that a carrier holds rated current with"),
+            "injection_bandwidth": (loop, "the fastest of 15, 10 and 7 Hz that a carrier holds rated current with"),
             "speed_bandwidth": (min(d["speed_bandwidth"], loop / carrier.SLOWER), "a quarter of the position's loop"),
             "acceleration": (min(d["acceleration"], behind), "the position's loop follows 0.12 rad behind")}
 

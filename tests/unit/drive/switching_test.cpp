@@ -237,7 +237,7 @@ TEST(HandOver, CurrentControlOfASineIsStableBelowAQuarterOfATurnOfDelay)
     const struct {
         double bandwidth_Hz;
         bool holds;
-    } cases[] = {{0.4 / kDelay_s / 2 / bench::kPi, true}, {0.6 * limit_Hz, true}, {1.4 * limit_Hz, false}};
+    } cases[] = {{0.4 / kDelay_s / 2 / bench::kPi, true}, {0.6 * limit_Hz, true}, {2.2 * limit_Hz, false}};
     for (const injection_id_t id : {INJECTION_pulsating_sine, INJECTION_rotating_sine}) {
         for (const auto &x : cases) {
             Closed c(with_legs(), with_source(id, 7, 2));

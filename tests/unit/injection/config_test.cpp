@@ -53,7 +53,7 @@ TEST(InjectionConfig, SquareWavesSlowCurrentControl)
     }
 }
 
-// Sines: half a window and 1.5 periods are a phase of 0.4 rad at the bandwidth of current control and of 0.3 rad at that of
+// Sines: half a window and 1.5 periods are a phase of 0.4 rad at the bandwidth of current control and of 0.2 rad at that of
 // the position loop.
 TEST(InjectionConfig, SinesSlowCurrentControlByTheirWindow)
 {
@@ -68,7 +68,7 @@ TEST(InjectionConfig, SinesSlowCurrentControlByTheirWindow)
             EXPECT_NEAR(real(configure(p).position.current_low, 31),
                         std::min(1.0, 0.4 / (2 * bench::kPi * delay) / 500), 1e-6)
                 << id << ' ' << n;
-            const double most_Hz = 0.3 / (2 * bench::kPi * delay);
+            const double most_Hz = 0.2 / (2 * bench::kPi * delay);
             for (const double share : {0.99, 1.01}) {
                 p.injection_bandwidth = static_cast<int32_t>(std::lround(share * most_Hz * 1e3));
                 drive_config_t c = {};

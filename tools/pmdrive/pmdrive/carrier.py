@@ -1,10 +1,10 @@
 """Where injection holds: noise of the position by quantisation (METHODS.md 5.8.1, row 65), and whether the loop of position, window
 and currents is stable at a load (5.8.2, row 66), from the machine, the converter and the bandwidths.
 
-The noise has a formula, noise_deg(). For the loop there is none: a window over the carrier passes what the fundamental current does
-while it changes, at omega_h +- nu; the position loop turns the frame with that, and the fundamental current in a frame that
-trembles at omega_h looks like the answer to the carrier. This second loop grows with the square of i_f / I_n and of the bandwidth
-over f_h. So the loop is run, a sample a period, as the drive has it: position loop, window, current control, delay of 1.5 periods,
+The noise has a formula, noise_deg(). For the loop there is none: in a frame that trembles at half of f_h the fundamental current
+trembles too, the window over a whole period of the carrier passes two thirds of that as an answer, and the position loop turns the
+frame by it. This second loop grows with i_f / I_n and the bandwidth over f_h; a low-pass in the error signal weakens it
+(injection/sine.h). So the loop is run, a sample a period, as the drive has it: position loop, window, low-pass, current control, delay of 1.5 periods,
 cross-coupling by the parabolas of injection/saliency.h, speed control; on the machine by its fluxes and its inertia, without converter,
 and without the inverter unless it is asked for. Holds.run() begins 5 degrees off and ends within LOST of a position or does not.
 """
@@ -18,8 +18,8 @@ ZETA = 0.9
 GAIN_RISE = 2.5
 KICK = math.radians(5)
 STAR = [cmath.exp(2j * math.pi * x / 3) for x in range(3)]
-LOST = {SQUARE: math.radians(2), ROTATING: math.radians(2), PULSATING: math.radians(2),
-        STATIONARY: math.radians(4)}  # that a held position swings by at the end at most; a carrier that stands does by 3 for dead time
+LOST = {SQUARE: math.radians(2), ROTATING: math.radians(3), PULSATING: math.radians(2),
+        STATIONARY: math.radians(4)}  # that a held position swings by at the end at most; for dead time a rotating carrier does by 2, one that stands by 3
 OFF = math.radians(15)   # and is away at most
 SETTLE_S, SEEN_S = 1.0, 0.2
 
@@ -109,10 +109,17 @@ class Known:
         return i_q * (pair[0] + pair[1] * abs(i_q))
 
 
+def low_pass(d):
+    """w_s of injection/sine.h."""
+    of_loop, of_carrier = 4 * d["injection_bandwidth"], d["f_pwm"] / periods(d) / 8
+    return 2 * math.pi * (d.get("injection_filter") or max(of_loop, of_carrier))
+
+
 def noise_band_Hz(d):
-    """Two-sided noise bandwidth over f_pwm of a loop of second order: the share of white noise of a sample that is left."""
+    """Two-sided noise bandwidth of the loop with its low-pass: times a period, the share of white noise of a sample that is left."""
     w_n = 2 * math.pi * d["injection_bandwidth"]
-    return w_n * (ZETA + 1 / (4 * ZETA))
+    k_p, k_i = 2 * ZETA * w_n, w_n ** 2
+    return (k_p ** 2 + k_i) / (2 * (k_p - (0 if d["injection"] == SQUARE else k_i / low_pass(d))))
 
 
 def noise_deg(d, noise_lsb=0.5, bits=12, slope=None):
@@ -148,9 +155,11 @@ class Holds:
         kappa = (d["L_q"] - d["L_d"]) / (d["L_q"] + d["L_d"])
         rho = d["R_s"] / 2 * (1 / d["L_d"] + 1 / d["L_q"]) * periods(d) / (2 * math.pi * d["f_pwm"])
         if d.get("injection_post_comp", 1) and positive:
-            beyond = max(-0.5, min(0.5, cmath.phase(positive) - rho * (1 + kappa ** 2)))
+            beyond = cmath.phase(positive) - rho * (1 + kappa ** 2)
             load = abs(i_f) ** 2 / (abs(i_f) ** 2 + k.i_p ** 2)
-            rho += (0.75 + ((1 / (2 * kappa) - 0.75) * load if kappa >= 0.1 else 0.0)) * beyond
+            share = 0.75 + ((1 / (2 * kappa) - 0.75) * load if kappa >= 0.1 else 0.0)
+            most = 1.25 * lost_V(d) / d["v_injection"] + rho / 2
+            rho += max(-most, min(most, share * beyond))
         return cmath.exp(2j * (rho - k.of(k.turn, i_f.imag)))
 
     def told(self, i):
@@ -179,6 +188,8 @@ class Holds:
         w_n = 2 * math.pi * d["injection_bandwidth"]
         kp, ki = 2 * ZETA * w_n, w_n ** 2 * T
         psi = complex(*self.flux(i_ref.real, i_ref.imag))
+        smooth = low_pass(d) * T / (1 + low_pass(d) * T)
+        low = 0.0
         theta, theta_hat, omega_hat = 0.0, -KICK, self.omega
         psi_s = psi
         rotor = 1.0 + 0j
@@ -252,6 +263,9 @@ class Holds:
                 at = (at + 1) % N
             if n < N + 2:
                 eps = 0.0
+            if d["injection"] != SQUARE:
+                low += smooth * (eps - low)
+                eps = low
             eps *= self.gain
             omega_hat += ki * eps
             w = omega_hat + kp * eps
@@ -291,7 +305,7 @@ class Holds:
 SHARES = (1 / 4, 1 / 2, 3 / 4)        # of the largest carrier that the link leaves room for
 PERIODS = (8, 10, 20, 30)             # N
 PERIODS_POLE = 16                     # least that the drive finds the pole with by the second harmonic, polarity: 3
-LOOPS_HZ = (10.0, 7.0)
+LOOPS_HZ = (15.0, 10.0, 7.0)
 SLOWER = 4.0                          # speed control than the position
 ERROR_DEG = 3.0                       # largest error that is accepted: METHODS.md 5.8.3
 MARGIN = 1.15                         # of the current

@@ -322,8 +322,8 @@ ENTRIES = (
     Entry(0x2400, 34, "i_polarity", "injection", "i32", "off", "A", -3, 0, 0, 4000000, 2000, False, True, "application", "none", {}, 'current along d, both ways, that shows the polarity', "8.3.1 #94"),
     Entry(0x2400, 35, "L_d_falls", "injection", "i32", "off", "1", 0, 0, 0, 1, 0, False, True, "application", "none", {0: 'with magnetising current', 1: 'with demagnetising current, as bridges that the magnet holds saturated make it'}, ('what saturates the machine, as no start can tell: wrong, and it takes the '
  'wrong pole'), "8.2 #93"),
-    Entry(0x2400, 40, "injection_filter", "injection", "i32", "live", "Hz", -3, 0, 0, 2000000, 0, False, True, "application", "none", {}, ("low-pass of the injection's error signal, 0: none; too low a frequency makes "
- 'the position loop swing'), "4.5.2 #45"),
+    Entry(0x2400, 40, "injection_filter", "injection", "i32", "live", "Hz", -3, 0, 0, 2000000, 0, False, True, "application", "none", {}, ("low-pass of the injection's error signal, 0: none, of sines an eighth of "
+ 'f_injection; too low a frequency makes the position loop swing'), "4.5.2 #45"),
     Entry(0x2400, 41, "saliency_order", "injection", "i32", "live", "1", 0, 0, -10, 14, 0, False, True, "application", "none", {}, ('a second saliency of the machine beside that of order 2: -4, 8, -10, 14; 0: '
  'none'), "5.4 #54"),
     Entry(0x2400, 42, "saliency_ratio", "injection", "i32", "live", "1", -6, 0, 0, 500000, 0, False, True, "application", "none", {}, 'its size over that of order 2', "5.4 #54"),
