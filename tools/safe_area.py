@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parent.parent
 WITHIN = 0.15  # of the current: METHODS.md 5.8.2
 LIGHT = 0.15   # of rated current: what the speed control asks for either way on its way to the load
 SPEED = 0.05   # of rated, that of the campaign's scenario
-LOOPS_HZ = (6, 7, 8.5, 10, 12, 14, 17, 20, 25, 32, 40)
+LOOPS_HZ = (6, 7, 8.5, 10, 12, 14, 17, 20, 25, 28, 32, 40)
 
 
 def drive_of(machine):
@@ -131,10 +131,10 @@ bandwidths.
 ![runs on the predicted boundary](safe_area.png)
 
 What ends operation here is not the converter. Noise and quantisation move the position by 0.1 to 0.6 degrees rms, at any load. It is a
-second loop: while the fundamental current changes, the window over the carrier passes it at f_h; the position loop turns the frame
-with that; and the fundamental current in a frame that trembles at f_h looks like the answer to the carrier. Its gain goes with
-(i_f / I_n)^2 and with the bandwidth over f_h squared, so the remedies are a slower loop, more voltage, or a higher carrier, in this
-order of their price. A rotating carrier and one that stands see all of the current, a pulsating one only i_d and lambda i_q. Sources that
+second loop: in a frame that trembles at half of f_h the fundamental current trembles too, the window over a whole period of the carrier
+passes 2 / pi of that as an answer, and the position loop turns the frame by it. Its gain goes with i_f / I_n and with the bandwidth over
+f_h. A low-pass in the error signal leaves a quarter of it (injection/sine.h); further remedies are a slower loop, more voltage, or a
+higher carrier, in this order of their price. A rotating carrier and one that stands see all of the current, a pulsating one only i_d and lambda i_q. Sources that
 answer within two or three periods, square waves, INFORM and PWM excitation, have no window: they are predicted to hold everywhere.
 """
 

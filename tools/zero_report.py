@@ -22,7 +22,7 @@ MACHINES = {"IPM-1000": {"V": 35, "range": 10, "I": 10, "dL_0": 2e-3, "L_d": 43e
             "SPM-400": {"V": 8, "range": 2, "I": 10, "dL_0": 0.3e-3, "L_d": 3e-3, "L_q": 3.3e-3}}
 # name, source, Hz, position loop and speed control, Hz: the loops that the file of the source is compared with, and
 # the square wave's for all that can have them
-SOURCES = [("pulsating_sine", 4, 500, 7, 2), ("rotating_sine", 1, 500, 7, 2), ("pulsating_square", 0, 500, 20, 3),
+SOURCES = [("pulsating_sine", 4, 500, 15, 4), ("rotating_sine", 1, 500, 12, 3), ("pulsating_square", 0, 500, 20, 3),
            ("zero_anti_rotating", 7, 500, 7, 2), ("zero_anti_rotating", 7, 500, 20, 3), ("zero_rotating", 8, 500, 20, 3),
            ("zero_anti_rotating", 7, 5000, 20, 3)]
 NEUTRAL = 7  # from this source on
