@@ -49,6 +49,52 @@ TEST(SwitchFault, ShootThroughDrawsTheLinkOverBothSwitches)
     EXPECT_NEAR(residual_J(after), residual_J(before), 1e-6 * through_J);
 }
 
+// A leg that shorts the link discharges its capacitor through both switches, at whatever rate:
+//   v = v_end + (v_start - v_end) e^{-t/tau},   tau = C / (g_source + g_through)
+// The winding is left out: its time constant is 8 ms, and it never has more than 2 % of the current.
+struct Through {
+    double r_on_ohm, C_F, r_source_ohm;
+};
+
+class ShootThrough : public testing::TestWithParam<Through>
+{
+};
+
+TEST_P(ShootThrough, DischargesTheLinkAsAnRCDoes)
+{
+    constexpr double period_s = 1e-4, V = 36.0;
+    const Through p = GetParam();
+    plant_config_t config = locked_spm();
+    config.inverter = rig::inverter(10e3, 0.0, 0.0, 0.0, p.r_on_ohm);
+    config.dclink = rig::dclink(V, p.r_source_ohm, p.C_F);
+    rig::Plant plant(config);
+    plant.run(rig::pwm(0, 0, 0), 3);
+    plant_set_leg_fault(plant, 2, PLANT_UPPER_SHORT);
+    plant_truth_t before = plant.truth();
+    double through_S = 0.5 / std::fmax(p.r_on_ohm, 1e-3), source_S = 1.0 / p.r_source_ohm; // 1 mOhm at least
+    double tau_s = p.C_F / (through_S + source_S), end_V = V * source_S / (through_S + source_S);
+    auto link_V = [&](double t_s) { return end_V + (V - end_V) * std::exp(-t_s / tau_s); };
+    double early_s = 0.7 * tau_s; // of a single step tau_s long their error estimate is zero
+    EXPECT_NEAR(plant.at(early_s).v_dc_V, link_V(early_s), 1e-3 * V);
+    plant.run(rig::pwm(0, 0, 0));
+    plant_truth_t after = plant.truth();
+    EXPECT_NEAR(after.v_dc_V, link_V(period_s), 1e-3 * V);
+    double a_V = V - end_V, left = std::exp(-period_s / tau_s);
+    double heat_J = through_S * (end_V * end_V * period_s + 2.0 * end_V * a_V * tau_s * (1.0 - left) +
+                                 0.5 * a_V * a_V * tau_s * (1.0 - left * left));
+    EXPECT_NEAR(after.e_device_J - before.e_device_J, heat_J, 2e-3 * heat_J);
+    EXPECT_NEAR(residual_J(after), residual_J(before), 1e-6 * heat_J);
+    plant.run(rig::pwm(0, 0, 0), 5);
+    EXPECT_NEAR(plant.truth().v_dc_V, end_V, 2e-3 * V);
+    EXPECT_LT(std::fabs(plant.truth().i_A[2]), 0.5 * V / (1.5 * R)) << "what half the link drives at most";
+}
+
+INSTANTIATE_TEST_SUITE_P(Links, ShootThrough,
+                         testing::Values(Through{0.0, 47e-6, 0.1}, Through{0.0, 4.7e-6, 0.5},
+                                         Through{0.0, 1e-6, 0.1}, Through{0.0, 1e-3, 0.01},
+                                         Through{2e-3, 47e-6, 0.1}, Through{5e-3, 10e-6, 0.1},
+                                         Through{0.05, 100e-6, 0.1}));
+
 TEST(SwitchFault, ShortedSwitchHoldsItsRail)
 {
     rig::Plant plant(locked_spm());
