@@ -129,7 +129,7 @@ INLINE void tied_at(const circuit_t *c, const field_t *f, const double x[], shap
         i_dc_A += weights(shape, p) * pair_at(&b->rail[2 * p]) * f->i_A[p];
     }
     for (int g = 0; swings && g < groups(shape); g++) {
-        trio_t v_V, drop_V;
+        trio_t v_V = {0.0}, drop_V; /* gcc 12 sees terminals_at() set it in parts, and warns */
         along_group(w, shape, g, f->i_A, &i_leg_A[g]);
         i_leg_A[g] *= swings[g];
         terminals_at(x, g, &v_V);
