@@ -2,8 +2,7 @@
 
 #include <assert.h>
 
-#define MAX_EVENTS                                                                                           \
-    10000 /* of a segment, as where a short rings with output capacitances; more would be chatter */
+#define MAX_EVENTS 10000 /* of a segment; more would be chatter */
 
 double circuit_advance(circuit_t *c, double duration_s)
 {

@@ -142,10 +142,10 @@ void bridge_summarise(bridge_t *b, const winding_t *w)
     bridge_sum(b, w);
 }
 
-leg_t bridge_released(const bridge_t *bridge, double i_A)
+leg_t bridge_released(const bridge_t *bridge, int k, double i_A)
 {
     if (fabs(i_A) <= bridge->no_current_A) {
-        return bridge->c_leg_F > 0.0 ? LEG_SWINGING : LEG_FLOATING;
+        return bridge_output_F(bridge, k) > 0.0 ? LEG_SWINGING : LEG_FLOATING;
     }
     return i_A > 0.0 ? LEG_DIODE_LOW : LEG_DIODE_HIGH;
 }
@@ -162,10 +162,10 @@ leg_t bridge_commutated(const bridge_t *bridge, int k, gate_t gate, double i_A)
     if (leg != LEG_LOW && leg != LEG_HIGH && leg != LEG_BOTH) {
         return leg;
     }
-    leg_t diode = bridge_released(bridge, i_A);
+    leg_t diode = bridge_released(bridge, k, i_A);
     bool same_rail =
         (leg == LEG_LOW && diode == LEG_DIODE_LOW) || (leg == LEG_HIGH && diode == LEG_DIODE_HIGH);
-    return bridge->c_leg_F == 0.0 || same_rail ? diode : LEG_SWINGING;
+    return bridge_output_F(bridge, k) == 0.0 || same_rail ? diode : LEG_SWINGING;
 }
 
 double bridge_beyond_V(const bridge_t *bridge, double v_dc_V, double v_leg_V)

@@ -9,7 +9,10 @@
  *
  * A switch drop reverses over +-zone_A with continuous slope instead of jumping, so that a current
  * creeping through zero under a closed switch makes no train of events. zone_A is a 2000th of the
- * converter's full scale, the step of 12 bits. Tests: bridge_test.cpp. */
+ * converter's full scale, the step of 12 bits.
+ *
+ * The legs of a short have no output capacitance: with the 1 uH of the short it would ring at 10 MHz, hardly
+ * damped, and that only shortens the integrator's steps. Tests: bridge_test.cpp, shorts: fault_test.cpp. */
 #ifndef PLANT_BRIDGE_H
 #define PLANT_BRIDGE_H
 
@@ -39,6 +42,7 @@ typedef struct {
     int legs;
     leg_t leg[PLANT_LEGS];
     bool off_wire[PLANT_LEGS];
+    unsigned bare; /* legs without output capacitance, bit k for leg k: those of a short */
     double v_source_V[PLANT_LEGS];
     /* what follows from leg[] */
     uint64_t kinds;                            /* a byte for each, of which bit k is leg k; see bridge.c */
@@ -84,11 +88,17 @@ static inline void bridge_put(bridge_t *b, int k, leg_t leg)
 /* Leg k after a change of its gate; i_A is its current. */
 leg_t bridge_commutated(const bridge_t *bridge, int k, gate_t gate, double i_A);
 
-/* A leg without gate anew after a jump of its current. */
-leg_t bridge_released(const bridge_t *bridge, double i_A);
+/* Leg k without gate anew after a jump of its current. */
+leg_t bridge_released(const bridge_t *bridge, int k, double i_A);
 
 /* How far a terminal is beyond the nearer diode's threshold, V. */
 double bridge_beyond_V(const bridge_t *bridge, double v_dc_V, double v_leg_V);
+
+/* Output capacitance of leg k; without it the leg floats where it would swing. */
+static inline double bridge_output_F(const bridge_t *bridge, int k)
+{
+    return (bridge->bare >> k & 1u) != 0u ? 0.0 : bridge->c_leg_F;
+}
 
 /* Of a set of legs, which is not empty, the first. */
 static inline int bridge_first(unsigned legs)

@@ -113,14 +113,37 @@ void circuit_wire(circuit_t *c, int leg, bool off)
     circuit_reassign_diodes(c);
 }
 
+/* The legs that now have no output capacitance; those that have it again swing from where they are. */
+static void bare_outputs(circuit_t *c, unsigned bare)
+{
+    bridge_t *b = &c->bridge;
+    double v_leg_V[PLANT_LEGS] = {0.0};
+    if ((b->bare & b->floating) != 0u) {
+        circuit_terminals(c, &c->now, v_leg_V);
+    }
+    for (int k = 0; k < b->legs; k++) {
+        bool was = (b->bare >> k & 1u) != 0u, is = (bare >> k & 1u) != 0u;
+        if (is && b->leg[k] == LEG_SWINGING) {
+            bridge_put(b, k, LEG_FLOATING);
+        } else if (was && !is && b->leg[k] == LEG_FLOATING && !b->off_wire[k] && b->c_leg_F > 0.0) {
+            bridge_put(b, k, LEG_SWINGING);
+            c->now.x[V_LEG(k)] = v_leg_V[k];
+        }
+    }
+    b->bare = bare;
+}
+
 void circuit_short(circuit_t *c, int leg_a, int leg_b, double R_ohm)
 {
     double before_J = circuit_field_J(c);
     double axis[PLANT_LEGS] = {0.0};
+    unsigned legs = 1u << leg_a;
     axis[leg_a] = 1.0;
     if (leg_b >= 0) {
         axis[leg_b] = -1.0;
+        legs |= 1u << leg_b;
     }
+    bare_outputs(c, R_ohm < 0.0 ? 0u : legs);
     machine_set_branch(&c->machine, axis, R_ohm);
     choose_steps(c);
     for (int a = 2 * c->machine.winding.sets + (c->machine.winding.zero >= 0); a < ACTIVE; a++) {

@@ -38,9 +38,9 @@ void circuit_currents(const circuit_t *circuit, point_t *point);
 void circuit_take_state(circuit_t *circuit, const machine_state_t *state, const machine_point_t *machine);
 
 /* Energy of a leg's output capacitance at a voltage, and the voltage that it has. */
-static inline double circuit_capacitor_J(const circuit_t *c, double v_V)
+static inline double circuit_capacitor_J(const circuit_t *c, int k, double v_V)
 {
-    return 0.5 * c->bridge.c_leg_F * v_V * v_V;
+    return 0.5 * bridge_output_F(&c->bridge, k) * v_V * v_V;
 }
 
 static inline double circuit_output_V(const circuit_t *c, int k)

@@ -20,7 +20,7 @@ static void charge_output(circuit_t *c, int k, double before_V)
     double charge_C = b->upper[k] == 1.0 ? b->c_leg_F * (after_V - before_V) : 0.0;
     double in_J = charge_C * c->now.x[V_DC];
     c->jump_in_J += in_J;
-    c->jump_device_J += in_J + circuit_capacitor_J(c, before_V) - circuit_capacitor_J(c, after_V);
+    c->jump_device_J += in_J + circuit_capacitor_J(c, k, before_V) - circuit_capacitor_J(c, k, after_V);
     c->now.x[V_DC] -= charge_C * c->link.inv_C_1_F;
 }
 
@@ -33,7 +33,7 @@ static void set_leg(circuit_t *c, int k, leg_t leg)
         c->low_since_s[k] = c->t_s;
     }
     bridge_put(b, k, leg);
-    if (b->c_leg_F > 0.0) {
+    if (bridge_output_F(b, k) > 0.0) {
         charge_output(c, k, before_V);
     }
 }
@@ -157,7 +157,7 @@ static void stop_diodes(circuit_t *c)
     for (unsigned legs = c->bridge.diodes; legs != 0u; legs &= legs - 1u) {
         int k = bridge_first(legs);
         if (bridge_reverse_A(&c->bridge, k, circuit_leg_A(c, &c->now, k)) > 0.0) {
-            set_leg(c, k, c->bridge.c_leg_F > 0.0 ? LEG_SWINGING : LEG_FLOATING);
+            set_leg(c, k, bridge_output_F(&c->bridge, k) > 0.0 ? LEG_SWINGING : LEG_FLOATING);
             stopped = true;
         }
     }
@@ -228,7 +228,7 @@ void circuit_reassign_diodes(circuit_t *c)
 {
     for (int k = 0; k < c->bridge.legs; k++) {
         if (bridge_is_diode(&c->bridge, k)) {
-            set_leg(c, k, bridge_released(&c->bridge, circuit_leg_A(c, &c->now, k)));
+            set_leg(c, k, bridge_released(&c->bridge, k, circuit_leg_A(c, &c->now, k)));
         }
     }
     circuit_summarise(c);

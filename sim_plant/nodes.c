@@ -131,7 +131,7 @@ double circuit_field_of_J(const circuit_t *c, const machine_state_t *state, cons
 {
     double energy_J = machine_energy_J(&c->machine, state, machine);
     for (int k = 0; k < c->bridge.legs && c->bridge.c_leg_F > 0.0; k++) {
-        energy_J += circuit_capacitor_J(c, circuit_output_V(c, k));
+        energy_J += circuit_capacitor_J(c, k, circuit_output_V(c, k));
     }
     return energy_J;
 }

@@ -123,7 +123,8 @@ int plant_leg_count(const plant_t *plant); /* 3, or 6 */
 void plant_set_temperature(plant_t *plant, double winding_degC, double magnet_degC);
 void plant_set_leg_fault(plant_t *plant, int leg, plant_leg_fault_t fault);
 void plant_set_supply(plant_t *plant, bool connected); /* lost supply: the link runs on its capacitor */
-/* Ties two terminals, or one to the negative rail (leg_b < 0), through a resistance and 1 uH; R < 0 opens. */
+/* Ties two terminals, or one to the negative rail (leg_b < 0), through a resistance and 1 uH; R < 0 opens. Such
+ * a leg has no output capacitance meanwhile (bridge.h). */
 void plant_set_short(plant_t *plant, int leg_a, int leg_b, double R_ohm);
 
 /* A slip: flux linkages are kept, so currents jump, but for those of floating legs. */

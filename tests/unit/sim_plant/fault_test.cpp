@@ -1,6 +1,7 @@
 // Faults of switches, wires and windings through the plant, and bridges of six legs: currents against
 // Kirchhoff and Ohm, and every energy booked.
 #include "rig.h"
+#include "step_length.h"
 
 #include <gtest/gtest.h>
 
@@ -218,6 +219,93 @@ TEST(Short, ToTheRailBesideADrivenLeg)
     plant.run(rig::pwm(1, 1, 1), 3);
     EXPECT_NEAR(plant.truth().i_A[0], 3.0, closed_form * 3.0);
     EXPECT_NEAR(plant.truth().i_A[1], 0.0, 1e-9);
+}
+
+// Output capacitances would ring with the 1 uH of a short at 10 MHz, for 200 us and longer: steps of some ns. The
+// steps must be those of the rest, of which the fastest is the third terminal, 140 kHz with its winding.
+constexpr double shortest_step_s = 0.1e-6;
+constexpr double c_leg_F = 0.5e-9;
+
+plant_config_t with_capacitances()
+{
+    plant_config_t c = rig::spm_400_linear();
+    c.inverter = rig::inverter(10e3, 1e-6, 0.7, 0.7, 0.0);
+    c.inverter.c_leg_F = c_leg_F;
+    return c;
+}
+
+// Terminals A and B joined and the inverter off: the EMF between them drives
+//   i = e_AB / (2 (R + j w L) + R_short),   e_AB = sqrt(3) w psi_m
+TEST(Short, OfLegsThatSwingCarriesTheCurrentOfTheEmf)
+{
+    constexpr double omega_e = 2.0 * pi * 40.0, short_ohm = 0.01;
+    rig::Plant plant(with_capacitances());
+    plant_set_speed(plant, omega_e / 5.0);
+    plant.run(rig::all_off(), 20);
+    plant_truth_t before = plant.truth();
+    plant_set_short(plant, 0, 1, short_ohm);
+    EXPECT_NEAR(residual_J(plant.truth()), residual_J(before), 1e-12);
+    plant.run(rig::all_off(), 800); // 9 time constants
+    double most_A = 0.0;
+    for (int n = 0; n < 250; n++) {
+        plant.run(rig::all_off());
+        plant_truth_t t = plant.truth();
+        EXPECT_NEAR(t.i_A[0], 0.0, 1e-4) << "in winding and short, not in the leg";
+        EXPECT_NEAR(t.v_leg_V[0], t.v_leg_V[1], 1.0);
+        most_A = std::fmax(most_A, std::sqrt(0.75) * std::hypot(t.i_d_A, t.i_q_A)); // i_a = -i_b, i_c = 0
+        ASSERT_GT(step_length_s(plant), shortest_step_s);
+    }
+    double i_A = std::sqrt(3.0) * omega_e * 77.6e-3 / std::hypot(2.0 * R + short_ohm, 2.0 * omega_e * L);
+    EXPECT_NEAR(most_A, i_A, 1e-3 * i_A);
+    plant_truth_t t = plant.truth();
+    EXPECT_NEAR(residual_J(t), residual_J(before), 1e-5 * t.e_copper_J);
+    plant_set_short(plant, 0, 1, -1.0);
+    EXPECT_NEAR(residual_J(plant.truth()), residual_J(t), 1e-9 * t.e_copper_J + 1e-12);
+    plant.run(rig::all_off(), 80); // against link and EMF
+    for (int k = 0; k < 3; k++) {
+        EXPECT_NEAR(plant.truth().i_A[k], 0.0, 0.1) << "what its own capacitance takes";
+    }
+}
+
+// Link and short while A is up and B down, beside the current of the winding, which hardly moves:
+//   C dv/dt = (V - v) / r_source - i - i_winding
+//   L di/dt = v - R i
+TEST(Short, EmptiesTheLinkAndIsSwitchedOff)
+{
+    constexpr double V = 36.0, short_ohm = 0.01, short_H = 1e-6, C_F = 47e-6, r_source_ohm = 0.1;
+    plant_config_t config = with_capacitances();
+    config.mech.locked = true;
+    config.dclink = rig::dclink(V, r_source_ohm, C_F);
+    rig::Plant plant(config);
+    plant.run(rig::pwm(1, 0, 0), 3);
+    plant_truth_t before = plant.truth();
+    plant_set_short(plant, 0, 1, short_ohm);
+    double v = before.v_dc_V, i = 0.0, i_winding_A = before.i_A[0], drops_V = 2.0 * 0.7;
+    for (int us = 1; us <= 9; us++) {
+        for (int n = 0; n < 10000; n++) { // the middle of steps of 0.1 ns
+            double v_mid = v + 0.05e-9 / C_F * ((V - v) / r_source_ohm - i - i_winding_A);
+            double i_mid = i + 0.05e-9 / short_H * (v - drops_V - short_ohm * i);
+            v += 0.1e-9 / C_F * ((V - v_mid) / r_source_ohm - i_mid - i_winding_A);
+            i += 0.1e-9 / short_H * (v_mid - drops_V - short_ohm * i_mid);
+        }
+        plant_truth_t t = plant.at(us * 1e-6);
+        EXPECT_NEAR(t.v_dc_V, v, 2e-3 * V);
+        EXPECT_NEAR(t.i_A[0], i + i_winding_A, 2e-3 * 250.0);
+    }
+    EXPECT_GT(i, 150.0);
+    EXPECT_LT(v, 0.6 * V);
+    plant.run(rig::pwm(0.9, 0.1, 0.5), 20); // and chops it
+    plant_trip(plant);
+    for (int n = 0; n < 50; n++) {
+        plant.run(rig::all_off());
+        ASSERT_GT(step_length_s(plant), shortest_step_s);
+    }
+    plant_truth_t t = plant.truth();
+    EXPECT_NEAR(residual_J(t), residual_J(before), 1e-5 * t.e_in_J);
+    EXPECT_NEAR(t.v_dc_V, V, 1e-3 * V);
+    for (int k = 0; k < 3; k++) {
+        EXPECT_NEAR(t.i_A[k], 0.0, 0.1);
+    }
 }
 
 plant_pwm_t six(const double (&duty)[6])
