@@ -212,9 +212,6 @@ plant_config_t random_machine(Random &random)
         c.inverter.turn_on_s = 0.3 * c.inverter.dead_time_s;
         c.inverter.turn_off_s = 0.6 * c.inverter.dead_time_s;
     }
-    if (c.inverter.r_on_ohm == 0.0) {
-        c.inverter.r_on_ohm = 0.01; // a shorted switch needs some
-    }
     return c;
 }
 
