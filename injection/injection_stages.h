@@ -16,6 +16,8 @@
  *     eps -= gain (b cos 2 theta^ - a sin 2 theta^)
  *     Of a carrier along d alone; those of the stator are refused.
  *
+ * The low-pass behind them (`injection_filter`) is that of all sources: injection.h.
+ *
  * injection_stages_before(), _after(): each period 70 instructions with all; _slow(): 1 kHz. Not in a period: what was
  * learnt outlasts a reset of the source, not that of the position. Tests: tests/unit/injection/injection_stages_test.cpp,
  * tests/scenario/cross_coupling_direct.yaml, saliencies.yaml, inductance_asymmetry.yaml. */
