@@ -87,6 +87,36 @@ TEST(RotatingSine, PositiveSequenceShowsTheResistance)
 }
 
 // A saliency too small to be told from the load's share leaves the share of no load at any: 3/4 of what the positive sequence shows.
+// 2 rho' by which the source turns the negative sequence, from its error signal.
+double turned_by(const injection_config_t &c, const rig::Answer &a)
+{
+    const double gain = c.rotating_sine.saliency.gain_0 / std::pow(2.0, 20);
+    const double size = std::abs(a.vector) / rig::kBase.i_A;
+    return std::asin(a.eps / (gain * size)) - std::arg(a.vector);
+}
+
+double si(int32_t value, drive_param_id_t id)
+{
+    return value * std::pow(10, drive_param_exp10[id]);
+}
+
+// The limit is what dead time, devices and a hot winding take of the carrier. R ten times what is told, as the phase of a transient
+// may look, asks for 0.24 rad, and gets a limit of 0.1; twin: not limited, more than twice that.
+TEST(RotatingSine, CorrectionIsAtMostWhatTheInverterTakes)
+{
+    const drive_params_t p = bench::parameters(bench::kIpmLinear, rig::kBase);
+    const double v_lost = si(p.dead_time, DRIVE_PARAM_dead_time) * si(p.f_pwm, DRIVE_PARAM_f_pwm) *
+                              si(p.v_dc_nominal, DRIVE_PARAM_v_dc_nominal) +
+                          si(p.device_drop, DRIVE_PARAM_device_drop);
+    injection_config_t c = config(6);
+    const double rho_0 = real(c.rotating_sine.rho_0);
+    const double most = 5.0 / 4 * v_lost / 35 + rho_0 / 2;
+    EXPECT_NEAR(real(c.rotating_sine.most), most, 1e-4);
+    EXPECT_GT(turned_by(c, settled(c, 0, 60)), 2 * (rho_0 + 0.2));
+    c.rotating_sine.most = PM_Q(0.1);
+    EXPECT_NEAR(turned_by(c, settled(c, 0, 60)), 2 * (rho_0 + 0.1), 0.005);
+}
+
 TEST(RotatingSine, TheLoadCountsWhereTheSaliencyIsLarge)
 {
     const Machine &m = bench::kIpmLinear;
