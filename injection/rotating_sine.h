@@ -14,8 +14,8 @@
  *   eps   = gain(i_q) Im[negative e^{j (2 rho' - theta_m)}],  gain = 1 / (2 I_n)
  * Without load all phases are governed by the carrier and p = 3/4; under load one phase at a time crosses zero.
  * Of a nearly round machine, kappa < 0.1, the second amplifies every error of rho_0: p stays 3/4. The part with p
- * is at most what dead time, devices and an R that is half as large again take of the carrier, since p, up to 8, magnifies
- * what a transient of i_f does to rho_m:
+ * is limited to what dead time, devices and an R misestimated by 50 % can cause, since p, up to 8, amplifies what a
+ * transient of i_f does to rho_m:
  *   5/4 v_lost / V_h + rho_0 / 2
  *
  * Compensation of dead time before the carrier (5.6.4.1, row 62): by the fundamental current alone it does nothing

@@ -15,14 +15,14 @@
  *   noise  sigma = (I_qu / 2 I_n) sqrt(c 2/3 (sigma_n^2 + 1/12) B / f_pwm)   rad
  *          B     = (K_p^2 + K_i) / (2 (K_p - K_i / w_s)),  K_p = 2 zeta w_n,  K_i = w_n^2
  *          I_qu: step of the converter; sigma_n: noise in steps; c: 2 along d, 1 rotating
- *   load   up to where the second loop through the window is stable: a frame that trembles at omega_h / 2 trembles i_f
- *          with it, of which the window, a whole period of the carrier, passes two thirds as an answer; the position
- *          loop turns the frame by that. Its gain goes with (i_f / I_n) (w_n / omega_h), so the error signal passes a
- *          low-pass before the loop (injection.h), which leaves a quarter:
+ *   load   up to where the second loop through the window is stable. When the estimated frame oscillates at omega_h / 2,
+ *          i_f oscillates in it; the window, a whole period of the carrier, passes 2 / pi of that as an answer, and the
+ *          position loop turns the frame by it. The loop gain goes with (i_f / I_n) (w_n / omega_h). A low-pass in the
+ *          error signal (injection.h) leaves a quarter of it:
  *            w_s = max(omega_h / 8, 4 w_n)
  *
  * The samples in it are (N - 1) / 2 periods old, and so is the mean of the current: current control is slowed
- * while the source leads, to a phase of 0.4 rad, and the position loop may have 0.2 rad, as the low-pass takes as much and more. */
+ * while the source leads, to a phase of 0.4 rad, and the position loop may have 0.2 rad: the low-pass lags as well. */
 #ifndef INJECTION_SINE_H
 #define INJECTION_SINE_H
 

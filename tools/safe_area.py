@@ -131,7 +131,7 @@ bandwidths.
 ![runs on the predicted boundary](safe_area.png)
 
 What ends operation here is not the converter. Noise and quantisation move the position by 0.1 to 0.6 degrees rms, at any load. It is a
-second loop: in a frame that trembles at half of f_h the fundamental current trembles too, the window over a whole period of the carrier
+second loop: when the frame oscillates at half of f_h, the fundamental current in it does too, the window over a whole period of the carrier
 passes 2 / pi of that as an answer, and the position loop turns the frame by it. Its gain goes with i_f / I_n and with the bandwidth over
 f_h. A low-pass in the error signal leaves a quarter of it (injection/sine.h); further remedies are a slower loop, more voltage, or a
 higher carrier, in this order of their price. A rotating carrier and one that stands see all of the current, a pulsating one only i_d and lambda i_q. Sources that

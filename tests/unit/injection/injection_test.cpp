@@ -58,7 +58,7 @@ TEST(Injection, SourcesOfEachPeriodHaveOneWhenAsked)
     EXPECT_FALSE(configured(INJECTION_pulsating_square, 100).inlined);
 }
 
-// A current that trembles at half of the carrier's frequency, as a frame that trembles makes it: the loop sees 1 / |1 + j f / f_c|
+// A current that oscillates at half of the carrier's frequency, as in a frame that does: the loop sees 1 / |1 + j f / f_c|
 // of what the source says, and after a reset nothing of what it said before.
 TEST(Injection, HalfOfTheCarriersFrequencyIsCutToAQuarter)
 {

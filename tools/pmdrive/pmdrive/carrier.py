@@ -1,8 +1,8 @@
 """Where injection holds: noise of the position by quantisation (METHODS.md 5.8.1, row 65), and whether the loop of position, window
 and currents is stable at a load (5.8.2, row 66), from the machine, the converter and the bandwidths.
 
-The noise has a formula, noise_deg(). For the loop there is none: in a frame that trembles at half of f_h the fundamental current
-trembles too, the window over a whole period of the carrier passes two thirds of that as an answer, and the position loop turns the
+The noise has a formula, noise_deg(). For the loop there is none: when the frame oscillates at half of f_h, the fundamental current
+in it does too, the window over a whole period of the carrier passes two thirds of that as an answer, and the position loop turns the
 frame by it. This second loop grows with i_f / I_n and the bandwidth over f_h; a low-pass in the error signal weakens it
 (injection/sine.h). So the loop is run, a sample a period, as the drive has it: position loop, window, low-pass, current control, delay of 1.5 periods,
 cross-coupling by the parabolas of injection/saliency.h, speed control; on the machine by its fluxes and its inertia, without converter,
