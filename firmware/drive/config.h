@@ -43,8 +43,9 @@ typedef struct {
     pm_q_t v_dc_min;
     int32_t v_dc_span; /* v_dc_max - v_dc_min */
     pm_q_t v_dc_max, v_dc_derate;
-    pm_q_t i_sum;       /* largest believable sum of the phase currents */
-    int32_t offset_max; /* of a 16-bit code */
+    pm_q_t i_sum;        /* largest believable sum of the phase currents */
+    uint16_t offset_max; /* of a 16-bit code */
+    uint16_t rest;       /* of a 16-bit code: by which a current that does not flow may seem to move */
     int16_t temp_derate_dC, temp_trip_dC;
     pm_q_t heat_max;        /* square of the current that is borne for good, with a margin of 5 % */
     pm_frac_t k_heat;       /* low-pass of the windings' heat, at 1 kHz */

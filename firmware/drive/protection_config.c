@@ -33,8 +33,10 @@ void make_protection(maker_t *m, protection_config_t *c, pm_unit_t share, pm_q_t
     c->v_dc_span = c->v_dc_max - c->v_dc_min;
     c->v_dc_derate = per_unit(m, DRIVE_PARAM_v_dc_derate, m->base.v);
     c->i_sum = PM_Q(0.1);
-    c->offset_max = fixed(m, pm_num_div(si(m, DRIVE_PARAM_offset_max), si(m, DRIVE_PARAM_i_full_scale)), 15,
-                          DRIVE_PARAM_offset_max);
+    const pm_num_t offset = pm_num_div(si(m, DRIVE_PARAM_offset_max), si(m, DRIVE_PARAM_i_full_scale));
+    c->offset_max = (uint16_t)fixed(m, least(offset, pm_num(1)), 15, DRIVE_PARAM_offset_max);
+    const pm_q_t noise = per_unit(m, DRIVE_PARAM_i_noise, m->base.i);
+    c->rest = (uint16_t)(pm_max(12 * pm_min(noise, PM_ONE / 16), PM_ONE / 64) / (PM_ONE / 32768));
     c->heat_max = borne(pm_min(i_rated, 2 * PM_ONE));
     c->k_heat =
         fixed(m, pm_num_div(m->t_slow, si(m, DRIVE_PARAM_t_winding)), FRAC_BITS, DRIVE_PARAM_t_winding);
@@ -44,7 +46,6 @@ void make_protection(maker_t *m, protection_config_t *c, pm_unit_t share, pm_q_t
         fixed(m, pm_num_div(m->t_slow, si(m, DRIVE_PARAM_t_bridge)), FRAC_BITS, DRIVE_PARAM_t_bridge);
     /* a current that dead time holds at zero is not one that does not conduct */
     const pm_q_t zone = at_most_twice(m, m->comp_zone, DRIVE_PARAM_comp_zone);
-    const pm_q_t noise = per_unit(m, DRIVE_PARAM_i_noise, m->base.i);
     const pm_q_t hidden = pm_max(2 * zone, 8 * pm_min(noise, PM_Q_MAX / 8));
     const pm_q_t judged = pm_max(hidden, i_rated / 64);
     c->judged = pm_mul(judged, judged);

@@ -232,6 +232,7 @@ void start_slow(drive_t *drive)
 PM_RARE void start_again(drive_t *drive)
 {
     start_begin(drive);
+    drive->rests = false;
     drive->sequence.step = (uint8_t)next_step(drive, 1);
     drive->stage = STAGE_OFF;
     drive->state = DRIVE_FINDING;

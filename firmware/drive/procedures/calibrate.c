@@ -1,4 +1,5 @@
 #include "firmware/drive/drive_parts.h"
+#include "firmware/math/compiler.h"
 
 void procedure_calibrate_begin(drive_t *drive)
 {
@@ -27,7 +28,7 @@ static pm_procedure_t conclude_second(drive_t *drive, int32_t most)
 
 static pm_procedure_t conclude(drive_t *drive)
 {
-    const int32_t most = pm_shl(drive->config.protection.offset_max, PM_Q_BITS - 15);
+    const int32_t most = pm_shl((int32_t)drive->config.protection.offset_max, PM_Q_BITS - 15);
     pm_procedure_t result = PM_DONE;
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
         const pm_q_t zero = pm_shl(drive->procedure.calibrate.sum[x], PM_Q_BITS - 15 - CALIBRATE_BITS);
@@ -51,10 +52,39 @@ static pm_procedure_t conclude(drive_t *drive)
     return result;
 }
 
-pm_procedure_t procedure_calibrate_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
+static bool moves(const uint16_t *code, const uint16_t *first, int32_t most)
+{
+    bool moved = false;
+    for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
+        moved = moved || pm_abs((int32_t)code[x] - (int32_t)first[x]) > most;
+    }
+    return moved;
+}
+
+/* A current flows: from the beginning, with this period as the first. */
+static void wait_for_rest(calibrate_t *self, const drive_in_t *in, int32_t most)
+{
+    bool moved = self->count == 0U || moves(in->i_leg, self->first, most);
+#if PM_HAS(two_sets)
+    moved = moved || moves(in->more.i_second, self->second_first, most);
+#endif
+    if (moved) {
+        *self = (calibrate_t){.timer = self->timer};
+        for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
+            self->first[x] = in->i_leg[x];
+#if PM_HAS(two_sets)
+            self->second_first[x] = in->more.i_second[x];
+#endif
+        }
+    }
+}
+
+PM_RARE pm_procedure_t procedure_calibrate_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
 {
     (void)out;
     calibrate_t *self = &drive->procedure.calibrate;
+    wait_for_rest(self, in, drive->config.protection.rest);
+    self->timer++;
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
         self->sum[x] += in->i_leg[x];
     }
@@ -68,7 +98,11 @@ pm_procedure_t procedure_calibrate_step(drive_t *drive, const drive_in_t *in, dr
     self->neutral_second += in->more.v_neutral_second;
 #endif
     self->count++;
-    return self->count == CALIBRATE_PERIODS ? conclude(drive) : PM_RUNNING;
+    if (self->count < CALIBRATE_PERIODS) {
+        return self->timer == UINT16_MAX ? PM_FAILED_TIMEOUT : PM_RUNNING;
+    }
+    drive->rests = true;
+    return conclude(drive);
 }
 
 pm_procedure_t procedure_calibrate_slow(drive_t *drive)

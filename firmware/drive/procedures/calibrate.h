@@ -2,10 +2,14 @@
  * off.
  *
  *   zero = sum of the codes / 1024
- * 1024 periods; fails (OFFSET) when a channel is off mid-scale by more than offset_max, the neutral's by a quarter of its
- * full scale. Of a rotor that turns the neutral sees whole cycles of its third harmonic, or what is left of one.
+ * 1024 periods in which no current differs from that of the first by more than 1/64 of full scale, or twelve times i_noise where
+ * that is more. One that does belongs to a rotor whose EMF is above the link, and the mean of it is no offset: they begin again,
+ * and the start waits until the diodes conduct no more. So none is flowing when the next step begins.
+ * Fails with OFFSET when a channel is off mid-scale by more than offset_max, the neutral's by a quarter of its full scale; with
+ * TIMEOUT where there is no rest in 65,535 periods: a rotor that is driven, or a channel that is not connected.
+ * Of a rotor that turns the neutral sees whole cycles of its third harmonic, or what is left of one.
  * Tests: tests/unit/drive/drive_test.cpp, tests/contract/procedure_contract_test.cpp,
- * tests/scenario/fault_sensor_offset.yaml. */
+ * tests/scenario/fault_sensor_offset.yaml, flying_start_above_link.yaml. */
 #ifndef DRIVE_PROCEDURES_CALIBRATE_H
 #define DRIVE_PROCEDURES_CALIBRATE_H
 
@@ -18,14 +22,17 @@
 
 typedef struct {
     int32_t sum[3];
+    uint16_t first[3];
+    uint16_t timer; /* periods since it began */
 #if PM_CARRIES(NEEDS_NEUTRAL)
     int32_t neutral; /* sum of its codes */
 #endif
 #if PM_CARRIES(NEEDS_SECOND_SET)
     int32_t second[3];
+    uint16_t second_first[3];
     int32_t neutral_second;
 #endif
-    uint16_t count; /* periods so far */
+    uint16_t count; /* periods at rest so far */
 } calibrate_t;
 
 #endif

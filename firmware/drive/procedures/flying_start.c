@@ -54,7 +54,7 @@ static void after_pulse(flying_start_t *self, const flying_start_config_t *c)
     static const uint8_t more[FLYING_START_PULSES + 1] = {0, 0,  1, 3,
                                                           7, 15, 0}; /* pitches, of so many pulses */
     const uint32_t pitch = periods_of(self->length) + SEEN + QUIET - 1U;
-    const uint32_t behind = self->timer + pitch;
+    const uint32_t behind = (uint32_t)self->timer - self->began + pitch;
     if (self->charged >= c->charge && (self->count >= FLYING_START_PULSES || behind > c->span)) {
         self->ended = true;
         self->wait = SEEN;
@@ -114,19 +114,25 @@ pm_procedure_t flying_start_step(flying_start_t *self, const flying_start_config
         if (self->timer == UINT16_MAX) {
             return PM_FAILED_TIMEOUT;
         }
-        self->quiet = is_zero(self, c, i) ? (uint8_t)(self->quiet + (self->quiet < QUIET ? 1U : 0U)) : 0U;
-        if (self->since <= self->wait || self->quiet < QUIET) {
+        self->quiet = is_zero(self, c, i) ? (uint16_t)(self->quiet + 1U) : 0U;
+        if (self->count == 1U && self->since > (uint32_t)self->wait + c->pause) {
+            *self = (flying_start_t){.timer = self->timer, .more = c->pause};
+        }
+        if (self->since <= self->wait || self->quiet < QUIET + self->more) {
             return PM_RUNNING;
         }
         if (self->ended) {
             return PM_DONE;
         }
-        self->timer = self->begun ? self->timer : 0U;
-        self->length = self->begun ? self->length : c->shortest;
-        self->begun = true;
+        if (!self->begun) {
+            self->began = self->timer;
+            self->length = c->shortest;
+            self->begun = true;
+        }
         self->left = (uint16_t)periods_of(self->length);
         self->wait = SEEN;
         self->quiet = 0;
+        self->more = 0;
     }
     self->left--;
     self->since = 0;
@@ -250,7 +256,7 @@ pm_procedure_t flying_start_find(flying_start_t *self, const flying_start_config
 
 void procedure_flying_start_begin(drive_t *drive)
 {
-    (void)drive;
+    drive->procedure.flying_start.more = drive->rests ? 0U : drive->config.flying_start.pause;
 }
 
 /* Less than a period: in its second half alone, at whose end the currents are sampled. Else the diodes would conduct between

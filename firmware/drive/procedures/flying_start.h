@@ -20,14 +20,17 @@
  * 10 % of rated speed, and less where L is small.
  *
  * Largest current: that of the first pulse, |w| psi_m tau / L_q, or 40 % of rated. All takes at most 15 ms, without the wait for
- * zero current: where the EMF exceeds the link the diodes conduct, and no switch closes until that ends;
+ * zero current: where the EMF exceeds the link the diodes conduct, and no switch closes until that ends, which the offsets wait
+ * for (calibrate.h). A look that no calibration precedes waits itself: a sixth of a turn without a current, at the speed whose EMF is
+ * two thirds of v_dc_nominal, (pi / 3) root(3) psi_m / v; faster, the pauses of the diodes are shorter. The same time is what the current of the first pulse may take to end, as the second must
+ * come within half a turn: where the EMF is within a few percent of the link it takes longer, and the look begins again.
  * PM_FAILED_TIMEOUT after 65,535 periods. Between pulses the diodes take the current back to zero, and the link takes its
  * energy, 3/4 L i^2. What rings on for longer than four periods is that of the legs' capacitance, v_dc root(C / L_d) at
  * its most, and ends no wait.
  * On boards with PM_BOOTSTRAP the pulses go on until the low switches have been on for what charge.h takes, since the
  * caught rotor must not be shorted for as long.
  * The control interrupt takes at most 324 instructions with it. Tests: tests/unit/drive/flying_start_test.cpp,
- * tests/scenario/flying_start.yaml, tests/contract/procedure_contract_test.cpp, tests/target/board. */
+ * tests/scenario/flying_start.yaml, flying_start_above_link.yaml, tests/contract/procedure_contract_test.cpp, tests/target/board. */
 #ifndef DRIVE_PROCEDURES_FLYING_START_H
 #define DRIVE_PROCEDURES_FLYING_START_H
 
@@ -46,15 +49,18 @@ extern "C" {
 
 typedef struct {
     bool on;
-    uint16_t shortest, longest; /* pulse, in parts; those shorter than a period need PWM on one switch */
-    uint16_t span;              /* periods in which the pulses begin and end */
-    uint32_t charge;            /* parts for which the low switches must have been on at the end */
-    pm_q_t i_zero;              /* currents below count as zero */
-    pm_q_t i_rings;             /* the same when the legs have been off for long enough */
-    pm_q_t i_enough;            /* a pulse that reaches it is not made twice as long */
-    pm_q_t noise;               /* of one current */
-    pm_q_t decay;               /* R T_s / (64 L_q) */
-    pm_q_t drop;                /* V_drop T_s / (64 L_q), a current */
+    uint8_t shortest; /* pulse, in parts; those shorter than a period need PWM on one switch */
+    uint16_t longest;
+    uint16_t span; /* periods in which the pulses begin and end */
+    uint16_t
+        pause; /* periods between two currents of the diodes, at most; a quarter turn at EMF = v_dc_nominal */
+    uint32_t charge; /* parts for which the low switches must have been on at the end */
+    pm_q_t i_zero;   /* currents below count as zero */
+    pm_q_t i_rings;  /* the same when the legs have been off for long enough */
+    pm_q_t i_enough; /* a pulse that reaches it is not made twice as long */
+    pm_q_t noise;    /* of one current */
+    pm_q_t decay;    /* R T_s / (64 L_q) */
+    pm_q_t drop;     /* V_drop T_s / (64 L_q), a current */
 } flying_start_config_t;
 
 typedef struct {
@@ -78,11 +84,13 @@ typedef struct {
     flying_start_reading_t reading;
     uint32_t charged; /* parts for which the low switches were on */
     uint16_t length;  /* parts */
-    uint16_t timer;   /* periods since the first pulse began; before, since the procedure did */
+    uint16_t timer;   /* periods so far, */
+    uint16_t began;   /* and of those before the first pulse */
     uint16_t since;   /* periods since the last one with the low switches on */
     uint16_t wait;    /* of those, until the next pulse */
     uint16_t left;    /* periods of the present pulse */
-    uint8_t quiet;    /* samples of zero current */
+    uint16_t quiet;   /* samples of zero current, */
+    uint16_t more;    /* and of those before the first pulse, more than a pulse takes */
     uint8_t count;
     bool begun, ended; /* the first pulse, the last */
     pm_angle_t theta;  /* found, at the end of the last pulse */

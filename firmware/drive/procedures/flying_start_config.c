@@ -20,13 +20,23 @@ static pm_q_t make_ringing(maker_t *m)
     return fixed(m, pm_num_div(least(i, most), m->base.i), Q_BITS, DRIVE_PARAM_leg_capacitance);
 }
 
+/* (pi / 3) root(3) psi_m / v, with v = 2/3 v_dc_nominal. */
+static uint16_t make_pause(maker_t *m)
+{
+    const pm_num_t turn = mul3(pm_num_ratio(2721, 1000), si(m, DRIVE_PARAM_psi_m),
+                               pm_num_div(pm_num(1), si(m, DRIVE_PARAM_v_dc_nominal)));
+    const pm_num_t most = pm_num(UINT16_MAX / 2);
+    return (uint16_t)(2 + fixed(m, least(pm_num_div(turn, m->base.t_s), most), 0, DRIVE_PARAM_psi_m));
+}
+
 void make_flying_start(maker_t *m, flying_start_config_t *c)
 {
     const uint32_t f = (uint32_t)m->params->f_pwm;
     c->on = m->params->flying_start != 0;
     const uint32_t fine = NEEDS_ONE_SWITCH | NEEDS_HALVES;
-    c->shortest = (m->channels & fine) == fine ? 1U : FLYING_START_PARTS;
+    c->shortest = (m->channels & fine) == fine ? 1U : (uint8_t)FLYING_START_PARTS;
     c->span = (uint16_t)(f / 1000U * SPAN_US / 1000U);
+    c->pause = make_pause(m);
     c->longest = FLYING_START_PARTS;
     while (2UL * c->longest / FLYING_START_PARTS <= f / 1000U * LONGEST_US / 1000U) {
         c->longest = (uint16_t)(2U * c->longest);

@@ -296,6 +296,58 @@ TEST(Drive, CalibrationTakes1024PeriodsWithTheBridgeOff)
     EXPECT_NEAR(periods, 1024, 10);
 }
 
+// A rotor whose EMF is above the link: pulses of 5 % of full scale, six times a turn of 30 periods, are no offset.
+TEST(Drive, CalibrationWaitsUntilNoCurrentFlows)
+{
+    Drive x;
+    x.enable(true, DRIVE_MODE_CURRENT);
+    int calibrating = 0;
+    for (int ms = 0; ms < 500; ++ms) {
+        const double pulse = ms < 300 && ms % 3 == 0 ? 0.05 : 0;
+        x.in.i_leg[0] = direct::current_code(0.003 + pulse);
+        x.in.i_leg[1] = direct::current_code(-pulse);
+        x.run_ms(1);
+        if (x.d.sequence.procedure == PROCEDURE_calibrate) {
+            calibrating = ms;
+            ASSERT_FALSE(x.driven());
+        }
+    }
+    EXPECT_NEAR(calibrating, 300 + 102, 4);
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_NONE);
+    EXPECT_NEAR(static_cast<double>(x.d.zero[0] - PM_ONE) / PM_ONE, 0.003, 1e-4);
+    EXPECT_NEAR(static_cast<double>(x.d.zero[1] - PM_ONE) / PM_ONE, 0, 1e-4);
+}
+
+TEST(Drive, CalibrationGivesUpWhereACurrentDoesNotEnd)
+{
+    Drive x;
+    x.enable(true, DRIVE_MODE_CURRENT);
+    for (int ms = 0; ms < 7000; ++ms) {
+        x.in.i_leg[2] = direct::current_code(ms % 2 == 0 ? 0.02 : 0);
+        x.run_ms(1);
+        ASSERT_FALSE(x.driven());
+    }
+    EXPECT_EQ(x.fault(), DRIVE_FAULT_POSITION_NOT_FOUND);
+    EXPECT_EQ(drive_fault_record(&x.d)->refusal.procedure, PROCEDURE_calibrate);
+    EXPECT_EQ(drive_fault_record(&x.d)->refusal.reason, PM_FAILED_TIMEOUT);
+}
+
+// A noisy sensor that is told so is not taken for a current.
+TEST(Drive, CalibrationTakesTheNoiseThatIsTold)
+{
+    for (const bool told : {false, true}) {
+        drive_params_t p = direct::params();
+        p.i_noise = told ? static_cast<int32_t>(0.01 * p.i_full_scale * 1000) : 1000;
+        Drive x(p);
+        x.enable(true, DRIVE_MODE_CURRENT);
+        for (int ms = 0; ms < 120; ++ms) {
+            x.in.i_leg[0] = direct::current_code(ms % 2 == 0 ? 0.03 : -0.03);
+            x.run_ms(1);
+        }
+        EXPECT_EQ(x.d.sequence.procedure == PROCEDURE_calibrate, !told);
+    }
+}
+
 TEST(Drive, SpeedReferenceIsHeldToItsLimit)
 {
     Closed x;
