@@ -108,6 +108,14 @@ void zero_crossing_open(zero_crossing_t *self, uint32_t sector, bool reverse, ui
     self->found = false;
 }
 
+/* At the lower rail, where no diode conducts any more: of a rotor that is about to start all of its EMF is as near as that. */
+static bool is_slow_emf(const zero_crossing_t *self, const zero_crossing_config_t *config, pm_q_t v,
+                        zero_instant_t when, const zero_expected_t *expected)
+{
+    return when.legs == ZERO_LEGS_LOW && v > config->rail / 4 && expected->seen > 0 &&
+           expected->seen < config->rail / 4 && when.at - self->open_since > expected->t_60 / 16U;
+}
+
 bool zero_crossing_step(zero_crossing_t *self, const zero_crossing_config_t *config, const zero_sample_t *in,
                         zero_instant_t when, const zero_expected_t *expected)
 {
@@ -117,7 +125,8 @@ bool zero_crossing_step(zero_crossing_t *self, const zero_crossing_config_t *con
     const bool rising = self->rising;
     const pm_q_t v = in->v[self->leg];
     const pm_q_t within = when.legs == ZERO_LEGS_HIGH ? -config->rail : config->rail;
-    const bool low = v <= config->rail, high = v >= in->v_dc - within;
+    const bool low = v <= config->rail && !is_slow_emf(self, config, v, when, expected);
+    const bool high = v >= in->v_dc - within;
     const bool past = rising ? high : low;
     const bool cut = rising ? low : high;
     if ((past && !self->ahead) || (cut && when.legs == ZERO_LEGS_APART)) {

@@ -34,7 +34,10 @@
  * seen, as far as the channel's full scale leaves room. With both low that is beyond a channel which begins at zero: there
  * freewheeling and past look alike at a downward crossing, and a late one is missed. An offset of the channel, or of
  * virtual_third.h the current of the driven legs, may keep it above zero there: within rail / 4 the slope tells from the last
- * sample further off.
+ * sample further off. Of a rotor that is about to start the whole EMF is within `rail` of the lower rail: where it swings by less
+ * than 2 rail, from t_60 / 16 behind the commutation on, when its currents have ceased, only rail / 4 of the rail tell nothing.
+ * Patterns that look there start by that; without it two of three commutations are those that were expected, which lose a light
+ * rotor.
  *
  * A RC filter of the terminals must settle within the on time and does not delay (METHODS-ADDENDUM.md, E20); what a
  * comparator delays is taken off by the commutation.

@@ -157,7 +157,10 @@ bool block_from_rest(drive_t *drive)
         return false;
     }
     const int32_t direction = wanted(drive);
-    if (direction == 0) {
+    const pm_q_t omega = drive->omega_ramp;
+    if (direction == 0 || (omega != 0 && (omega < 0) != (direction < 0))) {
+        /* of a rotor that turned when it was taken over */
+        drive->omega_ramp = pm_approach(omega, 0, drive->config.open_loop.slope);
         open_loop_hold(drive);
         return true;
     }

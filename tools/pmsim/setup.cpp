@@ -180,7 +180,9 @@ void derive_board_parameters(Setup &setup)
     derive(DRIVE_PARAM_f_pwm, inverter.f_pwm_Hz);
     derive(DRIVE_PARAM_timer_counts, inverter.timer_counts);
     derive(DRIVE_PARAM_dead_time, inverter.dead_time_s);
-    derive(DRIVE_PARAM_device_drop, 0.5 * (inverter.v_switch_V + inverter.v_diode_V));
+    // A closed switch conducts both ways; the diodes have the current for two dead times of a period.
+    const double gaps = 2 * inverter.dead_time_s * inverter.f_pwm_Hz;
+    derive(DRIVE_PARAM_device_drop, inverter.v_switch_V * (1 - gaps) + inverter.v_diode_V * gaps);
     derive(DRIVE_PARAM_v_dc_nominal, setup.rated.v_dc_V);
     derive(DRIVE_PARAM_i_full_scale, sensor.i_full_scale_A);
     derive(DRIVE_PARAM_v_full_scale, sensor.v_full_scale_V);

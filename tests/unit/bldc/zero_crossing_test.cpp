@@ -219,6 +219,35 @@ TEST(ZeroCrossing, IgnoresTheSwingAfterFreewheeling)
     EXPECT_LT(static_cast<int32_t>(b.self.at), -20000);
 }
 
+// A rotor that is about to start: all of its EMF, 0.3 V, is as near to the lower rail as what freewheeling leaves, 0.35 V. Behind the
+// currents it shows, where 0.0875 V are left. Twins: where the next crossings are sure, or soon after a commutation, it shows nothing.
+TEST(ZeroCrossing, AtTheLowerRailASlowEmfShows)
+{
+    constexpr double kSlow_V = 0.3;
+    const pm_q_t slow_swing = fixed(kSlow_V * kPi / 3 / kBase_V, 28);
+    const auto find = [&](uint32_t sector, pm_q_t seen, double since) {
+        Bench b;
+        b.legs = ZERO_LEGS_LOW;
+        b.config.swing = slow_swing;
+        b.sector = sector;
+        const zero_expected_t e = {0, 0, kT60, 0, seen};
+        zero_crossing_open(&b.self, sector, false, static_cast<uint32_t>(static_cast<int32_t>(since)));
+        for (double at = since + 2000; at < kT60 / 2.0; at += kSpacing) {
+            const double towards = sector % 2 == 0 ? 1 : -1;
+            const double v = towards * kSlow_V * std::sin(degrees(at) * kDegree);
+            if (b.step(b.terminal(at, v), e)) {
+                return degrees(static_cast<double>(static_cast<int32_t>(b.self.at)));
+            }
+        }
+        return 1e3;
+    };
+    const double half = kT60 / 2.0;
+    EXPECT_NEAR(find(0, slow_swing / 8, -half), 0, 3);
+    EXPECT_NEAR(find(1, slow_swing / 8, -half), 0, 3);
+    EXPECT_EQ(find(1, 0, -half), 1e3);
+    EXPECT_EQ(find(1, slow_swing / 8, -kT60 * 0.32), 1e3);
+}
+
 // The diode of the open leg has carried a current in the off time, and its terminal is on the way from the rail: one sample
 // past the crossing behind one ahead of it, two of them behind the freewheeling.
 TEST(ZeroCrossing, ASampleOnItsWayFromARailIsNoEarlyCrossing)
