@@ -43,7 +43,7 @@ struct drive {
     bool usual;        /* estimated angle and REGULATOR_INLINE: one branch per period for all that is not */
     bool round;        /* the start has found no saliency: without injection until the next one */
     bool tried;        /* open loop: once more, with more current */
-    bool rests;        /* no current flowed while the offsets were measured, and no start came since */
+    bool rests;        /* the start measured its offsets, while no current flowed */
     pm_dir_t ahead;    /* one and a half periods of rotation: from the sample to where the voltage acts */
     pm_unit_t v_share; /* share of v_dc for current control */
     pm_ab_t v_acting;  /* commanded at k-1: acts over [k, k+1) */

@@ -3,8 +3,8 @@
  *
  *   zero = sum of the codes / 1024
  * 1024 periods in which no current differs from that of the first by more than 1/64 of full scale, or twelve times i_noise where
- * that is more. One that does belongs to a rotor whose EMF is above the link, and the mean of it is no offset: they begin again,
- * and the start waits until the diodes conduct no more. So none is flowing when the next step begins.
+ * that is more. One that differs by more belongs to a rotor whose EMF is above the link, and its mean is no offset: the 1024 periods
+ * begin again. So the start waits until the diodes conduct no more, and no current flows when its next step begins.
  * Fails with OFFSET when a channel is off mid-scale by more than offset_max, the neutral's by a quarter of its full scale; with
  * TIMEOUT where there is no rest in 65,535 periods: a rotor that is driven, or a channel that is not connected.
  * Of a rotor that turns the neutral sees whole cycles of its third harmonic, or what is left of one.

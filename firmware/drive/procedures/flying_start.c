@@ -54,7 +54,7 @@ static void after_pulse(flying_start_t *self, const flying_start_config_t *c)
     static const uint8_t more[FLYING_START_PULSES + 1] = {0, 0,  1, 3,
                                                           7, 15, 0}; /* pitches, of so many pulses */
     const uint32_t pitch = periods_of(self->length) + SEEN + QUIET - 1U;
-    const uint32_t behind = (uint32_t)self->timer - self->began + pitch;
+    const uint32_t behind = (uint16_t)(self->timer - self->began) + pitch;
     if (self->charged >= c->charge && (self->count >= FLYING_START_PULSES || behind > c->span)) {
         self->ended = true;
         self->wait = SEEN;

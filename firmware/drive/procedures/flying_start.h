@@ -21,9 +21,11 @@
  *
  * Largest current: that of the first pulse, |w| psi_m tau / L_q, or 40 % of rated. All takes at most 15 ms, without the wait for
  * zero current: where the EMF exceeds the link the diodes conduct, and no switch closes until that ends, which the offsets wait
- * for (calibrate.h). A look that no calibration precedes waits itself: a sixth of a turn without a current, at the speed whose EMF is
- * two thirds of v_dc_nominal, (pi / 3) root(3) psi_m / v; faster, the pauses of the diodes are shorter. The same time is what the current of the first pulse may take to end, as the second must
- * come within half a turn: where the EMF is within a few percent of the link it takes longer, and the look begins again.
+ * for (calibrate.h). A look that no calibration precedes waits itself, for a pause without a current as long as a sixth of a turn
+ * at the speed whose EMF is two thirds of v_dc_nominal; faster, the pauses of the diodes are shorter:
+ *   pause = (pi / 3) root(3) psi_m / (2/3 v_dc_nominal)
+ * No longer may the current of the first pulse take to end, as the second must come within half a turn. Where the EMF is within a
+ * few percent of the link it takes longer, and the look begins again.
  * PM_FAILED_TIMEOUT after 65,535 periods. Between pulses the diodes take the current back to zero, and the link takes its
  * energy, 3/4 L i^2. What rings on for longer than four periods is that of the legs' capacitance, v_dc root(C / L_d) at
  * its most, and ends no wait.
@@ -51,9 +53,8 @@ typedef struct {
     bool on;
     uint8_t shortest; /* pulse, in parts; those shorter than a period need PWM on one switch */
     uint16_t longest;
-    uint16_t span; /* periods in which the pulses begin and end */
-    uint16_t
-        pause; /* periods between two currents of the diodes, at most; a quarter turn at EMF = v_dc_nominal */
+    uint16_t span;   /* periods in which the pulses begin and end */
+    uint16_t pause;  /* periods, see above; a quarter turn where the EMF is v_dc_nominal */
     uint32_t charge; /* parts for which the low switches must have been on at the end */
     pm_q_t i_zero;   /* currents below count as zero */
     pm_q_t i_rings;  /* the same when the legs have been off for long enough */

@@ -556,53 +556,62 @@ TEST(FlyingStart, ClosesNoSwitchWhileACurrentFlows)
     EXPECT_EQ(drive_fault_record(&x.d)->refusal.reason, PM_FAILED_TIMEOUT);
 }
 
-// No calibration has waited for the diodes: the pauses of their current, shorter than a sixth of a turn, are no end.
-TEST(FlyingStart, PausesOfTheDiodesAreNoEnd)
+flying_start_config_t with_a_pause(uint16_t pause)
 {
     flying_start_config_t c = {};
     c.longest = c.shortest = 32;
     c.span = 160;
-    c.pause = 17;
-    c.i_zero = c.i_rings = q28(2e-3);
-    flying_start_t self = {};
-    self.more = c.pause;
-    const auto first_pulse = [&](int from, int to, int pitch) {
-        for (int k = from; k < to; ++k) {
-            const pm_q_t i = pitch != 0 && k % pitch == 0 ? q28(0.05) : 0;
-            uint32_t low = 0;
-            flying_start_step(&self, &c, {i, -i, 0}, static_cast<uint16_t>(k), &low);
-            if (low != 0U) {
-                return k;
-            }
-        }
-        return -1;
-    };
-    EXPECT_EQ(first_pulse(0, 1000, 17), -1);
-    EXPECT_EQ(first_pulse(1000, 1100, 0), 986 + 19); // 986 was the last
-}
-
-// The second pulse must come within half a turn: a current that takes longer to end is that of an EMF near the link.
-TEST(FlyingStart, BeginsAgainWhereTheFirstCurrentDoesNotEnd)
-{
-    flying_start_config_t c = {};
-    c.longest = c.shortest = 32;
-    c.span = 160;
-    c.pause = 17;
+    c.pause = pause;
     c.i_zero = c.i_rings = q28(2e-3);
     c.i_enough = q28(0.05);
-    for (const int lasts : {10, 30}) {
-        flying_start_t self = {};
-        int pulses = 0;
-        for (int k = 0, since = 1000; k < 45; ++k, ++since) {
-            const pm_q_t i = since >= 2 && since < lasts ? q28(0.05) : 0;
-            uint32_t low = 0;
-            ASSERT_EQ(flying_start_step(&self, &c, {i, -i, 0}, static_cast<uint16_t>(k), &low), PM_RUNNING);
-            since = low != 0U ? 0 : since;
-            pulses += low != 0U ? 1 : 0;
+    return c;
+}
+
+// The period of the first pulse, of 1000 in which the diodes conduct each 17th, and 100 without a current; -1: none.
+int first_pulse(uint16_t more)
+{
+    const flying_start_config_t c = with_a_pause(17);
+    flying_start_t self = {};
+    self.more = more;
+    for (int k = 0; k < 1100; ++k) {
+        const pm_q_t i = k < 1000 && k % 17 == 0 ? q28(0.05) : 0;
+        uint32_t low = 0;
+        flying_start_step(&self, &c, {i, -i, 0}, static_cast<uint16_t>(k), &low);
+        if (low != 0U) {
+            return k;
         }
-        EXPECT_EQ(pulses, lasts == 10 ? 4 : 1);
-        EXPECT_EQ(self.count, lasts == 10 ? 4 : 0);
     }
+    return -1;
+}
+
+// No calibration has waited for the diodes: the pauses of their current, shorter than a sixth of a turn, are no end. Twin: two samples.
+TEST(FlyingStart, PausesOfTheDiodesAreNoEnd)
+{
+    EXPECT_EQ(first_pulse(17), 986 + 19); // 986 was the last
+    EXPECT_LT(first_pulse(0), 17);
+}
+
+// Of a look whose first current lasts as long, in 45 periods.
+int pulses_kept(int lasts, uint16_t pause)
+{
+    const flying_start_config_t c = with_a_pause(pause);
+    flying_start_t self = {};
+    for (int k = 0, since = 1000; k < 45; ++k, ++since) {
+        const pm_q_t i = since >= 2 && since < lasts ? q28(0.05) : 0;
+        uint32_t low = 0;
+        EXPECT_EQ(flying_start_step(&self, &c, {i, -i, 0}, static_cast<uint16_t>(k), &low), PM_RUNNING);
+        since = low != 0U ? 0 : since;
+    }
+    return self.count;
+}
+
+// The second pulse must come within half a turn: a current that takes longer to end is that of an EMF near the link. Twin: any time
+// is short enough.
+TEST(FlyingStart, BeginsAgainWhereTheFirstCurrentDoesNotEnd)
+{
+    EXPECT_EQ(pulses_kept(10, 17), 4);
+    EXPECT_EQ(pulses_kept(30, 17), 0);
+    EXPECT_EQ(pulses_kept(30, UINT16_MAX / 2), 2);
 }
 
 // The upper switches' supply has been charged when the rotor is caught, though nothing was on for 2 ms.
