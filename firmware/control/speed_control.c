@@ -24,3 +24,22 @@ pm_q_t speed_control_step(speed_control_t *self, const speed_control_config_t *c
     *limited = u_limited != u;
     return pm_narrow(u_limited);
 }
+
+/* By increments: the integral is what the last i_q has beyond its 2 kp e. */
+pm_q_t speed_control_below(speed_control_t *self, const speed_control_config_t *config, pm_q_t top,
+                           pm_q_t omega, pm_q_t i_q)
+{
+    const pm_q_t sign = i_q < 0 ? -1 : 1;
+    const pm_q_t e = pm_max(top - sign * omega, -PM_ONE);
+    if (e < top / 2) {
+        const pm_q_t gained = pm_clamp(sign * (self->reference - omega), -PM_ONE, PM_ONE);
+        const pm_wide_t before = sign * self->pi.integral + 2 * pm_gain_add(0, gained, config->pi.kp);
+        const pm_wide_t u =
+            pm_max(before + 4 * pm_gain_add(0, e, config->pi.ki), 2 * pm_gain_add(0, e, config->pi.kp));
+        if (u < pm_widen(sign * i_q)) {
+            i_q = sign * pm_narrow(pm_max(u, 0));
+        }
+    }
+    speed_control_reset(self, omega, i_q);
+    return i_q;
+}

@@ -4,6 +4,11 @@
  *   ki = kp w_s T / 4                        T: the step of 1 ms
  * per-unit: two real poles at half the bandwidth w_s when the current loop is fast. While the current limit
  * acts, the integral follows it (back-calculation). Runs at 1 kHz.
+ *
+ * A torque drives up to a speed and no further: another such PI, of twice the bandwidth so that it acts late,
+ * holds i_q between zero and the torque's. Its error is what is missing to that speed, its integral never below
+ * zero. It begins where the unloaded machine would be at that speed in 1 / (2 w_s), though not before half of it,
+ * passes by a seventh of that way and what the speed's estimate lags, and brakes nothing.
  * Tests: tests/unit/control/speed_control_test.cpp. */
 #ifndef CONTROL_SPEED_CONTROL_H
 #define CONTROL_SPEED_CONTROL_H
@@ -32,6 +37,10 @@ void speed_control_reset(speed_control_t *self, pm_q_t omega, pm_q_t i_q);
 /* i_min <= result <= i_max; *limited: one of them acts. */
 pm_q_t speed_control_step(speed_control_t *self, const speed_control_config_t *config, pm_q_t target,
                           pm_q_t omega, pm_q_t i_min, pm_q_t i_max, bool *limited);
+
+/* i_q, or what of it does not drive beyond +-top. The PI is left ready for speed control. */
+pm_q_t speed_control_below(speed_control_t *self, const speed_control_config_t *config, pm_q_t top,
+                           pm_q_t omega, pm_q_t i_q);
 
 void make_speed_control(maker_t *m, speed_control_config_t *c);
 

@@ -111,7 +111,7 @@ enum {
     DRIVE_LIMIT_VOLTAGE = 1 << 1,     /* modulator at its limit */
     DRIVE_LIMIT_TEMPERATURE = 1 << 2, /* current derated by temperature */
     DRIVE_LIMIT_DC_VOLTAGE = 1 << 3,  /* regeneration derated by the DC-link voltage */
-    DRIVE_LIMIT_SPEED = 1 << 4,       /* reference clamped to speed_max */
+    DRIVE_LIMIT_SPEED = 1 << 4,       /* reference clamped to speed_max, or the torque gives way to it */
     DRIVE_LIMIT_SLIP = 1 << 5, /* the position had slipped since the start, and was put right (slip.h) */
 };
 

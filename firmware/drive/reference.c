@@ -73,9 +73,10 @@ pm_q_t reference_torque(drive_t *drive, pm_q_t omega, pm_q_t i_min, pm_q_t i_max
     pm_q_t i_q;
     if (drive->command.mode == DRIVE_MODE_TORQUE && !stopping) {
         const pm_q_t wanted = current_for(drive, drive->torque_target);
-        i_q = pm_clamp(wanted, i_min, i_max);
-        limited = i_q != wanted;
-        speed_control_reset(&drive->speed, omega, i_q);
+        const pm_q_t allowed = pm_clamp(wanted, i_min, i_max);
+        limited = allowed != wanted;
+        i_q = speed_control_below(&drive->speed, &c->speed, c->omega_max, omega, allowed);
+        drive->status.limits |= i_q != allowed ? DRIVE_LIMIT_SPEED : 0U;
     } else {
         const pm_q_t wanted = stopping ? 0 : drive->omega_target;
         const pm_q_t target = pm_clamp(wanted, -c->omega_max, c->omega_max);

@@ -222,4 +222,59 @@ TEST(SpeedControl, CornersDoNotOverflow)
     }
 }
 
+// A machine without load and friction: the law in double precision, and what the header says of it.
+TEST(SpeedControl, TorqueDrivesToASpeedAndNoFurther)
+{
+    const speed_control_config_t c = config();
+    for (const double way : {1.0, -1.0}) {
+        for (const double i_q : {0.02, 0.1, 0.4}) {
+            const double top = 0.7, kp = 2 * real(c.pi.kp, 26), ki = 4 * real(c.pi.ki, 26);
+            speed_control_t self{};
+            Shaft shaft;
+            double last = 0, before = 0, most = 0;
+            for (int ms = 0; ms < 20000; ++ms) {
+                const double omega = way * shaft.omega;
+                const double got = real(
+                    speed_control_below(&self, &c, fixed(top, 28), fixed(omega, 28), fixed(way * i_q, 28)));
+                const double e = top - shaft.omega;
+                double expected = i_q;
+                if (e < top / 2) {
+                    expected =
+                        std::clamp(std::max(last + kp * (before - shaft.omega) + ki * e, kp * e), 0.0, i_q);
+                }
+                ASSERT_NEAR(way * got, expected, 1e-4) << ms;
+                last = way * got;
+                before = shaft.omega;
+                shaft.run(way * got);
+                most = std::max(most, shaft.omega);
+            }
+            const double slope = i_q * bench::kIpmBase.i_A / per_torque() / bench::kIpmBase.omega_rad_s;
+            EXPECT_GE(shaft.omega, top - 1e-3); // it coasts beyond, without friction
+            EXPECT_LT(most - top, 0.16 * slope / (2 * kBandwidth)) << i_q;
+            EXPECT_GT(most - top, 0.08 * slope / (2 * kBandwidth)) << i_q;
+        }
+    }
+}
+
+// What drives the machine on is not braked, a load that takes the torque has it whole, and the other way is free.
+TEST(SpeedControl, LimitOfSpeedTakesTorqueBackOnly)
+{
+    const speed_control_config_t c = config();
+    const pm_q_t top = fixed(0.7, 28), i_q = fixed(0.3, 28);
+    speed_control_t self{};
+    EXPECT_EQ(speed_control_below(&self, &c, top, fixed(0.3, 28), i_q),
+              i_q); // below half of it, whatever J was told
+    for (int ms = 0; ms < 2000; ++ms) {
+        EXPECT_GE(speed_control_below(&self, &c, top, fixed(0.8, 28), i_q), 0);
+    }
+    EXPECT_EQ(speed_control_below(&self, &c, top, fixed(0.8, 28), i_q), 0);
+    EXPECT_EQ(speed_control_below(&self, &c, top, fixed(0.8, 28), -i_q), -i_q);
+    for (int ms = 0; ms < 2000; ++ms) {
+        speed_control_below(&self, &c, top, fixed(0.69, 28), i_q);
+    }
+    EXPECT_EQ(speed_control_below(&self, &c, top, fixed(0.69, 28), i_q), i_q);
+    EXPECT_EQ(speed_control_below(&self, &c, top, fixed(-4.0, 28), i_q), i_q);
+    EXPECT_EQ(speed_control_below(&self, &c, top, fixed(4.0, 28), i_q), 0);
+}
+
 } // namespace

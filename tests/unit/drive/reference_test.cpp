@@ -201,6 +201,24 @@ TEST(Reference, SpeedIsLimitedAndSaid)
     }
 }
 
+TEST(Reference, TorqueGivesWayToTheLargestSpeedAndItIsSaid)
+{
+    for (const double way : {1.0, -1.0}) {
+        for (const bool beyond : {false, true}) {
+            Drive x = running(DRIVE_MODE_TORQUE);
+            x.d.torque_target = fixed(way * 0.05, 28);
+            x.d.position.pll.omega = fixed(way * (beyond ? 1.02 : 0.4) * kSpeed_max, 28);
+            for (int ms = 0; ms < 300; ++ms) {
+                x.d.status.limits = 0;
+                reference_vector(&x.d);
+            }
+            EXPECT_EQ(x.d.i_ref.q == 0, beyond);
+            EXPECT_EQ((x.d.status.limits & DRIVE_LIMIT_SPEED) != 0, beyond);
+            EXPECT_EQ(x.d.status.limits & DRIVE_LIMIT_CURRENT, 0U);
+        }
+    }
+}
+
 // In any mode a stop is a ramp of the speed to zero.
 TEST(Reference, StoppingBrakesWithSpeedControl)
 {

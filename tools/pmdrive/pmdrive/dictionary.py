@@ -216,7 +216,7 @@ ENTRIES = (
     Entry(0x2100, 14, "L_qd_strong", "machine", "i32", "locked", "H", -9, 0, -1000000000, 1000000000, 0, False, True, "machine", "none", {}, "the same with i_d = +half rated, in the magnet's direction", "3.4.2 #27"),
     Entry(0x2200, 0, "control.count", "control", "u8", "const", "", 0, 0, None, None, 15, False, False, "none", "none", {}, 'highest sub-index', ""),
     Entry(0x2200, 1, "i_max", "control", "i32", "live", "A", -3, 0, 50, 4000000, 5000, False, True, "application", "none", {}, 'limit of the current amplitude', ""),
-    Entry(0x2200, 2, "speed_max", "control", "i32", "live", "rad/s", -3, 0, 1000, 20000000, 150000, False, True, "application", "none", {}, 'largest speed reference', ""),
+    Entry(0x2200, 2, "speed_max", "control", "i32", "live", "rad/s", -3, 0, 1000, 20000000, 150000, False, True, "application", "none", {}, 'largest speed reference; a torque drives no further', ""),
     Entry(0x2200, 3, "acceleration", "control", "i32", "live", "rad/s2", -3, 0, 100, 1000000000, 200000, False, True, "application", "none", {}, ('slope of the speed reference; a position loop lags pole pairs times it over '
  '(2 pi bandwidth)^2 behind: at most 0.12 rad'), ""),
     Entry(0x2200, 4, "current_bandwidth", "control", "i32", "live", "Hz", -3, 0, 10000, 5000000, 500000, False, True, "application", "none", {}, 'current control bandwidth', "1.3.2.2 #5"),
