@@ -13,9 +13,9 @@
 
 const pm_angle_t pulses_axis[PULSES_AXES] = {0, 1431655765U, 2863311531U}; /* 0, 120, 240 degrees */
 
-static bool is_zero(const pulses_config_t *config, pm_abc_t i)
+static bool is_below(pm_q_t least, pm_abc_t i)
 {
-    return pm_abs(i.a) < config->i_zero && pm_abs(i.b) < config->i_zero && pm_abs(i.c) < config->i_zero;
+    return pm_abs(i.a) < least && pm_abs(i.b) < least && pm_abs(i.c) < least;
 }
 
 /* The output of a step acts over the next period, so a pulse commanded in n steps ends at step n + 2. A zero vector
@@ -26,7 +26,8 @@ static pm_procedure_t drive_pulse(pulses_t *self, const pulses_config_t *config,
     if (self->timer <= config->periods) {
         pulses_apply(out, axis, reverse, config->duty);
     } else if (self->timer > config->periods + 1U) {
-        if (is_zero(config, i)) {
+        /* what rings is not zero, and no wire is off */
+        if (is_below(pm_max(5 * config->i_noise, PULSES_STEPS), i)) {
             return PM_FAILED_OPEN;
         }
         self->i = i;
@@ -47,7 +48,7 @@ pm_procedure_t pulses_step(pulses_t *self, const pulses_config_t *config, uint32
     if (!self->decaying) {
         return drive_pulse(self, config, axis, reverse, i, out);
     }
-    self->quiet = is_zero(config, i) ? self->quiet + 1U : 0U;
+    self->quiet = is_below(config->i_zero, i) ? self->quiet + 1U : 0U;
     if (self->quiet < QUIET) {
         return self->timer > config->timeout ? PM_FAILED_TIMEOUT : PM_RUNNING;
     }

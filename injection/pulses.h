@@ -42,13 +42,14 @@ extern "C" {
 #endif
 
 #define PULSES_AXES      3
-#define PULSES_BALANCING 4 /* steps for the gains */
+#define PULSES_BALANCING 4                  /* steps for the gains */
+#define PULSES_STEPS     PM_Q(8.0 / 4096.0) /* 4 of 12 bits: with five times the noise, no current */
 
 typedef struct {
     uint16_t periods; /* length of a pulse */
     uint16_t timeout; /* periods that the decay may take */
     pm_q_t duty;      /* of the driven leg, 0 ... 1 */
-    pm_q_t i_zero;    /* currents below count as zero: noise, and what rings */
+    pm_q_t i_zero;    /* of a current that has ended: noise, and what rings */
     pm_q_t s_min;     /* least saliency: half of what the machine's data say */
     pm_q_t i_noise;   /* of one current */
     pm_q_t i_bridge;  /* what the bridge may add to the currents that show the polarity */

@@ -43,9 +43,8 @@ PM_APART static void make_errors(maker_t *m, pulses_config_t *c)
         pm_num_sqrt(pm_num_div(pm_num_mul(pm_num(4), si(m, DRIVE_PARAM_leg_capacitance)), L_d));
     const pm_num_t v_dc = pm_num_div(si(m, DRIVE_PARAM_v_dc_nominal), m->base.i);
     c->i_bridge = fixed(m, pm_num_mul(v_dc, pm_num_add(edges, ringing)), Q_BITS, DRIVE_PARAM_i_pulse);
-    /* five times the noise, and no less than four steps of a 12-bit converter */
     c->i_zero = fixed(m, pm_num_mul(pm_num(5), noise), Q_BITS, DRIVE_PARAM_i_noise);
-    c->i_zero = pm_max(c->i_zero, PM_Q(8.0 / 4096.0));
+    c->i_zero = pm_max(c->i_zero, PULSES_STEPS);
     c->i_zero = pm_max(c->i_zero, fixed(m, pm_num_mul(v_dc, ringing), Q_BITS, DRIVE_PARAM_leg_capacitance));
     c->i_noise = pm_max(fixed(m, noise, Q_BITS, DRIVE_PARAM_i_noise), 1);
 }

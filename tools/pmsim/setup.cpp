@@ -198,6 +198,9 @@ void derive_board_parameters(Setup &setup)
     } else if (sensor.v_leg_full_scale_V > 0.0) { // the difference of four channels
         derive(DRIVE_PARAM_neutral_full_scale, sensor.v_leg_full_scale_V);
         derive(DRIVE_PARAM_neutral_filter, sensor.filter_s);
+    } else { // a channel that is not there: its preset, in the format of a small link, too
+        const double preset_V = drive_param_table[DRIVE_PARAM_neutral_full_scale].def * 1e-3;
+        derive(DRIVE_PARAM_neutral_full_scale, std::min(preset_V, sensor.v_full_scale_V));
     }
     // rounding adds to the noise; codes have 16 bits at most
     const double lsb_A = std::ldexp(2.0 * sensor.i_full_scale_A, -(sensor.bits > 0 ? sensor.bits : 16));

@@ -282,4 +282,15 @@ TEST(InitialPulses, FailsWhenNoCurrentRises)
     EXPECT_EQ(find(kSix, r, config(r), 0.5).state, PM_FAILED_OPEN);
 }
 
+// Of a board whose legs ring with the winding by more than the pulse is wide: no position, but no wire is off.
+TEST(InitialPulses, LessThanWhatRingsIsNotOpen)
+{
+    const Rig r = ipm(0.01);
+    pulses_config_t c = config(r);
+    c.i_zero = PM_ONE;
+    EXPECT_NE(find(kSix, r, c, 0.5).state, PM_FAILED_OPEN);
+    c.i_noise = PM_ONE / 4;
+    EXPECT_EQ(find(kSix, r, c, 0.5).state, PM_FAILED_OPEN);
+}
+
 } // namespace
