@@ -18,21 +18,21 @@ bool pattern_chops_incoming(pattern_id_t id, uint32_t sector)
     return (chopped(id, sector) & (sector_rising(sector) ? LOW : HIGH)) != 0U;
 }
 
-uint16_t pattern_states(const pattern_config_t *config, uint32_t sector, bool reverse)
+uint16_t pattern_states(pattern_id_t id, bool complementary, uint32_t sector, bool reverse)
 {
-    const uint32_t chops = chopped(config->id, sector);
+    const uint32_t chops = chopped(id, sector);
     const sector_t at = sector_legs(sector, reverse);
     pm_leg_t state[PM_LEGS];
     state[at.open] = PM_LEG_OFF;
     state[at.high] = PM_LEG_HIGH;
     state[at.low] = PM_LEG_LOW;
     if ((chops & HIGH) != 0U) {
-        state[at.high] = config->complementary ? PM_LEG_PWM : PM_LEG_UPPER;
+        state[at.high] = complementary ? PM_LEG_PWM : PM_LEG_UPPER;
     }
-    if (config->id == PATTERN_H_PWM_L_PWM) {
-        state[at.low] = config->complementary ? PM_LEG_INVERTED : PM_LEG_LOWER_INVERTED;
+    if (id == PATTERN_H_PWM_L_PWM) {
+        state[at.low] = complementary ? PM_LEG_INVERTED : PM_LEG_LOWER_INVERTED;
     } else if ((chops & LOW) != 0U) {
-        state[at.low] = config->complementary ? PM_LEG_PWM : PM_LEG_LOWER;
+        state[at.low] = complementary ? PM_LEG_PWM : PM_LEG_LOWER;
     } else {
         /* closed */
     }
@@ -76,6 +76,14 @@ pattern_sample_t pattern_sample(const pattern_config_t *config, uint32_t sector,
         legs = chops == HIGH ? ZERO_LEGS_LOW : ZERO_LEGS_HIGH;
     }
     return (pattern_sample_t){.at = (uint16_t)pm_clamp(at, 1, 2 * N - 1), .legs = legs};
+}
+
+bool pattern_shows(const pattern_config_t *config, pm_q_t u)
+{
+    const int32_t on = pm_frac(u, (pm_frac_t)pm_shl(config->half_period, 33 - PM_Q_BITS)),
+                  least = config->least;
+    const int32_t pulse = config->id == PATTERN_H_PWM_L_PWM_ALTERNATING ? pm_half(on) : on;
+    return config->id == PATTERN_H_PWM_L_PWM || pulse >= least + least / 4;
 }
 
 uint32_t pattern_hidden(const pattern_config_t *config, uint32_t sector, bool reverse)

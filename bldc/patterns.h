@@ -19,7 +19,8 @@
  * What the ripple costs in H_PWM_L_PWM buys the longest on time, half of a period and more at any u. Alternating has the
  * shortest, half of u.
  * Complementary: the other switch of a chopped leg is closed for the rest, so the current may also flow back
- * (braking, no load). Else its diode carries the current (NEEDS_ONE_SWITCH), which may cease.
+ * (braking, no load). Else its diode carries the current (NEEDS_ONE_SWITCH), which may cease;
+ * six_step.h says when.
  *
  * Sample instants, counts in a period 0 ... 2 N with the high leg's pulse about N, the low leg's about 0, of
  * H_PWM_L_PWM about N:
@@ -74,7 +75,7 @@ typedef struct {
 } pattern_config_t;
 
 /* PM_LEGS_... of a sector. */
-uint16_t pattern_states(const pattern_config_t *config, uint32_t sector, bool reverse);
+uint16_t pattern_states(pattern_id_t id, bool complementary, uint32_t sector, bool reverse);
 
 static inline bool pattern_chops_both(pattern_id_t id)
 {
@@ -97,6 +98,9 @@ typedef struct {
     uint16_t at; /* counts from the start of the period, 1 ... 2 N - 1 */
     zero_legs_t legs;
 } pattern_sample_t;
+
+/* Samples are those of the on time, with a quarter to spare. */
+bool pattern_shows(const pattern_config_t *config, pm_q_t u);
 
 pattern_sample_t pattern_sample(const pattern_config_t *config, uint32_t sector, pm_q_t u);
 

@@ -34,10 +34,10 @@ AREA_SHARES = (0.7, 0.85, 1.0, 1.15)
 def drives(machine):
     """Name -> parameters."""
     found = {name: {"pattern": n} for n, name in enumerate(PATTERNS)}
+    found["H_PWM-L_ON, diodes"] = {"pattern": 1, "freewheeling": 0}
     if machine == FAN:
         found["H_PWM-L_ON, mean of the terminals"] = {"pattern": 1, "zero_reference": 1}
         found["H_PWM-L_ON, third harmonic"] = {"pattern": 1, "zero_reference": 2}
-        found["H_PWM-L_ON, diodes"] = {"pattern": 1, "freewheeling": 0}
         found["field orientation"] = {"commutation": 0}
     return found
 

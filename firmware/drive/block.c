@@ -191,8 +191,13 @@ static bool is_fast(const block_t *self)
     return pm_abs(self->pll.omega) > PM_ONE;
 }
 
-/* Of crossings that the voltage between the legs belies: at once where they would be an over-speed. Not drawn into
- * block_slow(): that costs every period two instructions. */
+static bool is_beside(pm_q_t e, pm_q_t emf, pm_q_t unsure)
+{
+    return pm_abs(e - emf) > pm_half(emf) + unsure;
+}
+
+/* Of crossings that the voltage between the legs belies, of the last turn as of the last sector, as the speed may change within one;
+ * those of a turn at once where they would be an over-speed. Not drawn into block_slow(): that costs every period two instructions. */
 PM_APART static bool is_wrong(drive_t *drive)
 {
     const block_config_t *c = &drive->config.block;
@@ -204,9 +209,12 @@ PM_APART static bool is_wrong(drive_t *drive)
     const pm_q_t unsure = turns ? pm_mul(c->lost, v_dc) : 0;
     const pm_q_t e = pm_mul(self->current.u - taken, v_dc) - pm_mul(c->current.R_2, self->i);
     const pm_q_t emf = block_emf(drive);
-    const bool wrong = c->six_step.pattern.complementary && pm_abs(e - emf) > pm_half(emf) + unsure;
-    self->wrong_ms = wrong ? (uint16_t)(self->wrong_ms + 1U) : 0U;
-    return self->wrong_ms > WRONG_MS || (wrong && is_fast(self));
+    const commutation_t *seen = &self->six_step.commutation;
+    const pm_q_t share = pm_div((pm_q_t)commutation_t_60(seen), (pm_q_t)seen->interval[seen->crossed]);
+    const bool of_turn = c->six_step.pattern.complementary && is_beside(e, emf, unsure);
+    const bool of_both = of_turn && is_beside(e, pm_mul_sat(emf, share), unsure);
+    self->wrong_ms = of_both ? (uint16_t)(self->wrong_ms + 1U) : 0U;
+    return self->wrong_ms > WRONG_MS || (of_turn && is_fast(self));
 }
 
 /* A rotor that is held shows no EMF: noise may make the crossings of a start, but not for longer than is_wrong() takes. */
@@ -237,6 +245,7 @@ block_result_t block_slow(drive_t *drive)
         return lost(drive);
     }
     six_step_slow(&self->six_step, &c->six_step);
+    six_step_free(&self->six_step, &c->six_step, self->current.u);
     look(self, c);
     if (young && is_fast(self)) { /* from rest: no rotor was there so soon */
         return BLOCK_STALLED;

@@ -11,9 +11,9 @@
  *      is wanted slower than 3/4 of six_step_speed, or the other way, begins anew with the align.
  * From then on angle and speed come from the zero crossings:
  *   theta = theta of the last crossing + (t - t_z) / turn
- * The voltage must be that of the speed, on average: (u - lost) v_dc - 2 R i within half of the EMF, with what the dead
- * time of one or both legs takes, else crossings are believed that are none, as of a rotor that was stopped. A current
- * below half of its largest ripple,
+ * The voltage must be that of the speed, on average: (u - lost) v_dc - 2 R i within half of the EMF of the last turn or the last
+ * sector, with what the dead time of one or both legs takes, else crossings are believed that are none, as of a rotor that was
+ * stopped. A current below half of its largest ripple,
  *   v_dc T / (16 L)     one leg chops
  *   v_dc T / (8 L)      both do
  * may change its sign within each period: dead time then takes anything from -lost to lost, and that much more is allowed.
@@ -29,8 +29,9 @@
  *   theta_f(i) + w (t_blank + T) <= 30 degrees             (freewheeling.h)
  * in mode duty also of a current that brakes: a duty that is taken back asks for all there is.
  *
- * Mode duty: u = |duty| (patterns.h), after a ramp of t_duty from 0 to 1, in place of what the current wants. Steadily, with
- * the dead time's share `lost`,
+ * Mode duty: u = |duty| (patterns.h), after a ramp of t_duty from 0 to 1, in place of what the current wants. It rises by a quarter of
+ * itself in a sector at most: a light rotor follows it within the turn whose sectors it is timed by. Steadily, with the dead time's
+ * share `lost`,
  *   (u - lost) v_dc = (3 sqrt(3) / pi) psi_m w + 2 R i + (3 / pi) L w i
  * of which the last is what commutation takes, L i in each 60 degrees.
  * The current stays within the limits above, and the duty gives way (DRIVE_LIMIT_CURRENT, line_current.h). A duty for the other
@@ -61,7 +62,8 @@ typedef struct {
     bool from_rest;   /* six_step_start = 1 */
     uint32_t t_30;    /* counts */
     pm_q_t i_start;   /* as i_q */
-    pm_q_t duty_step; /* change of the duty per call of 1 kHz */
+    pm_q_t duty_step; /* change of the duty per call of 1 kHz, ... */
+    pm_q_t duty_turn; /* ... and, while it rises, of one by itself at base speed */
     pm_q_t omega_on;  /* six_step_speed ... */
     pm_q_t omega_off; /* ... and 3/4 of it */
     pm_q_t per_code;  /* per-unit volts of a terminal at full scale */

@@ -77,13 +77,23 @@ static void narrow(const drive_t *drive, pm_q_t *i_min, pm_q_t *i_max)
     *i_max = pm_min(*i_max, self->six_step.reverse ? brakes : drives);
 }
 
+/* What the voltage may change by. A rotor that is light enough to follow it at once must not outrun the sectors: t_60 is known of the
+ * last six. */
+static pm_q_t duty_step(const drive_t *drive)
+{
+    const block_config_t *c = &drive->config.block;
+    const pm_q_t u = pm_max(pm_abs(drive->block.duty), PM_ONE / 32);
+    const pm_q_t of_turn = pm_mul_sat(pm_mul_sat(u, pm_abs(drive->block.pll.omega)), c->duty_turn);
+    const bool rises = pm_abs(drive->duty_target) > u;
+    return rises ? pm_min(c->duty_step, of_turn + 1) : c->duty_step;
+}
+
 /* The voltage is given, and the current is what it makes. */
 static void follow_duty(drive_t *drive, pm_q_t i_min, pm_q_t i_max)
 {
     block_t *self = &drive->block;
     const bool reverse = self->six_step.reverse;
-    const pm_q_t step = drive->config.block.duty_step;
-    self->duty = pm_approach(self->duty, drive->duty_target, step);
+    self->duty = pm_approach(self->duty, drive->duty_target, duty_step(drive));
     block_prepare(drive, reverse ? i_min : i_max);
     line_current_give(&self->current, pm_max(reverse ? -self->duty : self->duty, 0),
                       pm_mul(reverse ? -i_max : i_min, LINE_OF_Q));

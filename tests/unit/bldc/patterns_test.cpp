@@ -76,7 +76,7 @@ TEST(Patterns, ChopWhatTheirNameSays)
             for (const bool complementary : {false, true}) {
                 const pattern_config_t c = make(p.id, complementary);
                 for (uint32_t s = 0; s < SECTORS; ++s) {
-                    const uint16_t legs = pattern_states(&c, s, reverse);
+                    const uint16_t legs = pattern_states(c.id, c.complementary, s, reverse);
                     const sector_t at = sector_legs(s, reverse);
                     const bool upper_comes =
                         !sector_rising(s); // it was open in the sector before, which rose
@@ -106,9 +106,9 @@ TEST(Patterns, LineVoltageIsTheCommand)
                 for (uint32_t s = 0; s < SECTORS; ++s) {
                     pm_legs_t out, then;
                     pattern_duties(&c, s, reverse, fixed(u, 28), &out);
-                    out.legs = pattern_states(&c, s, reverse);
+                    out.legs = pattern_states(c.id, c.complementary, s, reverse);
                     pattern_duties(&c, sector_next(s), reverse, fixed(u, 28), &then);
-                    then.legs = pattern_states(&c, sector_next(s), reverse);
+                    then.legs = pattern_states(c.id, c.complementary, sector_next(s), reverse);
                     const sector_t at = sector_legs(s, reverse), next = sector_legs(sector_next(s), reverse);
                     const auto mean = [&](uint32_t leg) {
                         const pm_leg_t state = pm_leg(out.legs, leg);
@@ -127,6 +127,24 @@ TEST(Patterns, LineVoltageIsTheCommand)
     }
 }
 
+// Where it shows the on time every sample is of it; a little below some are not.
+TEST(Patterns, ShowsWhereSamplesAreThoseOfTheOnTime)
+{
+    for (int id = 0; id < PATTERN_COUNT; ++id) {
+        pattern_config_t c = make(static_cast<pattern_id_t>(id));
+        c.least = static_cast<uint16_t>(c.half_period / 5);
+        const double pulses = id == PATTERN_H_PWM_L_PWM_ALTERNATING ? 2 : 1;
+        for (double u = 0.003; u < 1; u += 0.01) {
+            const bool shows = pattern_shows(&c, fixed(u, 28));
+            EXPECT_EQ(shows, id == PATTERN_H_PWM_L_PWM || u >= 1.25 * 0.1 * pulses) << id << ' ' << u;
+            for (uint32_t s = 0; s < SECTORS; ++s) {
+                const bool on = pattern_sample(&c, s, fixed(u, 28)).legs == ZERO_LEGS_APART;
+                EXPECT_TRUE(on || !shows) << id << ' ' << u << ' ' << s;
+            }
+        }
+    }
+}
+
 // At the instant of a sample the legs are where the reference says, for `lead` before and what is left of the least time.
 TEST(Patterns, SamplesAreTakenWhereTheLegsAreAsTold)
 {
@@ -139,7 +157,7 @@ TEST(Patterns, SamplesAreTakenWhereTheLegsAreAsTold)
                 ASSERT_LT(sample.at, 2 * kN);
                 pm_legs_t out;
                 pattern_duties(&c, s, false, fixed(u, 28), &out);
-                out.legs = pattern_states(&c, s, false);
+                out.legs = pattern_states(c.id, c.complementary, s, false);
                 const sector_t at = sector_legs(s, false);
                 const double share = id == PATTERN_H_PWM_L_PWM               ? (1 + u) / 2
                                      : id == PATTERN_H_PWM_L_PWM_ALTERNATING ? u / 2
@@ -177,7 +195,7 @@ TEST(Patterns, LowSideShuntsHideWhatTheLegsSay)
                 for (uint32_t s = 0; s < SECTORS; ++s) {
                     pm_legs_t out;
                     pattern_duties(&c, s, reverse, fixed(u, 28), &out);
-                    const uint16_t states = pattern_states(&c, s, reverse);
+                    const uint16_t states = pattern_states(c.id, c.complementary, s, reverse);
                     const sector_t at = sector_legs(s, reverse);
                     uint32_t expected = 0;
                     for (const uint8_t leg : {at.high, at.low}) {

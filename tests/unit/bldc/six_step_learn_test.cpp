@@ -51,6 +51,28 @@ TEST(SixStepLearn, DeviationsOfAThirdHarmonicAreTakenOffTheInstants)
     EXPECT_EQ(b.s.phase.shift[0], 0);
 }
 
+// Diodes carry the off time of a rotor that turns, at an on time that shows its terminals, and of no other.
+TEST(SixStepDiodes, CarryWhereTheOnTimeShows)
+{
+    for (const bool diodes : {true, false}) {
+        for (const double u : {0.02, 0.9}) {
+            for (const bool young : {true, false}) {
+                for (const bool slow : {true, false}) {
+                    const double T = 9.37 * kPeriod;
+                    Bench b(T, configured(T), 0);
+                    b.config.pattern.complementary = !diodes;
+                    b.reset();
+                    EXPECT_TRUE(b.s.both) << "first";
+                    b.s.commutation.young = young ? 1 : 0;
+                    b.s.expected.t_60 = static_cast<uint32_t>(slow ? 1000 * T : T);
+                    six_step_free(&b.s, &b.config, fixed(u, PM_Q_BITS));
+                    EXPECT_EQ(b.s.both, !diodes || u < 0.1 || young || slow) << diodes << u << young << slow;
+                }
+            }
+        }
+    }
+}
+
 // What a rotor with an uneven terminal teaches: once for each crossing, of a turn whose six intervals are measured.
 TEST(SixStepLearn, LearnsOnceACrossingFromAWholeTurn)
 {

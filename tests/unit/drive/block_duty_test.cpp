@@ -88,6 +88,25 @@ TEST(BlockDuty, FollowsItsRamp)
     }
 }
 
+// A light rotor follows the voltage at once, and t_60 is known of the last six sectors.
+TEST(BlockDuty, RisesByAQuarterOfItselfInASector)
+{
+    for (const double way : {1.0, -1.0}) {
+        Fan x;
+        x.params().t_duty = 1;
+        start(x, way * 0.1);
+        const double before = u(x), sectors_s = std::fabs(x.omega_rel) * kRated_rad_s * 4 * 3 / kPi;
+        x.duty(way);
+        x.run_s(0.004);
+        EXPECT_NEAR(std::log(u(x) / before), 0.25 * sectors_s * 0.004, 0.25 * 0.25 * sectors_s * 0.004);
+        x.run_s(0.6);
+        EXPECT_NEAR(u(x), 1, 1e-6);
+        x.duty(way * 0.5);
+        x.run_s(0.002);
+        EXPECT_NEAR(x.drive().block.duty / double(PM_ONE), way * 0.5, 1e-6) << "down at once";
+    }
+}
+
 // Whatever the start needs, and goes on from there.
 TEST(BlockDuty, BeginsAtTheVoltageOfTheStart)
 {

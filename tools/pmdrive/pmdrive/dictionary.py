@@ -171,7 +171,7 @@ ENTRIES = (
     Entry(0x2000, 2, "timer_counts", "board", "i32", "locked", "1", 0, 0, 200, 32767, 8500, False, True, "application", "none", {}, 'timer counts in half a PWM period', ""),
     Entry(0x2000, 3, "dead_time", "board", "i32", "locked", "s", -9, 0, 0, 10000, 2000, False, True, "application", "none", {}, 'dead time of a leg, with the difference of switching delays', "5.6.1.1 #57"),
     Entry(0x2000, 4, "device_drop", "board", "i32", "live", "V", -3, 0, 0, 10000, 1000, False, True, "application", "none", {}, 'forward drop of a conducting device', "5.6.1.1 #57"),
-    Entry(0x2000, 5, "v_dc_nominal", "board", "i32", "live", "V", -3, 0, 5000, 1200000, 300000, False, True, "application", "none", {}, 'nominal DC-link voltage', ""),
+    Entry(0x2000, 5, "v_dc_nominal", "board", "i32", "live", "V", -3, 0, 2000, 1200000, 300000, False, True, "application", "none", {}, 'nominal DC-link voltage', ""),
     Entry(0x2001, 0, "schematic.count", "schematic", "u8", "const", "", 0, 0, None, None, 10, False, False, "none", "none", {}, 'highest sub-index', ""),
     Entry(0x2001, 1, "shunt", "schematic", "i32", "read", "ohm", -6, 0, 0, 1000000, 0, False, False, "none", "none", {}, 'shunt of a leg; 0: another sensor', ""),
     Entry(0x2001, 2, "current_gain", "schematic", "i32", "read", "1", -3, 0, 0, 1000000, 0, False, False, "none", "none", {}, 'from the shunt to the converter', ""),
@@ -353,7 +353,7 @@ ENTRIES = (
  '1: below 3/4 it ends, and starts anew if a speed is wanted'), "10.2.3 #108"),
     Entry(0x2500, 3, "pattern", "six_step", "i32", "off", "1", 0, 0, 0, 5, 1, False, True, "application", "none", {0: 'both legs chopped at once', 1: 'the high leg chopped', 2: 'the low leg chopped', 3: 'chopped for the first 60 degrees', 4: 'chopped for the last 60 degrees', 5: 'both legs chopped in turn'}, ('which switches are chopped: H_PWM_L_PWM, H_PWM_L_ON, H_ON_L_PWM, PWM_ON, '
  'ON_PWM, H_PWM_L_PWM with pulses half a period apart'), "10.3.1 #109"),
-    Entry(0x2500, 4, "freewheeling", "six_step", "i32", "off", "1", 0, 0, 0, 1, 1, False, True, "application", "none", {0: 'one switch: the diode carries the off time, no braking', 1: 'complementary: the other switch does, the current may flow back'}, 'the off time of a chopped leg', "10.3.1 #109"),
+    Entry(0x2500, 4, "freewheeling", "six_step", "i32", "off", "1", 0, 0, 0, 1, 1, False, True, "application", "none", {0: 'one switch: the diode carries the off time, no braking; at a start, and with on times too short to look at, as 1', 1: 'complementary: the other switch does, the current may flow back'}, 'the off time of a chopped leg', "10.3.1 #109"),
     Entry(0x2500, 5, "emf_shape", "six_step", "i32", "off", "1", 0, 0, 0, 1, 0, False, True, "application", "none", {0: 'sine', 1: 'trapezoid, psi_m of its fundamental'}, 'of the machine', "10.3.2.2 #111"),
     Entry(0x2500, 6, "zero_reference", "six_step", "i32", "off", "1", 0, 0, 0, 3, 0, False, True, "application", "none", {0: 'by v_dc and the switches', 1: 'mean of the terminals', 2: 'none: the third harmonic at the star point crosses with it', 3: 'none: the third harmonic of the terminals does, their mean less what the legs put there'}, 'what the open terminal is compared with', "10.3.2.1 #110"),
     Entry(0x2500, 7, "six_step_advance", "six_step", "i32", "off", "deg", -3, 0, -20000, 25000, 0, False, True, "application", "none", {}, 'the legs change by so much, electrical, ahead of 30 degrees after the crossing', "10.2.3 #108"),
@@ -371,9 +371,9 @@ ENTRIES = (
     Entry(0x2500, 17, "t_duty", "six_step", "i32", "off", "s", -3, 0, 1, 100000, 100, False, True, "application", "none", {}, "mode duty: ramp of the voltage's share of v_dc, from nothing to all", "1.4.2 #9"),
     Entry(0x2600, 0, "protections.count", "protections", "u8", "const", "", 0, 0, None, None, 12, False, False, "none", "none", {}, 'highest sub-index', ""),
     Entry(0x2600, 1, "i_trip", "protections", "i32", "locked", "A", -3, 0, 100, 4000000, 9000, False, True, "application", "none", {}, 'over-current fault, instantaneous, any phase', ""),
-    Entry(0x2600, 2, "v_dc_max", "protections", "i32", "locked", "V", -3, 0, 5000, 1200000, 400000, False, True, "application", "none", {}, 'DC over-voltage fault', ""),
-    Entry(0x2600, 3, "v_dc_min", "protections", "i32", "locked", "V", -3, 0, 2000, 1200000, 60000, False, True, "application", "none", {}, 'DC under-voltage fault', ""),
-    Entry(0x2600, 4, "v_dc_derate", "protections", "i32", "locked", "V", -3, 0, 5000, 1200000, 380000, False, True, "application", "none", {}, ('regenerated torque is reduced above, by v_dc as it will be in 2 ms, to zero '
+    Entry(0x2600, 2, "v_dc_max", "protections", "i32", "locked", "V", -3, 0, 2000, 1200000, 400000, False, True, "application", "none", {}, 'DC over-voltage fault', ""),
+    Entry(0x2600, 3, "v_dc_min", "protections", "i32", "locked", "V", -3, 0, 1000, 1200000, 60000, False, True, "application", "none", {}, 'DC under-voltage fault', ""),
+    Entry(0x2600, 4, "v_dc_derate", "protections", "i32", "locked", "V", -3, 0, 2000, 1200000, 380000, False, True, "application", "none", {}, ('regenerated torque is reduced above, by v_dc as it will be in 2 ms, to zero '
  'at three quarters of the way to v_dc_max; a rotor that turns then takes '
  'i_max / 32'), ""),
     Entry(0x2600, 5, "temp_derate", "protections", "i32", "locked", "degC", -1, 0, 0, 2000, 900, False, True, "application", "none", {}, 'current is reduced above, to zero at temp_trip', ""),
