@@ -19,8 +19,7 @@
  * What the ripple costs in H_PWM_L_PWM buys the longest on time, half of a period and more at any u. Alternating has the
  * shortest, half of u.
  * Complementary: the other switch of a chopped leg is closed for the rest, so the current may also flow back
- * (braking, no load). Else its diode carries the current (NEEDS_ONE_SWITCH), which may cease;
- * six_step.h says when.
+ * (braking, no load). Else its diode carries the current (NEEDS_ONE_SWITCH), which may cease. six_step.h says which and when.
  *
  * Sample instants, counts in a period 0 ... 2 N with the high leg's pulse about N, the low leg's about 0, of
  * H_PWM_L_PWM about N:

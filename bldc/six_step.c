@@ -57,11 +57,11 @@ void six_step_slow(six_step_t *self, const six_step_config_t *config)
     self->expected.seen = sure ? 0 : swing / 8;
 }
 
-void six_step_free(six_step_t *self, const six_step_config_t *config, pm_q_t u)
+void six_step_freewheel(six_step_t *self, const six_step_config_t *config, pm_q_t u)
 {
     const pm_q_t swing = zero_crossing_swing(&config->crossing, self->expected.t_60);
-    self->both = config->pattern.complementary || self->commutation.young != 0U ||
-                 swing < 4 * config->crossing.rail || !pattern_shows(&config->pattern, u);
+    self->complementary = config->pattern.complementary || self->commutation.young != 0U ||
+                          swing < 4 * config->crossing.rail || !pattern_shows(&config->pattern, u);
 }
 
 /* In the middle of `sector`, whose crossing is known. */
@@ -70,14 +70,14 @@ static void begin(six_step_t *self, const six_step_config_t *config, uint32_t se
     self->lost = false;
     self->learn = false;
     self->alike = 0;
-    self->both = true;
+    self->complementary = true;
     follow(self);
     six_step_slow(self, config);
     open_sector(self, config, sector, now);
     third_harmonic_open(&self->third, now);
     self->crossing.found = true;
     self->commutated = now;
-    self->legs = pattern_states(config->pattern.id, self->both, sector, self->reverse);
+    self->legs = pattern_states(config->pattern.id, self->complementary, sector, self->reverse);
     const six_step_plan_t none = {.sector = (uint16_t)sector};
     self->plan[0] = none;
     self->plan[1] = none;
@@ -228,7 +228,7 @@ void six_step_step(six_step_t *self, const six_step_config_t *config, const six_
         plan->commutate_at = (uint16_t)pm_max(due, 1);
         c->sector = (uint8_t)sector_next(c->sector);
         self->moved = true;
-        self->legs = pattern_states(config->pattern.id, self->both, c->sector, self->reverse);
+        self->legs = pattern_states(config->pattern.id, self->complementary, c->sector, self->reverse);
     }
     plan_sample(plan, &config->pattern, in->u);
     out->then = self->legs;

@@ -7,9 +7,13 @@
  *   legs, duty      from the start of that period on,
  *   commutate_at    until that instant; from there on `then`, so that the carrier does not quantise the commutation
  *   sample_at       where all terminals and the DC link are to be sampled
- * Where diodes are to carry the off time (pattern_config_t) they do once a start has seen its crossings, while the EMF swings by 4 rail
- * in 60 degrees and samples are those of the on time, with a quarter to spare: a current that has ceased leaves the terminals to
- * themselves, and next to a diode's drop a starting EMF makes no crossings. Else both switches do. Instants are counts from the start of the period. `now` is the count at t_k; it goes on by 2 N a period and wraps.
+ * Instants are counts from the start of the period. `now` is the count at t_k; it goes on by 2 N a period and wraps.
+ *
+ * Where diodes are to carry the off time (pattern_config_t) the other switches do it nevertheless
+ *   - until a start has seen its crossings, and while the EMF swings by less than 4 rail in 60 degrees: beside the drop of a
+ *     diode it makes no crossings,
+ *   - while the on time is too short to be sampled, with a quarter to spare: once the current has ceased in the off time the
+ *     terminals float, and a sample in it says nothing.
  *
  * Start: six_step_reset() with the angle and speed of a rotor that turns, from a drive with field orientation, an open
  * loop or a rotor that was caught; 20 degrees and 10 % of the speed may be missing. Or six_step_begin() with a rotor that an
@@ -95,7 +99,7 @@ typedef struct {
     bool moved;     /* a crossing, a wait or a commutation has: `due` is to be made again */
     bool reverse;
     bool lost;
-    bool both; /* switches of a chopped leg, in turn */
+    bool complementary; /* at present: pattern_config_t, or for the reasons above */
     third_harmonic_t third;
     phase_compensation_t phase; /* all zero where thresholds are compared */
 } six_step_t;
@@ -141,8 +145,8 @@ void six_step_step(six_step_t *self, const six_step_config_t *config, const six_
  * an eighth, for its crossing to be one. Without the call a rotor that has stopped may pass for one that turns. */
 void six_step_slow(six_step_t *self, const six_step_config_t *config);
 
-/* At 1 kHz, where diodes may carry the off time: whether they do, at a mean voltage u. */
-void six_step_free(six_step_t *self, const six_step_config_t *config, pm_q_t u);
+/* At 1 kHz, with the mean voltage u: what carries the off time. */
+void six_step_freewheel(six_step_t *self, const six_step_config_t *config, pm_q_t u);
 
 void make_six_step(maker_t *m, six_step_config_t *c);
 

@@ -319,7 +319,7 @@ def complete(x):
             "r_on_ohm": (0.02 * v / i / 10 if low else 0.0, "0.2 % of the link at rated current" if low else "in the drop"),
         },
         "sensor": {
-            "i_full_scale_A": (max(above(2.5 * i, (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8)), 0.1), "2.5 times rated, and the least a drive is told"),
+            "i_full_scale_A": (max(above(2.5 * i, (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8)), 0.1), "2.5 times rated; 0.1 A at least"),
             "v_full_scale_V": (scale, "1.5 times the link"),
             "noise_lsb": (0.5, "of 12 bits"),
             **({"v_leg_full_scale_V": (float(x["sensor"].get("v_full_scale_V", scale)), "as the link's channel")} if in_blocks(x) else {}),

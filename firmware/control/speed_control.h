@@ -5,10 +5,11 @@
  * per-unit: two real poles at half the bandwidth w_s when the current loop is fast. While the current limit
  * acts, the integral follows it (back-calculation). Runs at 1 kHz.
  *
- * A torque drives up to a speed and no further: another such PI, of twice the bandwidth so that it acts late,
- * holds i_q between zero and the torque's. Its error is what is missing to that speed, its integral never below
- * zero. It begins where the unloaded machine would be at that speed in 1 / (2 w_s), though not before half of it,
- * passes by a seventh of that way and what the speed's estimate lags, and brakes nothing.
+ * A torque drives up to a speed and no further, by another such PI of twice the bandwidth, so that it acts late:
+ *   e      = top - |omega|
+ *   |i_q| <= 2 kp e + sum of 4 ki e            the sum and the whole at least zero: it brakes nothing
+ * Below half of the speed nothing is taken back. A machine without a load slows its acceleration down from where it
+ * would be at that speed in 1 / (2 w_s), and passes by a seventh of that way and what the speed's estimate lags.
  * Tests: tests/unit/control/speed_control_test.cpp. */
 #ifndef CONTROL_SPEED_CONTROL_H
 #define CONTROL_SPEED_CONTROL_H

@@ -191,6 +191,13 @@ static bool is_fast(const block_t *self)
     return pm_abs(self->pll.omega) > PM_ONE;
 }
 
+/* Speed of the last sector, of that of the last turn. */
+static pm_q_t last_sector(const block_t *self)
+{
+    const commutation_t *seen = &self->six_step.commutation;
+    return pm_div((pm_q_t)commutation_t_60(seen), (pm_q_t)seen->interval[seen->crossed]);
+}
+
 static bool is_beside(pm_q_t e, pm_q_t emf, pm_q_t unsure)
 {
     return pm_abs(e - emf) > pm_half(emf) + unsure;
@@ -209,10 +216,8 @@ PM_APART static bool is_wrong(drive_t *drive)
     const pm_q_t unsure = turns ? pm_mul(c->lost, v_dc) : 0;
     const pm_q_t e = pm_mul(self->current.u - taken, v_dc) - pm_mul(c->current.R_2, self->i);
     const pm_q_t emf = block_emf(drive);
-    const commutation_t *seen = &self->six_step.commutation;
-    const pm_q_t share = pm_div((pm_q_t)commutation_t_60(seen), (pm_q_t)seen->interval[seen->crossed]);
-    const bool of_turn = c->six_step.pattern.complementary && is_beside(e, emf, unsure);
-    const bool of_both = of_turn && is_beside(e, pm_mul_sat(emf, share), unsure);
+    const bool of_turn = self->six_step.complementary && is_beside(e, emf, unsure);
+    const bool of_both = of_turn && is_beside(e, pm_mul_sat(emf, last_sector(self)), unsure);
     self->wrong_ms = of_both ? (uint16_t)(self->wrong_ms + 1U) : 0U;
     return self->wrong_ms > WRONG_MS || (of_turn && is_fast(self));
 }
@@ -245,7 +250,7 @@ block_result_t block_slow(drive_t *drive)
         return lost(drive);
     }
     six_step_slow(&self->six_step, &c->six_step);
-    six_step_free(&self->six_step, &c->six_step, self->current.u);
+    six_step_freewheel(&self->six_step, &c->six_step, self->current.u);
     look(self, c);
     if (young && is_fast(self)) { /* from rest: no rotor was there so soon */
         return BLOCK_STALLED;

@@ -45,6 +45,7 @@ void make_block(maker_t *m, block_config_t *c)
     make_from_rest(m, c);
     c->omega_on = speed(m, DRIVE_PARAM_six_step_speed);
     c->omega_off = c->omega_on / 4 * 3;
+    /* a quarter in pi / 3 */
     c->duty_turn =
         fixed(m, mul3(m->base.omega, m->t_slow, pm_num_ratio(239, 1000)), Q_BITS, DRIVE_PARAM_f_pwm);
     c->duty_step = fixed(m, pm_num_div(m->t_slow, si(m, DRIVE_PARAM_t_duty)), Q_BITS, DRIVE_PARAM_t_duty);

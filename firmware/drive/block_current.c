@@ -77,14 +77,14 @@ static void narrow(const drive_t *drive, pm_q_t *i_min, pm_q_t *i_max)
     *i_max = pm_min(*i_max, self->six_step.reverse ? brakes : drives);
 }
 
-/* What the voltage may change by. A rotor that is light enough to follow it at once must not outrun the sectors: t_60 is known of the
- * last six. */
+/* What the duty may change by in a millisecond. A rotor that is light enough to follow it at once must not outrun t_60, the mean of the
+ * last six sectors. */
 static pm_q_t duty_step(const drive_t *drive)
 {
     const block_config_t *c = &drive->config.block;
     const pm_q_t u = pm_max(pm_abs(drive->block.duty), PM_ONE / 32);
     const pm_q_t of_turn = pm_mul_sat(pm_mul_sat(u, pm_abs(drive->block.pll.omega)), c->duty_turn);
-    const bool rises = pm_abs(drive->duty_target) > u;
+    const bool rises = pm_abs(drive->duty_target) > u && (drive->duty_target < 0) == (drive->block.duty < 0);
     return rises ? pm_min(c->duty_step, of_turn + 1) : c->duty_step;
 }
 

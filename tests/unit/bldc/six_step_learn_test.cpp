@@ -62,11 +62,12 @@ TEST(SixStepDiodes, CarryWhereTheOnTimeShows)
                     Bench b(T, configured(T), 0);
                     b.config.pattern.complementary = !diodes;
                     b.reset();
-                    EXPECT_TRUE(b.s.both) << "first";
+                    EXPECT_TRUE(b.s.complementary) << "first";
                     b.s.commutation.young = young ? 1 : 0;
                     b.s.expected.t_60 = static_cast<uint32_t>(slow ? 1000 * T : T);
-                    six_step_free(&b.s, &b.config, fixed(u, PM_Q_BITS));
-                    EXPECT_EQ(b.s.both, !diodes || u < 0.1 || young || slow) << diodes << u << young << slow;
+                    six_step_freewheel(&b.s, &b.config, fixed(u, PM_Q_BITS));
+                    EXPECT_EQ(b.s.complementary, !diodes || u < 0.1 || young || slow)
+                        << diodes << u << young << slow;
                 }
             }
         }
