@@ -34,7 +34,7 @@ void line_current_step(line_current_t *self, const line_current_config_t *config
         self->held = self->held || wanted != duty;
     }
     const pm_wide_t given = pm_clamp(wanted, 0, pm_widen(pm_mul(v_dc, config->most)));
-    self->limited = self->limited || given != wanted;
+    self->limited |= (uint32_t)(given - wanted);
     pm_pi_update(&self->pi, &config->pi, e, given - v);
     self->u = pm_min(pm_narrow_sat(pm_gain(pm_narrow(given), self->per_v)), config->most);
     if (pm_rarely(self->given) && given == duty) {

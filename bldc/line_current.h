@@ -15,7 +15,7 @@
  * The fundamental of the blocks is what field orientation calls i_q:
  *   i = (pi / (2 sqrt(3))) i_q
  * so limits, torque and speed control are those of the vector. Called once a period with the current at t_k; acts in
- * [t_k+1, t_k+2). 35 instructions, 55 with a duty. Per-unit: Q28, gains as pi.h.
+ * [t_k+1, t_k+2). 41 instructions, 58 with a duty. Per-unit: Q28, gains as pi.h.
  * Tests: tests/unit/bldc/line_current_test.cpp, tests/scenario/six_step.yaml, six_step_low_side.yaml. */
 #ifndef BLDC_LINE_CURRENT_H
 #define BLDC_LINE_CURRENT_H
@@ -42,7 +42,7 @@ typedef struct {
     pm_q_t i_ref, emf; /* of 1 kHz; i_ref: with a duty i_max */
     pm_gain_t per_v;   /* 1 / v_dc */
     pm_q_t u;          /* 0 ... most */
-    bool limited;      /* v has been at an end since it was last cleared */
+    uint32_t limited;  /* not 0: v has been at an end since it was last cleared */
     bool given;        /* by a duty, */
     bool held;         /* which has given way to i_min or i_max since it was last cleared */
     pm_q_t duty;       /* 0 ... 1 */

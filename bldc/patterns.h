@@ -37,8 +37,8 @@
  * u at 1 - 2 b (line_current.h). The other patterns hold an upper switch closed beside a lower one that at rest conducts for less
  * than b: they show no current at all and are refused.
  *
- * The duties are those that each leg needs in this sector or, open, in the next: to commutate only states change.
- * pattern_duties(): 20 instructions; pattern_states(), at a commutation: 44; pattern_sample(): 37.
+ * The compare values are those that each leg needs in this sector or, open, in the next: to commutate only states change.
+ * pattern_states(), at a commutation: 44 instructions; drawn into the period pattern_on() takes 17, pattern_sample() 21.
  * Tests: tests/unit/bldc/patterns_test.cpp, tests/scenario/six_step_low_side.yaml. */
 #ifndef BLDC_PATTERNS_H
 #define BLDC_PATTERNS_H
@@ -65,13 +65,22 @@ typedef struct {
     pattern_id_t id;
     bool complementary;
     uint16_t half_period; /* N, counts */
-    uint16_t lead;        /* counts from a sample to the edge it is ahead of: converter and its trigger */
+    uint16_t lead;  /* >= 1: counts from a sample to the edge it is ahead of: converter and its trigger */
     uint16_t least; /* on time, counts, of which samples are taken: dead time, settling, lead; below 2 N */
     bool low_side;  /* shunts below the lower switches */
     pm_q_t
         shown;   /* u above which they hide the current of a leg that conducts, pattern_hidden(); in line 1 */
     pm_q_t most; /* u up to which it follows from the others; 1 but for H_PWM_L_PWM */
 } pattern_config_t;
+
+/* Which of the two are chopped, as bits, in even and odd sectors. The low leg has just come in even ones, the high leg in odd ones. */
+#define PATTERN_HIGH 1U
+#define PATTERN_LOW  2U
+static inline uint32_t pattern_chopped(pattern_id_t id, uint32_t sector)
+{
+    static const uint8_t of[PATTERN_COUNT][2] = {{3, 3}, {1, 1}, {2, 2}, {2, 1}, {1, 2}, {3, 3}};
+    return of[id][sector & 1U];
+}
 
 /* PM_LEGS_... of a sector. */
 uint16_t pattern_states(pattern_id_t id, bool complementary, uint32_t sector, bool reverse);
@@ -90,18 +99,78 @@ static inline bool pattern_holds_high(pattern_id_t id)
 /* The leg that has come with this sector is chopped. */
 bool pattern_chops_incoming(pattern_id_t id, uint32_t sector);
 
-/* Duties of its legs. */
-void pattern_duties(const pattern_config_t *config, uint32_t sector, bool reverse, pm_q_t u, pm_legs_t *out);
+/* What a mean voltage is in counts: */
+typedef struct {
+    int32_t high, low; /* compare values of the two legs, 0 ... N */
+    int32_t line;      /* in which u is between them, 0 ... 2 N */
+} pattern_on_t;
+
+static inline pattern_on_t pattern_on(const pattern_config_t *config, pm_q_t u)
+{
+    const pm_q_t D = pattern_chops_both(config->id) ? pm_mean(PM_ONE, u) : u;
+    const pm_frac_t N = pm_shl(config->half_period, 32 - PM_Q_BITS);
+    pattern_on_t on;
+    on.high = pm_frac(D, N);
+    on.low = config->id == PATTERN_H_PWM_L_PWM ? on.high : pm_frac(PM_ONE - D, N);
+    on.line = pm_frac(u, 2 * N);
+    return on;
+}
+
+/* Compare values of a sector's legs. */
+static inline void pattern_compare(const pattern_on_t *on, uint32_t sector, bool reverse,
+                                   uint16_t compare[PM_LEGS])
+{
+    const sector_t legs = sector_legs(sector, reverse);
+    compare[legs.high] = (uint16_t)on->high;
+    compare[legs.low] = (uint16_t)on->low;
+    compare[legs.open] = (uint16_t)(sector_rising(sector) ? on->high : on->low);
+}
+
+/* How the samples of a sector lie. */
+typedef enum {
+    PATTERN_AT_ONCE,
+    PATTERN_OF_HIGH = PATTERN_HIGH,
+    PATTERN_OF_LOW = PATTERN_LOW,
+    PATTERN_IN_TURN = PATTERN_HIGH | PATTERN_LOW, /* the first of two pulses, from N - D to D */
+    PATTERN_KINDS
+} pattern_kind_t;
+
+static inline pattern_kind_t pattern_kind(pattern_id_t id, uint32_t sector)
+{
+    return id == PATTERN_H_PWM_L_PWM ? PATTERN_AT_ONCE : (pattern_kind_t)pattern_chopped(id, sector);
+}
 
 typedef struct {
-    uint16_t at; /* counts from the start of the period, 1 ... 2 N - 1 */
+    int32_t at; /* counts from the start of the period, 1 ... 2 N - 1 */
     zero_legs_t legs;
 } pattern_sample_t;
 
+static inline pattern_sample_t pattern_sample(const pattern_config_t *config, pattern_kind_t kind,
+                                              const pattern_on_t *on)
+{
+    typedef struct {
+        int8_t halves, high; /* at = halves N + high on->high - lead */
+        uint8_t legs, none;
+    } edge_t;
+    static const edge_t of[PATTERN_KINDS][2] = {
+        /* too short for a sample, and not */
+        {{1, 1, ZERO_LEGS_APART, 0}, {1, 1, ZERO_LEGS_APART, 0}},
+        {{1, -1, ZERO_LEGS_LOW, 0}, {1, 1, ZERO_LEGS_APART, 0}},
+        {{2, -1, ZERO_LEGS_HIGH, 0}, {0, 1, ZERO_LEGS_APART, 0}},
+        {{1, -1, ZERO_LEGS_LOW, 0}, {0, 1, ZERO_LEGS_APART, 0}},
+    };
+    const int32_t N = config->half_period, shortest = config->least, lead = config->lead;
+    const int32_t pulse = kind == PATTERN_IN_TURN ? pm_half(on->line) : on->line;
+    const edge_t *edge = &of[kind][pulse >= shortest ? 1 : 0];
+    const int32_t at = edge->halves * N + edge->high * on->high - lead;
+    pattern_sample_t sample;
+    sample.at = pm_max(at, 1);
+    sample.legs = (zero_legs_t)edge->legs;
+    return sample;
+}
+
 /* Samples are those of the on time, with a quarter to spare. */
 bool pattern_shows(const pattern_config_t *config, pm_q_t u);
-
-pattern_sample_t pattern_sample(const pattern_config_t *config, uint32_t sector, pm_q_t u);
 
 /* The leg whose current low-side shunts do not show at the end of a period that ends in `sector`, of u above `shown`: a bit. */
 uint32_t pattern_hidden(const pattern_config_t *config, uint32_t sector, bool reverse);

@@ -21,6 +21,7 @@
 
 typedef struct {
     uint8_t high, low, open; /* legs, 0 ... 2 */
+    uint8_t stays;           /* the one of high and low that conducted in the sector before */
 } sector_t;
 
 static inline uint32_t sector_next(uint32_t sector)
@@ -42,8 +43,8 @@ static inline bool sector_rising(uint32_t sector)
 static inline sector_t sector_legs(uint32_t sector, bool reverse)
 {
     static const sector_t legs[2][SECTORS] = {
-        {{1, 0, 2}, {2, 0, 1}, {2, 1, 0}, {0, 1, 2}, {0, 2, 1}, {1, 2, 0}},
-        {{2, 0, 1}, {1, 0, 2}, {1, 2, 0}, {0, 2, 1}, {0, 1, 2}, {2, 1, 0}},
+        {{1, 0, 2, 1}, {2, 0, 1, 0}, {2, 1, 0, 2}, {0, 1, 2, 1}, {0, 2, 1, 0}, {1, 2, 0, 2}},
+        {{2, 0, 1, 2}, {1, 0, 2, 0}, {1, 2, 0, 1}, {0, 2, 1, 2}, {0, 1, 2, 0}, {2, 1, 0, 1}},
     };
     return legs[reverse ? 1 : 0][sector];
 }

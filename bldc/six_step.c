@@ -22,7 +22,9 @@ static void follow(six_step_t *self)
 static void wait_for(six_step_t *self, uint32_t at)
 {
     commutation_ahead(&self->commutation, at);
-    self->moved = self->moved || (int32_t)(at - self->commutation.crossing - self->expected.t_60) > 0;
+    if ((int32_t)(at - self->expected.at) > 0) {
+        self->moved = true;
+    }
 }
 
 /* After what moves the next commutation, or ends the commutation for good. */
@@ -46,6 +48,7 @@ void six_step_slow(six_step_t *self, const six_step_config_t *config)
     const uint32_t t_60 = self->expected.t_60;
     const bool sure = self->commutation.young == 0U && t_60 < 2U * SAMPLES * config->pattern.half_period;
     const pm_q_t swing = zero_crossing_swing(&config->crossing, t_60);
+    self->swing = swing;
     thresholds_slow(&self->thresholds);
     if (config->compared == 0) {
         phase_compensation_slow(&self->phase, &self->thresholds, self->reverse, t_60, swing);
@@ -57,11 +60,12 @@ void six_step_slow(six_step_t *self, const six_step_config_t *config)
     self->expected.seen = sure ? 0 : swing / 8;
 }
 
-void six_step_freewheel(six_step_t *self, const six_step_config_t *config, pm_q_t u)
+void six_step_freewheel(six_step_t *self, const six_step_config_t *config, pm_q_t u, bool flows)
 {
-    const pm_q_t swing = zero_crossing_swing(&config->crossing, self->expected.t_60);
+    const bool ceases = config->pattern.id == PATTERN_H_PWM_L_PWM && !flows;
+    const pm_q_t swing = self->swing;
     self->complementary = config->pattern.complementary || self->commutation.young != 0U ||
-                          swing < 4 * config->crossing.rail || !pattern_shows(&config->pattern, u);
+                          swing < 4 * config->crossing.rail || !pattern_shows(&config->pattern, u) || ceases;
 }
 
 /* In the middle of `sector`, whose crossing is known. */
@@ -78,6 +82,7 @@ static void begin(six_step_t *self, const six_step_config_t *config, uint32_t se
     self->crossing.found = true;
     self->commutated = now;
     self->legs = pattern_states(config->pattern.id, self->complementary, sector, self->reverse);
+    self->kind = (uint8_t)pattern_kind(config->pattern.id, sector);
     const six_step_plan_t none = {.sector = (uint16_t)sector};
     self->plan[0] = none;
     self->plan[1] = none;
@@ -126,7 +131,7 @@ static void learn(six_step_t *self, const six_step_config_t *config)
     }
     const commutation_t *c = &self->commutation;
     thresholds_learn(&self->thresholds, &config->thresholds, c->crossed, self->reverse, c->interval, c->sum,
-                     zero_crossing_swing(&config->crossing, self->expected.t_60));
+                     self->swing);
 }
 
 /* The sample of the period that began at `start`. */
@@ -159,6 +164,7 @@ static void look(six_step_t *self, const six_step_config_t *config, const six_st
     }
 }
 
+#if PM_CARRIES(NEEDS_NEUTRAL)
 /* The third harmonic crosses by the rotor alone: where a filter delays it, behind the commutation that it was for. */
 PM_APART static void look_third(six_step_t *self, const six_step_config_t *config, const six_step_in_t *in)
 {
@@ -185,16 +191,26 @@ PM_APART static void look_third(six_step_t *self, const six_step_config_t *confi
         /* past a crossing that was found, or not yet beyond it */
     }
 }
+#endif
 
 /* A commutation ahead of the sample moves it to where the next sector has its own, if that is still to come. */
-static void plan_sample(six_step_plan_t *plan, const pattern_config_t *pattern, pm_q_t u)
+PM_APART static pattern_sample_t sample_behind(const six_step_plan_t *plan, const pattern_config_t *pattern,
+                                               const pattern_on_t *on)
 {
-    pattern_sample_t sample = pattern_sample(pattern, plan->sector, u);
-    if (plan->commutate_at != 0U && plan->commutate_at < sample.at) {
-        sample = pattern_sample(pattern, sector_next(plan->sector), u);
-        sample.at = plan->commutate_at < sample.at ? sample.at : 0U;
+    const pattern_kind_t kind = pattern_kind(pattern->id, sector_next(plan->sector));
+    pattern_sample_t sample = pattern_sample(pattern, kind, on);
+    sample.at = (int32_t)plan->commutate_at < sample.at ? sample.at : 0;
+    return sample;
+}
+
+static void plan_sample(six_step_plan_t *plan, const pattern_config_t *pattern, pattern_kind_t kind,
+                        const pattern_on_t *on)
+{
+    pattern_sample_t sample = pattern_sample(pattern, kind, on);
+    if (plan->commutate_at != 0U && (int32_t)plan->commutate_at < sample.at) {
+        sample = sample_behind(plan, pattern, on);
     }
-    plan->sample_at = sample.at;
+    plan->sample_at = (uint16_t)sample.at;
     plan->legs = (uint16_t)sample.legs;
 }
 
@@ -206,8 +222,12 @@ void six_step_step(six_step_t *self, const six_step_config_t *config, const six_
     commutation_t *c = &self->commutation;
     if (in->sample != NULL) {
         look(self, config, in, ended);
+#if PM_CARRIES(NEEDS_NEUTRAL)
     } else if (pm_rarely(config->crossings == CROSSINGS_third_harmonic)) {
         look_third(self, config, in);
+#endif
+    } else if (self->learn) {
+        learn(self, config);
     } else {
         /* nothing new */
     }
@@ -221,21 +241,24 @@ void six_step_step(six_step_t *self, const six_step_config_t *config, const six_
     six_step_plan_t *plan = &self->plan[1];
     plan->sector = c->sector;
     plan->commutate_at = 0;
-    pattern_duties(&config->pattern, c->sector, self->reverse, in->u, &out->legs);
-    out->legs.legs = self->legs;
+    const pattern_kind_t kind = (pattern_kind_t)self->kind;
+    out->on = pattern_on(&config->pattern, in->u);
+    out->sector = c->sector;
+    out->legs = self->legs;
     const int32_t due = (int32_t)(self->due - coming);
     if (due < period) {
         plan->commutate_at = (uint16_t)pm_max(due, 1);
         c->sector = (uint8_t)sector_next(c->sector);
         self->moved = true;
         self->legs = pattern_states(config->pattern.id, self->complementary, c->sector, self->reverse);
+        self->kind = (uint8_t)pattern_kind(config->pattern.id, c->sector);
     }
-    plan_sample(plan, &config->pattern, in->u);
+    plan_sample(plan, &config->pattern, kind, &out->on);
     out->then = self->legs;
     out->commutate_at = plan->commutate_at;
     out->sample_at = plan->sample_at;
     if (self->lost) {
-        out->legs.legs = PM_LEGS_OFF;
+        out->legs = PM_LEGS_OFF;
         out->commutate_at = 0;
     }
 }

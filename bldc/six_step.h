@@ -4,7 +4,7 @@
  *
  * Called at the start t_k of each period. What a call asks for is done in [t_k+1, t_k+2) and delivered with the call at
  * t_k+2, as measure.h has it:
- *   legs, duty      from the start of that period on,
+ *   legs, on        from the start of that period on,
  *   commutate_at    until that instant; from there on `then`, so that the carrier does not quantise the commutation
  *   sample_at       where all terminals and the DC link are to be sampled
  * Instants are counts from the start of the period. `now` is the count at t_k; it goes on by 2 N a period and wraps.
@@ -13,7 +13,9 @@
  *   - until a start has seen its crossings, and while the EMF swings by less than 4 rail in 60 degrees: beside the drop of a
  *     diode it makes no crossings,
  *   - while the on time is too short to be sampled, with a quarter to spare: once the current has ceased in the off time the
- *     terminals float, and a sample in it says nothing.
+ *     terminals float, and a sample in it says nothing,
+ *   - with both chopped at once, while the current is smaller than its ripple: it would cease, and what half a period drives be
+ *     more than a rotor without a load takes.
  *
  * Start: six_step_reset() with the angle and speed of a rotor that turns, from a drive with field orientation, an open
  * loop or a rotor that was caught; 20 degrees and 10 % of the speed may be missing. Or six_step_begin() with a rotor that an
@@ -21,9 +23,9 @@
  * (commutation.h) `lost` is set and all legs are off from the next call on, until the next reset.
  *
  * six_step_step(), instructions on Cortex-M4 with five periods in a sector:
- *   without a crossing             211 on average, at most 282, where it commutates
- *   with one                       386             398
- *   after one, thresholds learnt   294             367
+ *   without a crossing             180 on average, at most 258, where it commutates
+ *   with one                       351             363
+ *   after one, thresholds learnt   238             310
  * Tests: tests/target/bldc, tests/unit/bldc/six_step_test.cpp. */
 #ifndef BLDC_SIX_STEP_H
 #define BLDC_SIX_STEP_H
@@ -64,7 +66,7 @@ typedef struct {
 
 typedef struct {
     uint32_t now; /* counts at t_k */
-    /* What was asked for two calls ago; NULL where it is not here, and with CROSSINGS_third_harmonic. Of
+    /* What was asked for two calls ago; NULL where it is not here or not awaited, and with CROSSINGS_third_harmonic. Of
      * CROSSINGS_virtual_third what six_step_from_mean() makes of it. */
     const zero_sample_t *sample;
     pm_q_t u;      /* patterns.h */
@@ -72,7 +74,9 @@ typedef struct {
 } six_step_in_t;
 
 typedef struct {
-    pm_legs_t legs;
+    pattern_on_t on;       /* pattern_compare() of ... */
+    uint8_t sector;        /* ... this one */
+    uint16_t legs;         /* PM_LEGS_... */
     uint16_t commutate_at; /* 1 ... 2 N - 1; 0: not in this period */
     uint16_t then;         /* PM_LEGS_... */
     uint16_t sample_at;    /* 1 ... 2 N - 1; 0: none */
@@ -92,6 +96,7 @@ typedef struct {
     zero_expected_t expected;
     six_step_plan_t plan[2]; /* [1] of the period that begins now, [0] of the one that has ended */
     uint32_t commutated;     /* instant of the last commutation */
+    pm_q_t swing;            /* zero_crossing_swing() of the last millisecond */
     uint32_t due;            /* of the next, commutation_due(); not while `moved` */
     uint32_t alike; /* crossings in succession of the kind that thresholds are learnt from, up to SECTORS */
     uint16_t legs;  /* PM_LEGS_... of commutation.sector */
@@ -100,6 +105,7 @@ typedef struct {
     bool reverse;
     bool lost;
     bool complementary; /* at present: pattern_config_t, or for the reasons above */
+    uint8_t kind;       /* pattern_kind_t of commutation.sector */
     third_harmonic_t third;
     phase_compensation_t phase; /* all zero where thresholds are compared */
 } six_step_t;
@@ -118,8 +124,15 @@ static inline sector_t six_step_legs(const six_step_t *self)
 /* Of these, the current of the one that stays across the last commutation: that of both but for the freewheeling. */
 static inline pm_q_t six_step_current(const six_step_t *self, const pm_q_t i[PM_LEGS])
 {
-    const sector_t legs = six_step_legs(self);
-    return sector_rising(self->plan[1].sector) ? i[legs.high] : -i[legs.low];
+    const pm_q_t stays = i[six_step_legs(self).stays];
+    return sector_rising(self->plan[1].sector) ? stays : -stays;
+}
+
+/* A sample of plan[0] would be looked at: its sector has no crossing yet, or has been left. */
+static inline bool six_step_awaits(const six_step_t *self)
+{
+    const six_step_plan_t *plan = &self->plan[0];
+    return !self->crossing.found || plan->sector != self->crossing.sector || plan->commutate_at != 0U;
 }
 
 /* The rotor stands at theta, in the middle of a sector, and will turn forwards or back by 30 degrees in t_30 counts
@@ -145,8 +158,8 @@ void six_step_step(six_step_t *self, const six_step_config_t *config, const six_
  * an eighth, for its crossing to be one. Without the call a rotor that has stopped may pass for one that turns. */
 void six_step_slow(six_step_t *self, const six_step_config_t *config);
 
-/* At 1 kHz, with the mean voltage u: what carries the off time. */
-void six_step_freewheel(six_step_t *self, const six_step_config_t *config, pm_q_t u);
+/* At 1 kHz, with the mean voltage u, and whether the current is larger than half of its ripple: what carries the off time. */
+void six_step_freewheel(six_step_t *self, const six_step_config_t *config, pm_q_t u, bool flows);
 
 void make_six_step(maker_t *m, six_step_config_t *c);
 

@@ -36,7 +36,7 @@ static void make_pattern(maker_t *m, pattern_config_t *c)
     c->id = (pattern_id_t)p->pattern;
     c->complementary = p->freewheeling != 0;
     c->half_period = (uint16_t)p->timer_counts;
-    c->lead = counts(m, DRIVE_PARAM_t_lead);
+    c->lead = (uint16_t)pm_max(counts(m, DRIVE_PARAM_t_lead), 1);
     const int32_t blind = c->lead + counts(m, DRIVE_PARAM_t_blank) + counts(m, DRIVE_PARAM_dead_time);
     if (blind >= p->timer_counts) {
         refuse(m, DRIVE_PARAM_t_blank, "with t_lead and dead_time beyond half a period");

@@ -125,12 +125,15 @@ bool zero_crossing_step(zero_crossing_t *self, const zero_crossing_config_t *con
     const bool rising = self->rising;
     const pm_q_t v = in->v[self->leg];
     const pm_q_t within = when.legs == ZERO_LEGS_HIGH ? -config->rail : config->rail;
-    const bool low = v <= config->rail && !is_slow_emf(self, config, v, when, expected);
-    const bool high = v >= in->v_dc - within;
-    const bool past = rising ? high : low;
-    const bool cut = rising ? low : high;
-    if ((past && !self->ahead) || (cut && when.legs == ZERO_LEGS_APART)) {
-        return false; /* freewheeling, of a braking current at the other rail */
+    bool past = false, cut = false;
+    if (v <= config->rail || v >= in->v_dc - within) {
+        const bool low = v <= config->rail && !is_slow_emf(self, config, v, when, expected);
+        const bool high = v >= in->v_dc - within;
+        past = rising ? high : low;
+        cut = rising ? low : high;
+        if ((past && !self->ahead) || (cut && when.legs == ZERO_LEGS_APART)) {
+            return false; /* freewheeling, of a braking current at the other rail */
+        }
     }
     const pm_q_t difference = against_reference(config, in, when.legs, v);
     const bool on = when.legs == ZERO_LEGS_APART;

@@ -190,19 +190,19 @@ WHICH = """## Which to take
   period and more at any speed. It costs ripple: 1.6 times the current's of the others, {both} W for {one} W on BLDC-HS at {p}.
 - **PWM-ON and ON-PWM**: both switches of a leg share the losses. ON-PWM freewheels for the shortest angle, PWM-ON for the longest: rank
   by current, from the [safe area](#safe-area).
-- **both in turn**: half of the ripple, at twice the frequency; on times are half as long. Not where crossings must be seen at low speed.
+- **both in turn**: half of the ripple, at twice the frequency; on times are half as long. Not where crossings must be seen at low speed,
+  nor where they must be exact: the capacitance of the legs rings with the winding behind each edge, and there are twice as many.
 - **third harmonic**: where the star point is led out: no blanking, also through the freewheeling and without pulses.
 - **field orientation**: where torque must be smooth or losses low: {more:.0f} % more torque of an ampere of BLDC-FAN and {less:.0f} % of the
-  torque ripple at {p}. It needs three currents and the flux observer, {vector} instructions a period on average where block
-  commutation takes {block} (without current control and interrupt), and an open-loop start that BLDC-HS does not make.
+  torque ripple at {p}. It needs three currents and an open-loop start that BLDC-HS does not make, but no sample within the
+  period: its whole control interrupt takes {vector} instructions on average where that of the blocks takes {block}.
 """
 
 
 def instructions():
-    """Mean of the vector's step and of the blocks': docs/performance.md, bldc/six_step.h."""
-    row = re.search(r"active flux, high speed \| (\d+) ", (ROOT / "docs/performance.md").read_text(encoding="utf-8"))
-    step = re.search(r"without a crossing +(\d+) on average", (ROOT / "bldc/six_step.h").read_text(encoding="utf-8"))
-    return row[1], step[1]
+    """Mean of the whole interrupt with field orientation and with blocks, both in `bldc`: docs/performance.md."""
+    page = (ROOT / "docs/performance.md").read_text(encoding="utf-8").split("whole control interrupt of `bldc`")[1]
+    return [re.search(rf"{what} \| (\d+) ", page)[1] for what in ("active flux, high speed", "H_PWM-L_ON, BLDC-FAN")]
 
 
 def results_table(machine, results):

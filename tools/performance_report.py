@@ -20,7 +20,7 @@ PAGE = ROOT / "docs/performance.md"
 PMSIM = ROOT / "out/build/host-release/tools/pmsim/pmsim"
 TARGET = ROOT / "out/build/stm32g431"
 IMAGES = gen_images.images(ROOT)
-FOC, SMALL = (TARGET / f"{next(x.program for x in IMAGES if x.name == name)}.elf" for name in ("foc", "small"))
+FOC, SMALL, BLDC = (TARGET / f"{next(x.program for x in IMAGES if x.name == name)}.elf" for name in ("foc", "small", "bldc"))
 SCENARIOS = ROOT / "tests/scenario"
 FAST = (SCENARIOS / "board/identity.yaml", "--set", "noise=5")  # at 20 kHz
 RUNS = 5
@@ -108,6 +108,23 @@ def observer_rows(folder):
                f"{run['control.worst_percent']:.1f} %", f"{run['load_percent']:.1f} %"]
 
 
+BLOCKS = (("H_PWM-L_ON, BLDC-FAN", "--set", "case=FAN", "--set", "angle=130"),
+          ("H_PWM-L_ON, BLDC-HS, 40 kHz", "--set", "case=HS", "--set", "angle=10", "--set", "sensor.shunt=in_line"),
+          ("H_PWM-L_PWM, BLDC-HS, 40 kHz, low-side shunts", "--set", "case=HS", "--set", "angle=10", "--set", "drive.pattern=0"))
+
+
+def block_rows(folder):
+    """Block commutation in `bldc`, and field orientation in the same image."""
+    def row(what, run, mode):
+        return [what, *(f"{run[f'control.{mode}.{x}']:.0f}" for x in ("mean", "worst", "cycles")), f"{run['load_percent']:.1f} %"]
+
+    for what, *words in BLOCKS:
+        yield row(what, run_board(folder, SCENARIOS / "six_step.yaml", *words, image=BLDC), "six_step")
+    duty = run_board(folder, SCENARIOS / "six_step_duty.yaml", "--set", "case=FAN ramp", image=BLDC)
+    yield row("mode duty, BLDC-FAN", duty, "six_step")
+    yield row("active flux, high speed", duty, "flux")
+
+
 def check():
     with tempfile.TemporaryDirectory(prefix="pm_performance") as name:
         steps = [(image, count_step(Path(name), image)) for image in IMAGES]
@@ -130,6 +147,7 @@ def main():
         modes = run_board(folder, MODES_RUN)
         busy = run_board(folder, MODES_RUN, "--busy")
         optional = list(observer_rows(folder))
+        blocks = list(block_rows(folder))
         speed, slow_speed = speeds("--keep-speed" in sys.argv[1:])
 
     def mode(key):
@@ -163,6 +181,8 @@ def main():
                [SPEEDS[0], speed, "4"], [SPEEDS[1], slow_speed, ""]]),
         table(["control interrupt of `foc`, 20 kHz", "observer, mean", "with injection, mean", "worst",
                "of the period, worst", "processor load"], optional),
+        table(["whole control interrupt of `bldc`, the sample within the period among it", "mean", "worst", "cycles, mean", "processor load"],
+              blocks),
         table(["bytes", *(head for image in IMAGES for head in (f"`{image.name}`", "budget"))], size_rows()),
     ]
     text, found = re.subn(r"(?s)(<!-- measured -->\n).*?(<!-- end -->)",

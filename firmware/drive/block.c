@@ -12,9 +12,10 @@
 static void take_sample(const drive_t *drive, const drive_in_t *in, zero_sample_t *sample)
 {
     const pm_q_t per_code = drive->config.block.per_code;
-    for (uint32_t leg = 0; leg < PM_LEGS; leg++) {
-        sample->v[leg] = pm_mul(pm_shl(in->more.v_sample[0][leg], PM_Q_BITS - 16), per_code);
-    }
+    const uint16_t *code = in->more.v_sample[0];
+    sample->v[0] = pm_mul(pm_shl(code[0], PM_Q_BITS - 16), per_code);
+    sample->v[1] = pm_mul(pm_shl(code[1], PM_Q_BITS - 16), per_code);
+    sample->v[2] = pm_mul(pm_shl(code[2], PM_Q_BITS - 16), per_code);
     sample->v_dc = pm_shl(in->more.v_dc_sample[0], (uint32_t)drive->config.protection.v_bits);
     sample->v_neutral = 0;
 }
@@ -71,7 +72,7 @@ void block_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
         sampled = false;
     }
 #endif
-    if (sampled) {
+    if (sampled && six_step_awaits(&self->six_step)) {
         take_sample(drive, in, &sample);
         if (pm_rarely(c->six_step.crossings == CROSSINGS_virtual_third)) {
             six_step_from_mean(&self->six_step, &sample);
@@ -80,15 +81,16 @@ void block_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
     }
     six_step_out_t next;
     six_step_step(&self->six_step, &c->six_step, &seen, &next);
-    for (uint32_t leg = 0; leg < PM_LEGS; leg++) {
-        drive_write_leg(out->compare[leg], pm_frac(next.legs.duty[leg], pm_shl(counts, 32 - PM_Q_BITS)));
-    }
+    const sector_t at = sector_legs(next.sector, self->six_step.reverse);
+    drive_write_leg(out->compare[at.high], next.on.high);
+    drive_write_leg(out->compare[at.low], next.on.low);
+    drive_write_leg(out->compare[at.open], sector_rising(next.sector) ? next.on.high : next.on.low);
     if (pm_rarely(self->current.u > c->six_step.pattern.shown)) {
         const uint32_t end = self->six_step.commutation.sector;
         const uint32_t legs = pattern_hidden(&c->six_step.pattern, end, self->six_step.reverse);
         drive->modulator.hidden += MODULATOR_NEXT * (int32_t)legs;
     }
-    out->legs = next.legs.legs;
+    out->legs = next.legs;
     out->trip = 0;
     out->instants = (pm_instants_t){.sample_at = {next.sample_at},
                                     .commutate_at = next.commutate_at,
@@ -198,6 +200,12 @@ static pm_q_t last_sector(const block_t *self)
     return pm_div((pm_q_t)commutation_t_60(seen), (pm_q_t)seen->interval[seen->crossed]);
 }
 
+/* More than half of its largest ripple: it does not change its sign within a period. */
+static bool flows(const drive_t *drive)
+{
+    return pm_abs(drive->block.i) >= pm_mul(drive->config.block.ripple, drive->status.v_dc);
+}
+
 static bool is_beside(pm_q_t e, pm_q_t emf, pm_q_t unsure)
 {
     return pm_abs(e - emf) > pm_half(emf) + unsure;
@@ -211,9 +219,9 @@ PM_APART static bool is_wrong(drive_t *drive)
     block_t *self = &drive->block;
     const pm_q_t v_dc = drive->status.v_dc;
     const pm_q_t driven = self->i < 0 ? -c->lost : c->lost;
-    const bool turns = pm_abs(self->i) < pm_mul(c->ripple, v_dc);
-    const pm_q_t taken = turns ? 0 : driven;
-    const pm_q_t unsure = turns ? pm_mul(c->lost, v_dc) : 0;
+    const bool sure = flows(drive);
+    const pm_q_t taken = sure ? driven : 0;
+    const pm_q_t unsure = sure ? 0 : pm_mul(c->lost, v_dc);
     const pm_q_t e = pm_mul(self->current.u - taken, v_dc) - pm_mul(c->current.R_2, self->i);
     const pm_q_t emf = block_emf(drive);
     const bool of_turn = self->six_step.complementary && is_beside(e, emf, unsure);
@@ -250,7 +258,7 @@ block_result_t block_slow(drive_t *drive)
         return lost(drive);
     }
     six_step_slow(&self->six_step, &c->six_step);
-    six_step_freewheel(&self->six_step, &c->six_step, self->current.u);
+    six_step_freewheel(&self->six_step, &c->six_step, self->current.u, flows(drive));
     look(self, c);
     if (young && is_fast(self)) { /* from rest: no rotor was there so soon */
         return BLOCK_STALLED;
@@ -274,7 +282,7 @@ block_result_t block_slow(drive_t *drive)
     } else {
         drive->block_tries = 0;
     }
-    self->current.limited = false;
+    self->current.limited = 0;
     return BLOCK_RUNS;
 }
 

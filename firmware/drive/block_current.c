@@ -40,7 +40,7 @@ void block_report(drive_t *drive, pm_q_t i_q)
     const pm_q_t v = pm_mul(pm_mul(self->current.u, drive->status.v_dc), PM_Q(1 / 1.6539866862653761));
     drive->v_next =
         pm_park_inverse((pm_dq_t){.d = 0, .q = self->six_step.reverse ? -v : v}, pm_dir(self->pll.theta));
-    drive->status.limits |= self->current.limited ? DRIVE_LIMIT_VOLTAGE : 0U;
+    drive->status.limits |= self->current.limited != 0U ? DRIVE_LIMIT_VOLTAGE : 0U;
 }
 
 static bool follows_duty(const drive_t *drive)

@@ -46,10 +46,4 @@ static inline pm_leg_t pm_leg(uint16_t legs, uint32_t leg)
     return (pm_leg_t)((uint32_t)legs >> 4U * leg & 15U);
 }
 
-typedef struct {
-    pm_q_t duty[PM_LEGS]; /* Q28, 0 ... 1: share of the period in which the upper switch of PWM, the
-                            lower one of INVERTED is closed */
-    uint16_t legs;        /* PM_LEGS_... */
-} pm_legs_t;
-
 #endif

@@ -210,18 +210,22 @@ static const struct {
     [PM_LEG_LOWER_INVERTED] = {TIM_CCER_CC1NE, TIM_OCM_PWM1},
 };
 
-/* For the next COM event. */
-static void write_states(uint32_t legs)
+__attribute__((noinline)) static void change_states(uint32_t legs)
 {
-    if (legs == port_hal.written) {
-        return;
-    }
     const uint32_t a = legs & 7U, b = legs >> 4U & 7U, c = legs >> 8U & 7U;
     TIM1.CCER =
         OF_STATE[a].outputs | (uint32_t)OF_STATE[b].outputs << 4U | (uint32_t)OF_STATE[c].outputs << 8U;
     TIM1.CCMR1 = modes_12(OF_STATE[a].mode, OF_STATE[b].mode);
     TIM1.CCMR2 = modes_34(OF_STATE[c].mode);
     port_hal.written = legs;
+}
+
+/* For the next COM event. */
+static inline void write_states(uint32_t legs)
+{
+    if (legs != port_hal.written) {
+        change_states(legs);
+    }
 }
 
 /* The states of this period take effect now; those behind its commutation wait for TIM3. */

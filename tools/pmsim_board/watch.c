@@ -33,6 +33,13 @@ static void add(interrupt_figure_t *figure, const cpu_exception_stats_t *before,
     figure->cycles_high += now->cycles_high - before->cycles_high;
 }
 
+/* A sample within the period is taken by the control interrupt's handler, too: it is counted with the period that it is for. */
+static bool is_sample(const watch_t *watch, int interrupt)
+{
+    return interrupt == FIGURE_CONTROL &&
+           watch->twin->period(watch->before) == watch->twin->period(watch->image);
+}
+
 static void count(watch_t *watch, int interrupt, int exception)
 {
     const cpu_exception_stats_t *now = cpu_exception_stats(board_cpu(watch->board), exception);
@@ -79,10 +86,13 @@ static void trace(void *owner, int exception, bool entry)
         watch->entered = interrupt;
     } else if (!entry) {
         watch->mode = watch->twin->mode(watch->before);
+        const bool whole = !is_sample(watch, interrupt);
         if (compared && watch->entered == interrupt) { /* not one that had begun before the watch */
             compare(watch, interrupt);
         }
-        count(watch, interrupt, exception);
+        if (whole) {
+            count(watch, interrupt, exception);
+        }
     } else {
         /* nothing to keep */
     }

@@ -15,13 +15,35 @@ using bldc_rig::kDegree;
 using bldc_rig::real;
 
 constexpr uint16_t kN = 2125;
-constexpr double kDuty = 1e-7;
+constexpr double kDuty = 1.0 / kN + 1e-9;    // half a count of each leg
 constexpr double kRipple = 0.15, kRms = 0.3; // METHODS-ADDENDUM.md B (c), row 109
 
 pattern_config_t make(pattern_id_t id, bool complementary = true)
 {
     return {id, complementary, kN, 170, 1000, false, PM_ONE, PM_ONE};
 }
+
+pattern_sample_t sample_of(const pattern_config_t &c, uint32_t sector, pm_q_t u)
+{
+    const pattern_on_t on = pattern_on(&c, u);
+    return pattern_sample(&c, pattern_kind(c.id, sector), &on);
+}
+
+// Of a sector at a mean voltage.
+struct Asked {
+    Asked(const pattern_config_t &c, uint32_t sector, bool reverse, double u)
+        : legs(pattern_states(c.id, c.complementary, sector, reverse))
+    {
+        const pattern_on_t on = pattern_on(&c, fixed(u, 28));
+        pattern_compare(&on, sector, reverse, compare);
+    }
+    double duty(uint32_t leg) const
+    {
+        return compare[leg] / double(kN);
+    }
+
+    uint16_t compare[PM_LEGS], legs;
+};
 
 // Is a terminal at the upper rail at a count of the period?
 bool high_at(pm_leg_t state, double duty, double count)
@@ -104,23 +126,19 @@ TEST(Patterns, LineVoltageIsTheCommand)
         for (const bool reverse : {false, true}) {
             for (const double u : {0.0, 0.2, 0.7, 1.0}) {
                 for (uint32_t s = 0; s < SECTORS; ++s) {
-                    pm_legs_t out, then;
-                    pattern_duties(&c, s, reverse, fixed(u, 28), &out);
-                    out.legs = pattern_states(c.id, c.complementary, s, reverse);
-                    pattern_duties(&c, sector_next(s), reverse, fixed(u, 28), &then);
-                    then.legs = pattern_states(c.id, c.complementary, sector_next(s), reverse);
+                    const Asked out(c, s, reverse, u), then(c, sector_next(s), reverse, u);
                     const sector_t at = sector_legs(s, reverse), next = sector_legs(sector_next(s), reverse);
                     const auto mean = [&](uint32_t leg) {
                         const pm_leg_t state = pm_leg(out.legs, leg);
-                        const double duty = real(out.duty[leg]);
+                        const double duty = out.duty(leg);
                         return state == PM_LEG_HIGH       ? 1
                                : state == PM_LEG_LOW      ? 0
                                : state == PM_LEG_INVERTED ? 1 - duty
                                                           : duty;
                     };
                     EXPECT_NEAR(mean(at.high) - mean(at.low), u, kDuty);
-                    EXPECT_EQ(out.duty[next.high], then.duty[next.high]);
-                    EXPECT_EQ(out.duty[next.low], then.duty[next.low]);
+                    EXPECT_EQ(out.compare[next.high], then.compare[next.high]);
+                    EXPECT_EQ(out.compare[next.low], then.compare[next.low]);
                 }
             }
         }
@@ -138,7 +156,7 @@ TEST(Patterns, ShowsWhereSamplesAreThoseOfTheOnTime)
             const bool shows = pattern_shows(&c, fixed(u, 28));
             EXPECT_EQ(shows, id == PATTERN_H_PWM_L_PWM || u >= 1.25 * 0.1 * pulses) << id << ' ' << u;
             for (uint32_t s = 0; s < SECTORS; ++s) {
-                const bool on = pattern_sample(&c, s, fixed(u, 28)).legs == ZERO_LEGS_APART;
+                const bool on = sample_of(c, s, fixed(u, 28)).legs == ZERO_LEGS_APART;
                 EXPECT_TRUE(on || !shows) << id << ' ' << u << ' ' << s;
             }
         }
@@ -152,12 +170,10 @@ TEST(Patterns, SamplesAreTakenWhereTheLegsAreAsTold)
         const pattern_config_t c = make(static_cast<pattern_id_t>(id));
         for (double u = 0.02; u < 0.985; u += 0.06) {
             for (uint32_t s = 0; s < SECTORS; ++s) {
-                const pattern_sample_t sample = pattern_sample(&c, s, fixed(u, 28));
+                const pattern_sample_t sample = sample_of(c, s, fixed(u, 28));
                 ASSERT_GE(sample.at, 1);
                 ASSERT_LT(sample.at, 2 * kN);
-                pm_legs_t out;
-                pattern_duties(&c, s, false, fixed(u, 28), &out);
-                out.legs = pattern_states(c.id, c.complementary, s, false);
+                const Asked out(c, s, false, u);
                 const sector_t at = sector_legs(s, false);
                 const double share = id == PATTERN_H_PWM_L_PWM               ? (1 + u) / 2
                                      : id == PATTERN_H_PWM_L_PWM_ALTERNATING ? u / 2
@@ -165,8 +181,8 @@ TEST(Patterns, SamplesAreTakenWhereTheLegsAreAsTold)
                 EXPECT_EQ(sample.legs == ZERO_LEGS_APART, 2 * kN * share >= c.least - 1) << id << u;
                 for (int ahead = 0; ahead >= -100; ahead -= 50) {
                     const double count = sample.at + ahead;
-                    const bool up = high_at(pm_leg(out.legs, at.high), real(out.duty[at.high]), count);
-                    const bool down = high_at(pm_leg(out.legs, at.low), real(out.duty[at.low]), count);
+                    const bool up = high_at(pm_leg(out.legs, at.high), out.duty(at.high), count);
+                    const bool down = high_at(pm_leg(out.legs, at.low), out.duty(at.low), count);
                     EXPECT_EQ(up, sample.legs != ZERO_LEGS_LOW) << id << ' ' << u << ' ' << s;
                     EXPECT_EQ(down, sample.legs == ZERO_LEGS_HIGH) << id << ' ' << u << ' ' << s;
                 }
@@ -193,15 +209,13 @@ TEST(Patterns, LowSideShuntsHideWhatTheLegsSay)
         for (double u = 0.005; u < p.most; u += 0.01) {
             for (const bool reverse : {false, true}) {
                 for (uint32_t s = 0; s < SECTORS; ++s) {
-                    pm_legs_t out;
-                    pattern_duties(&c, s, reverse, fixed(u, 28), &out);
-                    const uint16_t states = pattern_states(c.id, c.complementary, s, reverse);
+                    const Asked out(c, s, reverse, u);
                     const sector_t at = sector_legs(s, reverse);
                     uint32_t expected = 0;
                     for (const uint8_t leg : {at.high, at.low}) {
                         const bool high =
-                            high_at(pm_leg(states, leg), real(out.duty[leg]), 2 * kN * (1 - kBlind)) ||
-                            high_at(pm_leg(states, leg), real(out.duty[leg]), 2 * kN - 1);
+                            high_at(pm_leg(out.legs, leg), out.duty(leg), 2 * kN * (1 - kBlind)) ||
+                            high_at(pm_leg(out.legs, leg), out.duty(leg), 2 * kN - 1);
                         expected |= high ? 1U << leg : 0U;
                     }
                     const uint32_t hidden = fixed(u, 28) > c.shown ? pattern_hidden(&c, s, reverse) : 0;
@@ -275,9 +289,9 @@ TEST(Patterns, TheOnTimeIsSampledDownToTheLeast)
         pattern_config_t c = make(id);
         c.half_period = kN - 1; // even
         c.least = static_cast<uint16_t>(on);
-        EXPECT_EQ(pattern_sample(&c, 0, PM_ONE / 2).legs, ZERO_LEGS_APART) << id;
+        EXPECT_EQ(sample_of(c, 0, PM_ONE / 2).legs, ZERO_LEGS_APART) << id;
         c.least++;
-        EXPECT_NE(pattern_sample(&c, 0, PM_ONE / 2).legs, ZERO_LEGS_APART) << id;
+        EXPECT_NE(sample_of(c, 0, PM_ONE / 2).legs, ZERO_LEGS_APART) << id;
     }
 }
 
@@ -286,13 +300,11 @@ TEST(Patterns, SamplesStayWithinThePeriod)
 {
     pattern_config_t c = make(PATTERN_H_ON_L_PWM);
     c.lead = 600;
-    EXPECT_EQ(pattern_sample(&c, 0, fixed(0.25, 28)).at, 1); // the pulse ends at N / 4
-    c.lead = 0;
-    EXPECT_EQ(pattern_sample(&c, 0, 0).at, 2 * kN - 1); // the off time at 2 N
+    EXPECT_EQ(sample_of(c, 0, fixed(0.25, 28)).at, 1); // the pulse ends at N / 4
     c.lead = 1;
-    EXPECT_EQ(pattern_sample(&c, 0, 0).at, 2 * kN - 1);
+    EXPECT_EQ(sample_of(c, 0, 0).at, 2 * kN - 1); // the off time at 2 N
     c.lead = 2;
-    EXPECT_EQ(pattern_sample(&c, 0, 0).at, 2 * kN - 2);
+    EXPECT_EQ(sample_of(c, 0, 0).at, 2 * kN - 2);
 }
 
 } // namespace

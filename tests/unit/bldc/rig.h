@@ -397,11 +397,12 @@ class Rig
   private:
     void write(const six_step_out_t &out)
     {
-        const uint32_t N = machine.plant.inverter.timer_counts;
         plant_pwm_t pwm = {};
+        uint16_t compare[PM_LEGS];
+        pattern_compare(&out.on, out.sector, six_step.reverse, compare);
         for (uint32_t k = 0; k < 3; ++k) {
-            const pm_leg_t state = pm_leg(out.legs.legs, k);
-            pwm.compare[k][0] = static_cast<uint32_t>(std::lround(real(out.legs.duty[k]) * N));
+            const pm_leg_t state = pm_leg(out.legs, k);
+            pwm.compare[k][0] = compare[k];
             pwm.compare[k][1] = pwm.compare[k][0];
             pwm.driven[k] = state != PM_LEG_OFF;
             pwm.state[k] = of(state);

@@ -184,9 +184,15 @@ class Bench
         const int64_t k = first_ + static_cast<int64_t>(commutations.size());
         const Legs after = legs_of(k, reverse);
         const Legs before = legs_of(out.commutate_at != 0 ? k - 1 : k, reverse);
-        expect_states(out.legs.legs, before);
+        expect_states(out.legs, before);
         expect_states(out.then, after);
-        EXPECT_EQ(out.legs.duty[before.high - 'A'], fixed(u, PM_Q_BITS));
+        EXPECT_EQ(compare_of(out, before.high), std::lround(u * kN));
+    }
+    uint16_t compare_of(const six_step_out_t &asked, char leg) const
+    {
+        uint16_t compare[PM_LEGS];
+        pattern_compare(&asked.on, asked.sector, reverse, compare);
+        return compare[leg - 'A'];
     }
     static void expect_states(uint16_t legs, const Legs &l)
     {
@@ -247,7 +253,7 @@ class Bench
         sector_at_sample_ = n;
         const int64_t k = first_ + n;
         const bool changed = asked.out.commutate_at != 0 && asked.out.commutate_at < asked.out.sample_at;
-        const uint16_t states = changed ? asked.out.then : asked.out.legs.legs;
+        const uint16_t states = changed ? asked.out.then : asked.out.legs;
         const Legs l = legs_of(k, reverse);
         const double high = terminal(states, asked, l.high, place),
                      low = terminal(states, asked, l.low, place);
@@ -269,7 +275,7 @@ class Bench
         sample.v[l.open - 'A'] = fixed(open, PM_Q_BITS);
         return sample;
     }
-    static double terminal(uint16_t states, const Ask &asked, char leg, double place)
+    double terminal(uint16_t states, const Ask &asked, char leg, double place) const
     {
         const auto index = static_cast<uint32_t>(leg - 'A');
         const pm_leg_t state = pm_leg(states, index);
@@ -277,7 +283,7 @@ class Bench
         if (state == PM_LEG_HIGH) {
             return kLink;
         }
-        const bool up = std::abs(place - kN) < real(asked.out.legs.duty[index]) * kN;
+        const bool up = std::abs(place - kN) < compare_of(asked.out, leg);
         return state == PM_LEG_PWM && up ? kLink : 0;
     }
     // Star point: between two crossings from one to the other, by the nearest.

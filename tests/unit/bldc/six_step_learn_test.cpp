@@ -64,12 +64,29 @@ TEST(SixStepDiodes, CarryWhereTheOnTimeShows)
                     b.reset();
                     EXPECT_TRUE(b.s.complementary) << "first";
                     b.s.commutation.young = young ? 1 : 0;
-                    b.s.expected.t_60 = static_cast<uint32_t>(slow ? 1000 * T : T);
-                    six_step_freewheel(&b.s, &b.config, fixed(u, PM_Q_BITS));
+                    b.s.swing =
+                        zero_crossing_swing(&b.config.crossing, static_cast<uint32_t>(slow ? 1000 * T : T));
+                    six_step_freewheel(&b.s, &b.config, fixed(u, PM_Q_BITS), false);
                     EXPECT_EQ(b.s.complementary, !diodes || u < 0.1 || young || slow)
                         << diodes << u << young << slow;
                 }
             }
+        }
+    }
+}
+
+// With both legs chopped at once only a current that flows throughout.
+TEST(SixStepDiodes, CarryWhatDoesNotCease)
+{
+    const double T = 9.37 * kPeriod;
+    for (const pattern_id_t id : {PATTERN_H_PWM_L_PWM, PATTERN_H_PWM_L_ON}) {
+        for (const bool flows : {true, false}) {
+            Bench b(T, configured(T), 0);
+            b.config.pattern.id = id;
+            b.config.pattern.complementary = false;
+            b.reset();
+            six_step_freewheel(&b.s, &b.config, fixed(0.9, PM_Q_BITS), flows);
+            EXPECT_EQ(b.s.complementary, id == PATTERN_H_PWM_L_PWM && !flows) << id << flows;
         }
     }
 }

@@ -140,7 +140,7 @@ TEST(SixStepReset, ResetLeavesNothingOfTheRunBefore)
             fresh.period();
             ASSERT_EQ(again.out.commutate_at, fresh.out.commutate_at) << n;
             ASSERT_EQ(again.out.sample_at, fresh.out.sample_at) << n;
-            ASSERT_EQ(again.out.legs.legs, fresh.out.legs.legs) << n;
+            ASSERT_EQ(again.out.legs, fresh.out.legs) << n;
             ASSERT_EQ(again.out.then, fresh.out.then) << n;
             ASSERT_EQ(again.s.crossing.open_since, fresh.s.crossing.open_since) << n;
             ASSERT_EQ(again.s.commutation.crossing, fresh.s.commutation.crossing) << n;

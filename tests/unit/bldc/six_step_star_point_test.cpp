@@ -109,7 +109,7 @@ TEST(SixStepStarPoint, ThirdHarmonicThatIsNotThereIsMissedAndLost)
         }
         EXPECT_TRUE(b.s.lost);
         b.period();
-        EXPECT_EQ(b.out.legs.legs, PM_LEGS_OFF);
+        EXPECT_EQ(b.out.legs, PM_LEGS_OFF);
         expect_on_time(b, 0, T, advance, 0, 5 * kRounding);
     }
 }

@@ -93,7 +93,7 @@ TEST(SixStepSteps, ACommutationBelongsToOnePeriod)
             six_step_step(&b.s, &b.config, &in, &out);
             EXPECT_EQ(out.commutate_at, x.at) << x.due;
             EXPECT_EQ(b.s.commutation.sector, x.at != 0 ? (sector + 1) % 6 : sector);
-            Bench::expect_states(out.legs.legs, legs_of(sector, false));
+            Bench::expect_states(out.legs, legs_of(sector, false));
             Bench::expect_states(out.then, legs_of(x.at != 0 ? sector + 1 : sector, false));
             // the next one is a sector later; it is made again only where something has moved it
             EXPECT_EQ(b.s.moved, x.at != 0);
@@ -241,7 +241,7 @@ TEST(SixStepSteps, LostAfterTheStrikesThenAllLegsAreOffUntilTheNextReset)
     b.held = INT64_MAX;
     for (int n = 0; n < 40; ++n) {
         b.period();
-        EXPECT_EQ(b.out.legs.legs, PM_LEGS_OFF);
+        EXPECT_EQ(b.out.legs, PM_LEGS_OFF);
         EXPECT_EQ(b.out.commutate_at, 0);
         EXPECT_TRUE(b.s.lost);
     }
