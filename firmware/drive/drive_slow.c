@@ -55,6 +55,15 @@ PM_RARE void drive_take_over(drive_t *drive, const pm_pll_t *known, pm_q_t i_q)
 }
 #endif
 
+/* Torque has driven the rotor from the wrong side: what was wanted of it is wanted still, and a rotor that turns back for it is
+ * braked, by a ramp that begins at rest. */
+static void go_the_right_way(drive_t *drive, pm_q_t wanted)
+{
+    const pm_q_t omega = drive->position.pll.omega;
+    speed_control_reset(&drive->speed, (omega < 0) == (wanted < 0) ? omega : 0, wanted);
+    drive->i_ref.q = wanted;
+}
+
 PM_APART static void resolve_slip(drive_t *drive) /* its stack is not that of the others */
 {
     const drive_config_t *c = &drive->config;
@@ -62,7 +71,9 @@ PM_APART static void resolve_slip(drive_t *drive) /* its stack is not that of th
     const pm_angle_t turn =
         position_resolve_slip(&drive->position, &c->position, &c->machine, v, drive->status.i, drive->i_ab);
     if (turn != 0U) {
+        const pm_q_t wanted = drive->i_ref.q;
         drive_turn_frame(drive, turn, v);
+        go_the_right_way(drive, wanted);
     }
 }
 
