@@ -326,7 +326,7 @@ def complete(x):
         },
         "dclink": {
             "r_source_ohm": (0.002 * v / i, "0.2 % of the link at rated current"),
-            "c_F": (above(20 * i / (v * f_pwm), (1, 2.2, 4.7)), "rated current for a period is 5 % of the link"),
+            "c_F": (above(max(20 * i / (v * f_pwm), 1e-6), (1, 2.2, 4.7)), "rated current for a period is 5 % of the link; 1 uF at least"),
         },
     }
     if in_blocks(x) and C > 0:

@@ -189,7 +189,7 @@ class Values(Bench):
 
     def test_list(self):
         out, _ = self.command("list", "machine")
-        self.assertIn("0.0001 ohm to 100 ohm", out)
+        self.assertIn("0.0001 ohm to 1000 ohm", out)
         self.assertNotIn("store.machine", out)
         self.assertIn("v_injection", self.command("list", "inject")[0])
         self.assertEqual(len(self.json("list")), len(dictionary.ENTRIES))
@@ -249,7 +249,7 @@ class Values(Bench):
 
     def test_info(self):
         self.assertEqual(self.json("info")[0]["identity.product_code"]["value"], dictionary.PRODUCT_CODE)
-        self.assertIn("0.0001 ohm to 100 ohm", self.command("info", "R_s")[0])
+        self.assertIn("0.0001 ohm to 1000 ohm", self.command("info", "R_s")[0])
 
     def test_monitor(self):
         self.assertEqual(len(self.json("monitor", "velocity_actual", "--count", "3", "--interval", "0")), 3)

@@ -57,7 +57,7 @@ class Values(unittest.TestCase):
         self.refused("R_s", "nan", "is not a number")
         self.refused("R_s", "1e-8", "less than its resolution")
         self.refused("R_s", "99 uohm", "below the least, 0.0001 ohm")
-        self.refused("R_s", "100.000001", "above the most, 100 ohm")
+        self.refused("R_s", "1000.000001", "above the most, 1000 ohm")
         self.refused("R_s", "1e400", "above the most")
         self.refused("pole_pairs", "3.5", "is not an integer")
         self.refused("pole_pairs", "3 Hz", "it has no unit")

@@ -25,6 +25,7 @@ import tune  # noqa: E402
 # Name: R_s, L_d, L_q, psi_m, pole pairs, J, rated current, speed, link
 MOTORS = {
     "hub motor": (0.11, 0.18e-3, 0.2e-3, 0.022, 15, 0.02, 20, 40, 36),
+    "circulator pump on the mains": (285, 0.17, 0.18, 0.08, 4, 4e-5, 0.13, 314, 320),
     "gimbal": (8.0, 3e-3, 3e-3, 14.3e-3, 11, 3e-5, 1.0, 30, 24),
     "2212 drone motor": (0.1, 20e-6, 20e-6, 1.2e-3, 7, 12e-6, 10, 700, 12),
     "scooter": (0.05, 0.11e-3, 0.13e-3, 0.02, 15, 0.06, 35, 70, 48),
@@ -133,7 +134,7 @@ class Tune(unittest.TestCase):
                            ("drive: {flux_bandwith: 1}", "5:24: unknown parameter drive.flux_bandwith; did you mean `flux_bandwidth`?"),
                            ("drive: {R_s: abc}", "5:14: drive.R_s: expected a number, found \"abc\""),
                            ("drive: {commutation: true}", "5:22: drive.commutation: expected a number, found \"true\""),
-                           ("drive: {R_s: 1e9}", "5:14: drive.R_s = 1e9 is out of range 0.0001 ... 100"),
+                           ("drive: {R_s: 1e9}", "5:14: drive.R_s = 1e9 is out of range 0.0001 ... 1000"),
                            ("drive: {pole_pairs: 4.5}", "5:21: drive.pole_pairs = 4.5 cannot be stored: the step is 1"),
                            ("drive: {f_pwm: 20000}", "5:16: drive.f_pwm follows from the inverter: inverter.f_pwm_Hz"),
                            ("drive:", "5:1: drive: a value is missing"),
@@ -390,7 +391,7 @@ class Tune(unittest.TestCase):
                 self.assertAlmostEqual(1000 * value, round(1000 * value), places=6, msg=name)
 
     def test_five_decades_are_accepted_by_the_drive(self):
-        """R_s from milliohms to 100 ohm, L from microhenries up; with and without saturation to a tenth; a board of the motor's
+        """R_s from milliohms to 1000 ohm, L from microhenries up; with and without saturation to a tenth; a board of the motor's
         own and the drive board, whose channels are 60 A and 34 V."""
         draw = random.Random(5)
 

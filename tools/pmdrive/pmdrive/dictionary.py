@@ -199,7 +199,7 @@ ENTRIES = (
     Entry(0x2080, 2, "can_bit_rate", "bus", "u16", "off", "bit/s", 3, 0, 125, 1000, 500, False, True, "communication", "none", {125: '125 kbit/s', 250: '250 kbit/s', 500: '500 kbit/s', 1000: '1 Mbit/s'}, 'bit rate', ""),
     Entry(0x2100, 0, "machine.count", "machine", "u8", "const", "", 0, 0, None, None, 14, False, False, "none", "none", {}, 'highest sub-index', ""),
     Entry(0x2100, 1, "pole_pairs", "machine", "i32", "locked", "1", 0, 0, 1, 50, 3, False, True, "machine", "none", {}, 'pole pairs', ""),
-    Entry(0x2100, 2, "R_s", "machine", "i32", "locked", "ohm", -6, 0, 100, 100000000, 6000000, False, True, "machine", "none", {}, 'phase resistance, with one device and the lead', "1.3.1.3 #3"),
+    Entry(0x2100, 2, "R_s", "machine", "i32", "locked", "ohm", -6, 0, 100, 1000000000, 6000000, False, True, "machine", "none", {}, 'phase resistance, with one device and the lead', "1.3.1.3 #3"),
     Entry(0x2100, 3, "L_d", "machine", "i32", "locked", "H", -9, 0, 500, 1000000000, 43000000, False, True, "machine", "none", {}, 'd-axis inductance at zero current', "1.3.1.3 #3"),
     Entry(0x2100, 4, "L_q", "machine", "i32", "locked", "H", -9, 0, 500, 1000000000, 75000000, False, True, "machine", "none", {}, 'q-axis inductance at zero current', "1.3.1.3 #3"),
     Entry(0x2100, 5, "psi_m", "machine", "i32", "locked", "Wb", -9, 0, 100000, 2000000000, 236000000, False, True, "machine", "none", {}, 'magnet flux linkage', "1.3.1.3 #3"),
