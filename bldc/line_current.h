@@ -15,7 +15,7 @@
  * The fundamental of the blocks is what field orientation calls i_q:
  *   i = (pi / (2 sqrt(3))) i_q
  * so limits, torque and speed control are those of the vector. Called once a period with the current at t_k; acts in
- * [t_k+1, t_k+2). 41 instructions, 58 with a duty. Per-unit: Q28, gains as pi.h.
+ * [t_k+1, t_k+2). 41 instructions, some 20 more with a duty. Per-unit: Q28, gains as pi.h.
  * Tests: tests/unit/bldc/line_current_test.cpp, tests/scenario/six_step.yaml, six_step_low_side.yaml. */
 #ifndef BLDC_LINE_CURRENT_H
 #define BLDC_LINE_CURRENT_H

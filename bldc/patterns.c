@@ -2,23 +2,23 @@
 
 bool pattern_chops_incoming(pattern_id_t id, uint32_t sector)
 {
-    return (pattern_chopped(id, sector) & (sector_rising(sector) ? PATTERN_LOW : PATTERN_HIGH)) != 0U;
+    return pattern_kind(id, sector) != (sector_rising(sector) ? PATTERN_OF_HIGH : PATTERN_OF_LOW);
 }
 
 uint16_t pattern_states(pattern_id_t id, bool complementary, uint32_t sector, bool reverse)
 {
-    const uint32_t chops = pattern_chopped(id, sector);
+    const pattern_kind_t kind = pattern_kind(id, sector);
     const sector_t at = sector_legs(sector, reverse);
     pm_leg_t state[PM_LEGS];
     state[at.open] = PM_LEG_OFF;
     state[at.high] = PM_LEG_HIGH;
     state[at.low] = PM_LEG_LOW;
-    if ((chops & PATTERN_HIGH) != 0U) {
+    if (kind != PATTERN_OF_LOW) {
         state[at.high] = complementary ? PM_LEG_PWM : PM_LEG_UPPER;
     }
-    if (id == PATTERN_H_PWM_L_PWM) {
+    if (kind == PATTERN_AT_ONCE) {
         state[at.low] = complementary ? PM_LEG_INVERTED : PM_LEG_LOWER_INVERTED;
-    } else if ((chops & PATTERN_LOW) != 0U) {
+    } else if (kind != PATTERN_OF_HIGH) {
         state[at.low] = complementary ? PM_LEG_PWM : PM_LEG_LOWER;
     } else {
         /* closed */

@@ -73,13 +73,24 @@ typedef struct {
     pm_q_t most; /* u up to which it follows from the others; 1 but for H_PWM_L_PWM */
 } pattern_config_t;
 
-/* Which of the two are chopped, as bits, in even and odd sectors. The low leg has just come in even ones, the high leg in odd ones. */
-#define PATTERN_HIGH 1U
-#define PATTERN_LOW  2U
-static inline uint32_t pattern_chopped(pattern_id_t id, uint32_t sector)
+/* Which of the two are chopped in a sector. */
+typedef enum {
+    PATTERN_AT_ONCE, /* both */
+    PATTERN_OF_HIGH,
+    PATTERN_OF_LOW,
+    PATTERN_IN_TURN, /* both: the first of two pulses from N - D to D */
+    PATTERN_KINDS
+} pattern_kind_t;
+
+/* Of even and odd sectors: the low leg has just come in even ones, the high leg in odd ones. */
+static inline pattern_kind_t pattern_kind(pattern_id_t id, uint32_t sector)
 {
-    static const uint8_t of[PATTERN_COUNT][2] = {{3, 3}, {1, 1}, {2, 2}, {2, 1}, {1, 2}, {3, 3}};
-    return of[id][sector & 1U];
+    static const uint8_t of[PATTERN_COUNT][2] = {
+        {PATTERN_AT_ONCE, PATTERN_AT_ONCE}, {PATTERN_OF_HIGH, PATTERN_OF_HIGH},
+        {PATTERN_OF_LOW, PATTERN_OF_LOW},   {PATTERN_OF_LOW, PATTERN_OF_HIGH},
+        {PATTERN_OF_HIGH, PATTERN_OF_LOW},  {PATTERN_IN_TURN, PATTERN_IN_TURN},
+    };
+    return (pattern_kind_t)of[id][sector & 1U];
 }
 
 /* PM_LEGS_... of a sector. */
@@ -116,28 +127,15 @@ static inline pattern_on_t pattern_on(const pattern_config_t *config, pm_q_t u)
     return on;
 }
 
-/* Compare values of a sector's legs. */
-static inline void pattern_compare(const pattern_on_t *on, uint32_t sector, bool reverse,
-                                   uint16_t compare[PM_LEGS])
+/* Compare values of a sector's legs, in both halves of the carrier alike. */
+static inline void pattern_write(const pattern_on_t *on, uint32_t sector, bool reverse,
+                                 uint16_t compare[PM_LEGS][2])
 {
     const sector_t legs = sector_legs(sector, reverse);
-    compare[legs.high] = (uint16_t)on->high;
-    compare[legs.low] = (uint16_t)on->low;
-    compare[legs.open] = (uint16_t)(sector_rising(sector) ? on->high : on->low);
-}
-
-/* How the samples of a sector lie. */
-typedef enum {
-    PATTERN_AT_ONCE,
-    PATTERN_OF_HIGH = PATTERN_HIGH,
-    PATTERN_OF_LOW = PATTERN_LOW,
-    PATTERN_IN_TURN = PATTERN_HIGH | PATTERN_LOW, /* the first of two pulses, from N - D to D */
-    PATTERN_KINDS
-} pattern_kind_t;
-
-static inline pattern_kind_t pattern_kind(pattern_id_t id, uint32_t sector)
-{
-    return id == PATTERN_H_PWM_L_PWM ? PATTERN_AT_ONCE : (pattern_kind_t)pattern_chopped(id, sector);
+    const int32_t high = on->high, low = on->low;
+    pm_write_leg(compare[legs.high], high);
+    pm_write_leg(compare[legs.low], low);
+    pm_write_leg(compare[legs.open], sector_rising(sector) ? high : low);
 }
 
 typedef struct {
@@ -150,7 +148,8 @@ static inline pattern_sample_t pattern_sample(const pattern_config_t *config, pa
 {
     typedef struct {
         int8_t halves, high; /* at = halves N + high on->high - lead */
-        uint8_t legs, none;
+        uint8_t legs;
+        uint8_t fills; /* four bytes */
     } edge_t;
     static const edge_t of[PATTERN_KINDS][2] = {
         /* too short for a sample, and not */

@@ -14,7 +14,7 @@
  *     diode it makes no crossings,
  *   - while the on time is too short to be sampled, with a quarter to spare: once the current has ceased in the off time the
  *     terminals float, and a sample in it says nothing,
- *   - with both chopped at once, while the current is smaller than its ripple: it would cease, and what half a period drives be
+ *   - with both chopped at once, while the current is smaller than its ripple: it would cease, and half a period would drive
  *     more than a rotor without a load takes.
  *
  * Start: six_step_reset() with the angle and speed of a rotor that turns, from a drive with field orientation, an open
@@ -74,7 +74,7 @@ typedef struct {
 } six_step_in_t;
 
 typedef struct {
-    pattern_on_t on;       /* pattern_compare() of ... */
+    pattern_on_t on;       /* pattern_write() of ... */
     uint8_t sector;        /* ... this one */
     uint16_t legs;         /* PM_LEGS_... */
     uint16_t commutate_at; /* 1 ... 2 N - 1; 0: not in this period */

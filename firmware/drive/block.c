@@ -81,10 +81,7 @@ void block_step(drive_t *drive, const drive_in_t *in, drive_out_t *out)
     }
     six_step_out_t next;
     six_step_step(&self->six_step, &c->six_step, &seen, &next);
-    const sector_t at = sector_legs(next.sector, self->six_step.reverse);
-    drive_write_leg(out->compare[at.high], next.on.high);
-    drive_write_leg(out->compare[at.low], next.on.low);
-    drive_write_leg(out->compare[at.open], sector_rising(next.sector) ? next.on.high : next.on.low);
+    pattern_write(&next.on, next.sector, self->six_step.reverse, out->compare);
     if (pm_rarely(self->current.u > c->six_step.pattern.shown)) {
         const uint32_t end = self->six_step.commutation.sector;
         const uint32_t legs = pattern_hidden(&c->six_step.pattern, end, self->six_step.reverse);

@@ -9,17 +9,6 @@
 extern "C" {
 #endif
 
-/* On-time of a leg, in both halves of the carrier alike; a port without NEEDS_HALVES reads the first alone. */
-static inline void drive_write_leg(uint16_t compare[2], int32_t on) /* 0 <= on < 2^16 */
-{
-#if PM_CARRIES(NEEDS_HALVES)
-    pm_store_twice(compare, on);
-#else
-    pm_assume(on >= 0 && on <= UINT16_MAX);
-    compare[0] = (uint16_t)on;
-#endif
-}
-
 /* What a method asked for is asked for in that period alone. */
 static inline void drive_clear_instants(drive_out_t *out)
 {
@@ -37,9 +26,9 @@ static inline void drive_clear_instants(drive_out_t *out)
 
 static inline void drive_write_out(const modulator_out_t *m, drive_out_t *out)
 {
-    drive_write_leg(out->compare[0], m->on[0]);
-    drive_write_leg(out->compare[1], m->on[1]);
-    drive_write_leg(out->compare[2], m->on[2]);
+    pm_write_leg(out->compare[0], m->on[0]);
+    pm_write_leg(out->compare[1], m->on[1]);
+    pm_write_leg(out->compare[2], m->on[2]);
     out->legs = PM_LEGS_PWM;
     out->trip = 0;
     drive_clear_instants(out);

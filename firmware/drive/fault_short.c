@@ -101,7 +101,7 @@ PM_APART void fault_short_step(drive_t *drive, drive_out_t *out)
     }
     self->theta = theta;
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-        drive_write_leg(out->compare[x], 0);
+        pm_write_leg(out->compare[x], 0);
     }
     out->legs = PM_LEGS_PWM;
 }

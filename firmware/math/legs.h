@@ -15,6 +15,7 @@
 
 #include "firmware/math/fixed.h"
 #include "firmware/math/measure.h"
+#include "firmware/math/mulh.h"
 
 /* Every port can do OFF and PWM; HIGH and LOW are NEEDS_HELD, the others NEEDS_ONE_SWITCH. */
 typedef enum {
@@ -44,6 +45,17 @@ static inline uint16_t pm_legs_of(pm_leg_t a, pm_leg_t b, pm_leg_t c)
 static inline pm_leg_t pm_leg(uint16_t legs, uint32_t leg)
 {
     return (pm_leg_t)((uint32_t)legs >> 4U * leg & 15U);
+}
+
+/* On-time of a leg, in both halves of the carrier alike; a port without NEEDS_HALVES reads the first alone. */
+static inline void pm_write_leg(uint16_t compare[2], int32_t on) /* 0 <= on < 2^16 */
+{
+#if PM_CARRIES(NEEDS_HALVES)
+    pm_store_twice(compare, on);
+#else
+    pm_assume(on >= 0 && on <= UINT16_MAX);
+    compare[0] = (uint16_t)on;
+#endif
 }
 
 #endif

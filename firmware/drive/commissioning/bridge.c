@@ -49,7 +49,7 @@ static inline void write_leg(int32_t share, int32_t parts, int32_t *rest, uint16
     const pm_unit_t within = pm_share_to_unit(share);
     const uint32_t wanted = (uint32_t)pm_mulh_add(*rest, within, parts);
     *rest = (int32_t)(wanted % PART);
-    drive_write_leg(compare, (int32_t)(wanted / PART));
+    pm_write_leg(compare, (int32_t)(wanted / PART));
 }
 
 /* rest: of the counts, one for each leg. */

@@ -15,7 +15,7 @@ pm_procedure_t procedure_charge_step(drive_t *drive, const drive_in_t *in, drive
     }
     self->count++;
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-        drive_write_leg(out->compare[x], 0);
+        pm_write_leg(out->compare[x], 0);
     }
     out->legs = PM_LEGS_PWM;
     return PM_RUNNING;

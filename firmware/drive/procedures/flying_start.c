@@ -265,7 +265,7 @@ static void write_low(drive_t *drive, uint32_t low, drive_out_t *out)
 {
     const uint32_t counts = (uint32_t)drive->config.modulator.counts;
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
-        drive_write_leg(out->compare[x], (int32_t)(counts - counts * low / (uint32_t)PARTS));
+        pm_write_leg(out->compare[x], (int32_t)(counts - counts * low / (uint32_t)PARTS));
     }
     out->legs = PM_LEGS_PWM;
 #if PM_CARRIES(NEEDS_ONE_SWITCH) && PM_CARRIES(NEEDS_HALVES)

@@ -8,7 +8,7 @@ static inline void write_pulse(drive_t *drive, const pulses_out_t *pulse, drive_
 {
     for (uint32_t x = 0; x < DRIVE_LEGS; x++) {
         const int32_t on = pm_mulh(pulse->duty[x], pm_shl(drive->config.modulator.counts, 32 - PM_Q_BITS));
-        drive_write_leg(out->compare[x], on);
+        pm_write_leg(out->compare[x], on);
     }
     out->legs = pulse->driven ? PM_LEGS_PWM : PM_LEGS_OFF;
     if (!pulse->driven) { /* what flows through an upper diode is not seen below the low switch */

@@ -35,14 +35,14 @@ struct Asked {
         : legs(pattern_states(c.id, c.complementary, sector, reverse))
     {
         const pattern_on_t on = pattern_on(&c, fixed(u, 28));
-        pattern_compare(&on, sector, reverse, compare);
+        pattern_write(&on, sector, reverse, compare);
     }
     double duty(uint32_t leg) const
     {
-        return compare[leg] / double(kN);
+        return compare[leg][0] / double(kN);
     }
 
-    uint16_t compare[PM_LEGS], legs;
+    uint16_t compare[PM_LEGS][2], legs;
 };
 
 // Is a terminal at the upper rail at a count of the period?
@@ -137,8 +137,8 @@ TEST(Patterns, LineVoltageIsTheCommand)
                                                           : duty;
                     };
                     EXPECT_NEAR(mean(at.high) - mean(at.low), u, kDuty);
-                    EXPECT_EQ(out.compare[next.high], then.compare[next.high]);
-                    EXPECT_EQ(out.compare[next.low], then.compare[next.low]);
+                    EXPECT_EQ(out.compare[next.high][0], then.compare[next.high][0]);
+                    EXPECT_EQ(out.compare[next.low][0], then.compare[next.low][0]);
                 }
             }
         }

@@ -398,12 +398,12 @@ class Rig
     void write(const six_step_out_t &out)
     {
         plant_pwm_t pwm = {};
-        uint16_t compare[PM_LEGS];
-        pattern_compare(&out.on, out.sector, six_step.reverse, compare);
+        uint16_t compare[PM_LEGS][2];
+        pattern_write(&out.on, out.sector, six_step.reverse, compare);
         for (uint32_t k = 0; k < 3; ++k) {
             const pm_leg_t state = pm_leg(out.legs, k);
-            pwm.compare[k][0] = compare[k];
-            pwm.compare[k][1] = pwm.compare[k][0];
+            pwm.compare[k][0] = compare[k][0];
+            pwm.compare[k][1] = compare[k][1];
             pwm.driven[k] = state != PM_LEG_OFF;
             pwm.state[k] = of(state);
         }

@@ -190,9 +190,9 @@ class Bench
     }
     uint16_t compare_of(const six_step_out_t &asked, char leg) const
     {
-        uint16_t compare[PM_LEGS];
-        pattern_compare(&asked.on, asked.sector, reverse, compare);
-        return compare[leg - 'A'];
+        uint16_t compare[PM_LEGS][2];
+        pattern_write(&asked.on, asked.sector, reverse, compare);
+        return compare[leg - 'A'][0];
     }
     static void expect_states(uint16_t legs, const Legs &l)
     {

@@ -161,4 +161,41 @@ TEST(Slip, ThreeArePutRightTheFourthIsAFault)
     EXPECT_EQ(d.fault, DRIVE_FAULT_POSITION_LOST);
 }
 
+// A rotor that a torque from the wrong side has driven back is braked with what was wanted, by a ramp from rest; one that turns the right
+// way goes on from its speed. Without it the ramp began at the speed backwards, with the current that had driven it there.
+TEST(Slip, WhatWasWantedIsWantedStill)
+{
+    for (const bool back : {true, false}) {
+        direct::Drive x(direct::params(1));
+        drive_t &d = x.d;
+        for (pm_q_t &zero : d.zero) {
+            zero = PM_ONE;
+        }
+        x.run_ms(1);
+        d.state = DRIVE_RUNNING;
+        d.command.enable = true;
+        d.config.protection.lost_ms = UINT16_MAX;
+        position_reset(&d.position, &d.config.position, &direct::kAtRest, {0, 0}, true);
+        d.stage = STAGE_VECTOR;
+        const pm_q_t size = d.config.position.omega_low + d.config.position.omega_low / 8;
+        const pm_q_t omega = back ? -size : size;
+        const pm_q_t emf = pm_mul(omega, d.config.machine.psi_m);
+        const pm_q_t wanted = d.config.i_max / 2;
+        bool resolved = false;
+        for (unsigned ms = 0; ms < SLIP_MS + 5 && !resolved; ++ms) {
+            d.position.pll = {0, omega};
+            d.position.inject = true;
+            d.voltage.v = {0, -pm_widen(emf)};
+            speed_control_reset(&d.speed, omega, wanted);
+            const drive_slow_in_t slow = {250};
+            drive_slow(&d, &slow);
+            resolved = d.position.pll.theta != 0U;
+        }
+        ASSERT_TRUE(resolved) << back;
+        EXPECT_EQ(d.speed.reference, back ? 0 : omega);
+        EXPECT_GT(d.i_ref.q, 0) << back;
+        EXPECT_EQ(d.speed.pi.integral, pm_widen(d.i_ref.q)) << back;
+    }
+}
+
 } // namespace
