@@ -14,8 +14,9 @@
 #define QUIET 2U
 /* From then on, after a pulse, what is left may be the ringing of the open legs with the winding, which does not end. */
 #define RINGS (SEEN + 4U)
-/* Times its noise: a current of a leg that is there. */
-#define THERE 6
+/* The sign of a leg's current is sure at so many times the noise, and that it was one all along at that share of the whole. */
+#define SURE  4
+#define SHARE 10
 
 /* Periods of a pulse. */
 static uint32_t periods_of(uint32_t length)
@@ -141,21 +142,25 @@ pm_procedure_t flying_start_step(flying_start_t *self, const flying_start_config
     return PM_RUNNING;
 }
 
-/* By the device of a leg, with the sign of its current; within the noise it conducts nothing. */
-static pm_q_t taken_by(const flying_start_config_t *c, pm_q_t i, pm_q_t drop)
+/* What a device takes of a current, of which a leg is given back as much as its sign is sure. */
+static void find_drop(const flying_start_config_t *c, pm_ab_t i, uint32_t seen, flying_start_reading_t *r)
 {
-    const pm_q_t more = pm_abs(i) < THERE * c->noise ? 0 : drop;
-    return i < 0 ? -more : more;
+    r->eighth = times(c->drop, seen) / 8;
+    const pm_q_t sure = pm_max(SURE * c->noise, pm_hypot(i.alpha, i.beta) / SHARE);
+    r->per_sure = pm_ratio(r->eighth, pm_max(sure, r->eighth));
+}
+
+static pm_q_t taken_by(const flying_start_reading_t *known, pm_q_t i)
+{
+    return 8 * pm_clamp(pm_unit(i, known->per_sure), -known->eighth, known->eighth);
 }
 
 /* With what the devices took: along d, L_q / L_d times as much. */
-static pm_angle_t angle_of(const flying_start_config_t *c, pm_ab_t i, uint32_t seen,
-                           const flying_start_reading_t *known)
+static pm_angle_t angle_of(pm_ab_t i, const flying_start_reading_t *known)
 {
     const pm_abc_t legs = pm_clarke_inverse(i);
-    const pm_q_t drop = times(c->drop, seen);
-    const pm_ab_t taken = pm_clarke((pm_abc_t){
-        .a = taken_by(c, legs.a, drop), .b = taken_by(c, legs.b, drop), .c = taken_by(c, legs.c, drop)});
+    const pm_ab_t taken = pm_clarke(
+        (pm_abc_t){.a = taken_by(known, legs.a), .b = taken_by(known, legs.b), .c = taken_by(known, legs.c)});
     pm_angle_t angle = pm_atan2(i.beta + taken.beta, i.alpha + taken.alpha);
     for (int round = 0; round < 2 && known->ratio != PM_ONE; round++) {
         const pm_dir_t rotor = pm_dir(angle + known->behind - known->half);
@@ -193,25 +198,23 @@ static bool is_still(const flying_start_config_t *c, pm_q_t i, int32_t turn, uin
 }
 
 /* Each angle tells how many turns lie before the next. */
-static void read_pulses(const flying_start_t *self, const flying_start_config_t *c, uint32_t seen,
-                        flying_start_reading_t *r)
+static void read_pulses(const flying_start_t *self, flying_start_reading_t *r)
 {
-    const pm_angle_t first = angle_of(c, self->pulse[0].i, seen, r);
+    const pm_angle_t first = angle_of(self->pulse[0].i, r);
     int32_t turn = 0;
     for (uint32_t n = 1; n < self->count; n++) {
         r->periods = (uint16_t)(self->pulse[n].at - self->pulse[0].at);
-        r->angle = angle_of(c, self->pulse[n].i, seen, r);
+        r->angle = angle_of(self->pulse[n].i, r);
         turn += pm_angle_diff(r->angle - first, (uint32_t)turn * r->periods) / (int32_t)r->periods;
     }
     r->turn = turn;
 }
 
 /* The first and the last alone, between which the turns are known. */
-static void read_ends(const flying_start_t *self, const flying_start_config_t *c, uint32_t seen,
-                      flying_start_reading_t *r)
+static void read_ends(const flying_start_t *self, flying_start_reading_t *r)
 {
-    const pm_angle_t first = angle_of(c, self->pulse[0].i, seen, r);
-    r->angle = angle_of(c, self->pulse[self->count - 1U].i, seen, r);
+    const pm_angle_t first = angle_of(self->pulse[0].i, r);
+    r->angle = angle_of(self->pulse[self->count - 1U].i, r);
     r->turn += pm_angle_diff(r->angle - first, (uint32_t)r->turn * r->periods) / (int32_t)r->periods;
 }
 
@@ -235,7 +238,8 @@ pm_procedure_t flying_start_find(flying_start_t *self, const flying_start_config
     r->calls++;
     if (r->calls == 1U) {
         r->ratio = PM_ONE;
-        read_pulses(self, c, seen, r);
+        find_drop(c, self->pulse[0].i, seen, r);
+        read_pulses(self, r);
         const pm_ab_t i = self->pulse[self->count - 1U].i;
         if (is_still(c, pm_hypot(i.alpha, i.beta), r->turn, r->periods)) {
             return PM_FAILED_NOT_TURNING;
@@ -244,7 +248,7 @@ pm_procedure_t flying_start_find(flying_start_t *self, const flying_start_config
         r->ratio = pm_div(machine->L_q, machine->L_d);
         r->calls = pm_abs(r->ratio - PM_ONE) < PM_ONE / 8 ? 2U : 1U;
     } else if (r->calls == 2U) {
-        read_ends(self, c, seen, r);
+        read_ends(self, r);
         find_behind(c, machine, seen, r);
     } else {
         return PM_DONE;

@@ -6,8 +6,9 @@
  *   |i| = |w| psi_m tau / L_q                                   while tau is small against L / R and a turn
  *   angle of i = theta -+ (90 degrees + delta),  tan delta = s tan(|w| c),   - forwards, + backwards
  *   c = tau / 2 / (1 + y/3 - x/6 + 0.04 x y),  x = R tau / L_q,  y = R tau / L_d
- * theta belongs to the end of the pulse. What the devices took is given back: V_drop tau / L_q in each leg, of which what lies along d,
- * once theta is known, is s times as much.
+ * theta belongs to the end of the pulse. What the devices took is given back: V_drop tau / L_q in each leg; of which what lies along
+ * d, once theta is known, is s times as much. Less is given to a leg with a current within four times its noise, whose sign is not
+ * sure, or within a tenth of the whole, which conducted for a part of the pulse alone, as the rotor turns meanwhile.
  *
  * The first pulse is a period long; on boards that have PWM on one switch and different halves of a period, a 64th of one,
  * at its end. A pulse twice or four times as long follows while it cannot carry more than about 40 % of rated current, is not
@@ -71,13 +72,15 @@ typedef struct {
 
 /* What is known of the pulses: first nothing. */
 typedef struct {
-    pm_q_t ratio;      /* L_q / L_d */
-    pm_angle_t behind; /* from a current to d, at the end of its pulse */
-    pm_angle_t half;   /* that the rotor has turned since the middle of it */
-    uint32_t periods;  /* from the first pulse to the last, */
-    int32_t turn;      /* in one of them, */
-    pm_angle_t angle;  /* and the current of the last */
-    uint8_t calls;     /* of flying_start_find() */
+    pm_q_t eighth;      /* of what a device takes of a current */
+    pm_unit_t per_sure; /* that over the current from which on it is sure to */
+    pm_q_t ratio;       /* L_q / L_d */
+    pm_angle_t behind;  /* from a current to d, at the end of its pulse */
+    pm_angle_t half;    /* that the rotor has turned since the middle of it */
+    uint32_t periods;   /* from the first pulse to the last, */
+    int32_t turn;       /* in one of them, */
+    pm_angle_t angle;   /* and the current of the last */
+    uint8_t calls;      /* of flying_start_find() */
 } flying_start_reading_t;
 
 typedef struct {

@@ -201,12 +201,12 @@ TEST(FlyingStart, FindsAngleAndSpeedOfRandomMachines)
 }
 
 // What devices drop, a tenth of the EMF here, drives more current along d than along q: given back by L_q alone, 24 of the 400 angles
-// are off by more than 10 degrees, the worst by 14. A leg whose current they took wholly does not show how much that was: one in a
-// hundred may be off by up to 12.
+// are off by more than 10 degrees, the worst by 14. Given back to a leg from six times its noise on only, 10 of six draws of 400 are,
+// by up to 13; as it is now none, 9.3 degrees and a quarter of the speed at most.
 TEST(FlyingStart, DropsTakeMoreAlongTheDirectAxis)
 {
     std::mt19937_64 random(19);
-    int found = 0, beyond = 0;
+    int found = 0;
     for (int n = 0; n < 400; ++n) {
         Turning x = draw(random);
         x.m.L_q_H = std::uniform_real_distribution<double>(2.5, 5)(random) * x.m.L_d_H;
@@ -217,12 +217,10 @@ TEST(FlyingStart, DropsTakeMoreAlongTheDirectAxis)
         }
         ASSERT_EQ(f.result, PM_DONE) << n;
         ++found;
-        beyond += std::abs(f.angle_error_rad) > kAngle_rad ? 1 : 0;
-        EXPECT_LE(std::abs(f.angle_error_rad), 1.2 * kAngle_rad) << n;
-        EXPECT_LE(std::abs(f.speed_error), 5 * kSpeedError) << n;
+        EXPECT_LE(std::abs(f.angle_error_rad), kAngle_rad) << n;
+        EXPECT_LE(std::abs(f.speed_error), 10 * kSpeedError) << n;
     }
     EXPECT_GE(found, 395);
-    EXPECT_LE(beyond, 4);
 }
 
 // Noise is no speed, whichever way it points.
