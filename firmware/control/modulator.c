@@ -9,16 +9,62 @@ typedef struct {
     pm_q_t span; /* between the largest and the smallest */
 } centred_t;
 
-void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t v_dc)
+/* Length of (x, y), -1 to 8 %. */
+static inline pm_q_t about_hypot(pm_q_t x, pm_q_t y)
 {
-    const int32_t lost = config->dead + pm_mulh(config->drop, pm_per_volt(v_dc));
+    const pm_q_t a = pm_abs(x), b = pm_abs(y);
+    return pm_max(a, b) + pm_frac(pm_min(a, b), PM_FRAC(0.4));
+}
+
+/* Of the half of what is lost that has the signs at the ends of a carrier's swing: the share that is there. */
+static pm_unit_t beyond_swing(const modulator_config_t *config, pm_dq_t i)
+{
+    const pm_q_t size = pm_max(about_hypot(i.d, i.q), 1);
+    const int32_t swing = (config->far[1] != 0U ? 8 : 2) * PM_ZONE_EDGE;
+    const int32_t wide = swing / 4;
+    const int32_t past = pm_mulh(size / 4, config->per_zone[1]) - (swing - swing / 10);
+    if (past >= wide) {
+        return PM_UNIT_MAX;
+    }
+    const pm_unit_t across = pm_ratio(pm_min(pm_abs(i.q), size), size);
+    return past <= 0 ? across : across + pm_unit(PM_UNIT_MAX - across, pm_ratio(past, wide));
+}
+
+/* Edge of the zone over that which the ripple asks for, at most 1. */
+static pm_unit_t beside_ripple(const modulator_config_t *config, int32_t per_volt, pm_ab_t v)
+{
+    const pm_q_t size = about_hypot(v.alpha, v.beta);
+    const int32_t most = pm_mulh(size, config->ripple);
+    if (most <= PM_ZONE_EDGE) {
+        return PM_UNIT_MAX;
+    }
+    const int32_t active = pm_min(pm_mulh(size + pm_half(size), per_volt), PM_SHARE_ONE);
+    const int32_t ripple = most - pm_times_share(most, active);
+    return ripple > PM_ZONE_EDGE ? pm_ratio(PM_ZONE_EDGE, ripple) : PM_UNIT_MAX;
+}
+
+void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t v_dc, pm_ab_t v, pm_dq_t i)
+{
+    const int32_t per_volt = pm_per_volt(v_dc);
+    const int32_t lost = config->dead + pm_mulh(config->drop, per_volt);
     const int32_t all = pm_shl(pm_sat(lost, PM_SHARE_BITS - 2), PM_HEIGHT_BITS);
     const uint32_t n = self->carrier ? 1U : 0U;
     self->zone_alpha = config->per_zone[n];
+    self->far = all / 4 * (int32_t)config->far[n];
+    if (config->per_zone[n] != config->per_zone[0]) {
+        const int32_t none = pm_unit(pm_half(all), PM_UNIT_MAX - beyond_swing(config, i));
+        self->near = all - self->far - (config->far[1] == 0U ? none : 0);
+        self->far = pm_max(self->far - none, 0);
+    } else {
+        if (config->ripple != 0) {
+            const pm_unit_t narrower = beside_ripple(config, per_volt, v);
+            self->zone_alpha = pm_unit(self->zone_alpha, narrower);
+            self->far = pm_unit(self->far, narrower);
+        }
+        self->near = all - self->far;
+    }
     self->zone_beta =
         pm_mulh_sub(self->zone_alpha, self->zone_alpha, PM_FRAC(0.133974596)); /* 1 - sqrt(3)/2 */
-    self->far = pm_frac(all, config->far[n]);
-    self->near = all - self->far;
     self->room = PM_UNIT_MAX;
     if (config->top != PM_SHARE_ONE) {
         const int32_t may_lose = pm_sat(lost, PM_SHARE_BITS - 2);

@@ -12,12 +12,18 @@
  *   f = i / (2 I_1) up to I_1, 1 - I_1 / (2 i) beyond
  * f is made of two linear parts, 3/4 up to 1.7 I_1 and 1/4 up to 8 times that; error 0.07. Without
  * capacitance, or where `comp_zone` is larger than 1.7 I_1, there is one part, up to `comp_zone`.
+ * PWM swings the current about its mean, too: at the edges of the leg that the vector v lies along it is off by
+ *   r = v_dc T_s / (6 L) m (1 - m),   m = |v| / (2/3 v_dc),
+ * below the mean where that leg switches on, and above where it switches off. So none is lost below r: there the zone, in its first
+ * part, goes up to r, and the second part is smaller by as much.
  * A carrier that swings the current about its mean, from -S to S for the vector in one period and back in the next, has the
  * leg that it lifts most switch on and off at the ends of the swing, and in the next period, when that leg is the lowest, in
  * its middle. So half of what is lost has the sign of the mean current, and half the signs at the ends of the swing:
  *   lost = 1/2 sign(i) + 1/4 (sign(i + S) + sign(i - S))
  * of which the second is none below S. While a carrier is added f is two halves: one up to S / 8, one up to S. Where S / 8
- * is inside of the zone without a carrier it is one part up to S / 2, and where that is too, f is as without.
+ * is inside of the zone without a carrier it is one part up to S / 2, and where that is too, f is as without. A current
+ * I along the carrier alone has nothing of the second half up to S, all beyond; for one across it is smooth. So the second half
+ * has the share |i_q| / I up to 0.9 S, all from 1.15 S on, and in between what lies between.
  * The returned vector is the one without compensation, which is what the motor then receives. Legs are
  * shares of the period up to the last step, where one saturation keeps each within the timer's counts.
  *
@@ -56,11 +62,13 @@ typedef struct {
     int32_t counts; /* timer counts of half a period */
     int32_t whole;  /* the same for pm_share_of() */
     int32_t top;    /* on-time above which the current of a leg is hidden, Q20; one: never */
-    int32_t per_zone
-        [2]; /* pm_mulh(edge / 4, per_zone) = 2^PM_ZONE_BITS; 0: no compensation; [1]: while a carrier is added */
-    pm_frac_t far[2]; /* share of the second part: 1/4 or 0 */
-    int32_t dead;     /* share of the period that dead time takes, Q20 */
-    pm_q_t drop;      /* device drop */
+    /* pm_mulh(edge / 4, per_zone) = 2^PM_ZONE_BITS; 0: no compensation; [1]: while a carrier is added, another than
+     * [0] where that swings the current beyond the zone */
+    int32_t per_zone[2];
+    int32_t ripple; /* pm_mulh(|v|, ripple) = 2^PM_ZONE_BITS where r / (1 - m) is the edge; 0: r never is */
+    uint8_t far[2]; /* quarters of what is lost that the second part has: 0 or 1; with a swing 0 or 2 */
+    int32_t dead;   /* share of the period that dead time takes, Q20 */
+    pm_q_t drop;    /* device drop */
 } modulator_config_t;
 
 typedef struct {
@@ -81,7 +89,8 @@ typedef struct {
     pm_ab_t v;     /* realised */
 } modulator_out_t;
 
-void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t v_dc);
+/* v: present vector; i: mean current wanted, of use while a carrier along d is added. */
+void modulator_slow(modulator_t *self, const modulator_config_t *config, pm_q_t v_dc, pm_ab_t v, pm_dq_t i);
 
 /* i_quarter: a quarter of the current, Q26. */
 void modulator_step(modulator_t *self, const modulator_config_t *config, pm_ab_t v, pm_q_t v_dc,

@@ -18,6 +18,17 @@ static int32_t per_edge(maker_t *m, pm_num_t edge)
     return fixed(m, pm_num_div(m->base.i, edge), bits, DRIVE_PARAM_comp_zone);
 }
 
+/* T_s / (4 L edge), as |v| is m 2/3 v_dc; with the mean of L_d and L_q. 0 where r stays within the edge: at its most, half of the
+ * link's voltage, |v| (1 - m) is a sixth of that. */
+static int32_t make_ripple(maker_t *m, pm_num_t edge)
+{
+    const pm_num_t whole = pm_num_mul(pm_num_add(si(m, DRIVE_PARAM_L_d), si(m, DRIVE_PARAM_L_q)), edge);
+    const pm_num_t edges = pm_num_div(mul3(m->base.t_s, m->base.v, pm_num_ratio(1, 2)), whole);
+    const int32_t ripple = fixed(m, least(edges, pm_num(8000)), PM_ZONE_BITS + 32 - Q_BITS, DRIVE_PARAM_L_d);
+    const pm_q_t most = per_unit(m, DRIVE_PARAM_v_dc_max, m->base.v);
+    return pm_mulh(most, ripple) > 6 * PM_ZONE_EDGE ? ripple : 0;
+}
+
 void make_modulator(maker_t *m, modulator_config_t *c)
 {
     const pm_num_t duty = pm_num_mul(si(m, DRIVE_PARAM_dead_time), si(m, DRIVE_PARAM_f_pwm));
@@ -26,16 +37,17 @@ void make_modulator(maker_t *m, modulator_config_t *c)
     const pm_num_t by_capacitance = zone_of_capacitance(m);
     const bool two_parts = pm_num_cmp(by_capacitance, least_zone) > 0;
     m->comp_zone = two_parts ? by_capacitance : least_zone;
+    c->ripple = make_ripple(m, m->comp_zone);
     c->per_zone[0] = per_edge(m, m->comp_zone);
-    c->far[0] = two_parts ? PM_FRAC(0.25) : 0;
+    c->far[0] = two_parts ? 1U : 0U;
     c->per_zone[1] = c->per_zone[0];
     c->far[1] = c->far[0];
     if (pm_num_cmp(m->swing, m->comp_zone) > 0) {
         c->per_zone[1] = per_edge(m, m->swing);
-        c->far[1] = 0;
+        c->far[1] = 0U;
         if (c->per_zone[1] < c->per_zone[0] / 4) { /* a quarter of the swing is beyond the zone */
             c->per_zone[1] *= 4;
-            c->far[1] = PM_FRAC(0.4999);
+            c->far[1] = 2U;
         }
     }
     c->counts = m->params->timer_counts;
@@ -49,6 +61,7 @@ void make_modulator(maker_t *m, modulator_config_t *c)
     if (m->params->dead_time_comp == 0) {
         c->per_zone[0] = 0;
         c->per_zone[1] = 0;
+        c->ripple = 0;
     }
 }
 

@@ -60,6 +60,7 @@ void limit_windings(maker_t *m, drive_config_t *config)
     if (config->winding == (uint8_t)WINDING_STAR) {
         return;
     }
+    config->modulator.ripple = 0; /* that of two bridges is another */
     const pm_num_t share = pm_num_mul(si(m, DRIVE_PARAM_voltage_limit), reach(m));
     config->v_share = fixed(m, least(share, pm_num_ratio(SHARE_MOST, SHARE_MOST + 1)), UNIT_BITS,
                             DRIVE_PARAM_voltage_limit);

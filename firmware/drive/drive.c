@@ -151,7 +151,8 @@ PM_RARE void drive_prepare(drive_t *drive)
     }
     prepare_current_control(drive);
     drive->modulator.carrier = drive->carrier;
-    modulator_slow(&drive->modulator, &c->modulator, pm_max(v_dc, DRIVE_V_DC_LEAST));
+    modulator_slow(&drive->modulator, &c->modulator, pm_max(v_dc, DRIVE_V_DC_LEAST), drive->v_next,
+                   drive->i_ref);
 #if SEQUENCE_HAS_POLARITY
     if (procedure_without_current(drive)) {
         drive->modulator.near = 0;

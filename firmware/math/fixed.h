@@ -237,6 +237,7 @@ static inline int32_t pm_mean(int32_t a, int32_t b)
 /* sum +- height x / edge for |x| below edge = 2^PM_ZONE_BITS, sum +- height beyond; |x| < 2^26, height in
  * Q(PM_HEIGHT_BITS): one saturation and one multiply-accumulate. */
 #define PM_ZONE_BITS   14
+#define PM_ZONE_EDGE   ((int32_t)1 << PM_ZONE_BITS)
 #define PM_ZONE_LIFT   5
 #define PM_HEIGHT_BITS (32 - PM_ZONE_BITS - PM_ZONE_LIFT)
 

@@ -514,6 +514,11 @@ TEST(Config, SwitchesSwitch)
 {
     EXPECT_EQ(configure(changed({{DRIVE_PARAM_mtpa, 0}})).mtpa.h, 0);
     EXPECT_EQ(configure(changed({{DRIVE_PARAM_dead_time_comp, 0}})).modulator.per_zone[0], 0);
+    EXPECT_EQ(configure(changed({{DRIVE_PARAM_dead_time_comp, 0}})).modulator.ripple, 0);
+    // T_s / (4 L edge) V; with 0.03 A at most 0.94 of it, at half of 400 V
+    EXPECT_EQ(configure(changed({})).modulator.ripple, 0);
+    EXPECT_NEAR(real(configure(changed({{DRIVE_PARAM_comp_zone, 0.02}})).modulator.ripple, 18),
+                1e-4 / (2 * (43e-3 + 75e-3)) * 450 / 0.02, 1e-4);
     EXPECT_EQ(configure(changed({{DRIVE_PARAM_saturation_comp, 0}})).position.observer.active_flux.model.L_q2,
               0);
     EXPECT_EQ(configure(changed({{DRIVE_PARAM_resistance_adaptation, 0}}))
@@ -734,7 +739,7 @@ TEST(Config, ASquareWaveHasItsOwnZones)
     const double swing = 100 * 1e-4 / (2 * 43e-3); // 0.116 A
     const auto edge = [](const modulator_config_t &c) { return 10 / (c.per_zone[1] * 0x1p-20); };
     EXPECT_NEAR(edge(made(0.012)), swing / 8, 1e-4);
-    EXPECT_NEAR(made(0.012).far[1] * 0x1p-32, 0.5, 0.001);
+    EXPECT_EQ(made(0.012).far[1], 2);
     EXPECT_EQ(made(0.012).far[0], 0);
     EXPECT_NEAR(edge(made(0.02)), swing / 2, 1e-4);
     EXPECT_EQ(made(0.02).far[1], 0);

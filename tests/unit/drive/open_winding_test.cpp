@@ -75,7 +75,8 @@ struct Bridges {
         : config(ow::configured(p)), zero(config.open_winding), v_dc(link)
     {
         open_winding_reset(&self);
-        modulator_slow(&modulator, &config.modulator, fixed(v_dc, 28));
+        modulator_slow(&modulator, &config.modulator, fixed(v_dc, 28), {}, {});
+        EXPECT_EQ(config.modulator.ripple, 0);
     }
 
     void step(Complex v, Complex i = 0, double asked = 0)

@@ -84,7 +84,8 @@ struct Sets {
         : c(configured(p)), v_dc(fixed(v_dc_pu, 28))
     {
         two_sets_reset(&self, &c.two_sets);
-        modulator_slow(&modulator, &c.modulator, v_dc);
+        modulator_slow(&modulator, &c.modulator, v_dc, {}, {});
+        EXPECT_EQ(c.modulator.ripple, 0);
     }
 
     void step(Complex v, Complex i, double ahead_rad = 0, double omega_pu = 0)

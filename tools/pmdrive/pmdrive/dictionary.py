@@ -226,7 +226,8 @@ ENTRIES = (
  "the dead time's blind zone; < 0: magnetises"), "5.6.1.1 #57"),
     Entry(0x2200, 8, "i_fw_max", "control", "i32", "live", "A", -3, 0, 0, 4000000, 3000, False, True, "application", "none", {}, 'largest demagnetising current of field weakening; 0: off', ""),
     Entry(0x2200, 9, "dead_time_comp", "control", "i32", "live", "1", 0, 0, 0, 1, 1, False, True, "application", "none", {}, '1: compensate dead time and device drops', "5.6.1.1 #57"),
-    Entry(0x2200, 10, "comp_zone", "control", "i32", "live", "A", -3, 0, 1, 400000, 30, False, True, "application", "none", {}, 'least current below which the compensation is linear; more by leg_capacitance', "5.6.1.1 #57"),
+    Entry(0x2200, 10, "comp_zone", "control", "i32", "live", "A", -3, 0, 1, 400000, 30, False, True, "application", "none", {}, ('least current below which the compensation is linear; more by '
+ 'leg_capacitance and by the ripple of the pulses'), "5.6.1.1 #57"),
     Entry(0x2200, 11, "regulator", "control", "i32", "off", "1", 0, 0, 0, 4, 0, False, True, "application", "none", {0: 'PI in the estimated frame, bandwidth as current_bandwidth', 1: 'deadbeat: the current predicted at the end of the period reaches its reference in the next', 2: 'deadbeat, legs held in the nearest of eight switch states: injection 11 or none', 3: 'predictive: of eight switch states the one that leaves least of the error: injection 11 or none', 4: 'direct torque control, hysteresis of torque and flux: without injection'}, 'control of the current', "12.5.2 #146"),
     Entry(0x2200, 12, "leg_capacitance", "control", "i32", "live", "F", -12, 0, 0, 1000000, 0, False, True, "application", "none", {}, ('output capacitance of a leg, both switches: gives back part of what dead '
  'time takes at small currents'), "5.6.1.2 #58"),
