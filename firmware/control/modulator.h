@@ -12,18 +12,19 @@
  *   f = i / (2 I_1) up to I_1, 1 - I_1 / (2 i) beyond
  * f is made of two linear parts, 3/4 up to 1.7 I_1 and 1/4 up to 8 times that; error 0.07. Without
  * capacitance, or where `comp_zone` is larger than 1.7 I_1, there is one part, up to `comp_zone`.
- * PWM swings the current about its mean, too: at the edges of the leg that the vector v lies along it is off by
- *   r = v_dc T_s / (6 L) m (1 - m),   m = |v| / (2/3 v_dc),
- * below the mean where that leg switches on, and above where it switches off. So none is lost below r: there the zone, in its first
- * part, goes up to r, and the second part is smaller by as much.
+ * PWM swings the current about its mean, too: at the edges of the leg that the vector v lies along it is off by r,
+ *   r = v_dc T_s / (6 L) m (1 - m)
+ *   m = |v| / (2/3 v_dc)
+ * below the mean where that leg switches on, above it where the leg switches off. A leg with less current than r loses nothing. So
+ * where r is beyond the edge of the first part, that goes up to r, and the share of the second part falls as the edge over r.
  * A carrier that swings the current about its mean, from -S to S for the vector in one period and back in the next, has the
  * leg that it lifts most switch on and off at the ends of the swing, and in the next period, when that leg is the lowest, in
  * its middle. So half of what is lost has the sign of the mean current, and half the signs at the ends of the swing:
  *   lost = 1/2 sign(i) + 1/4 (sign(i + S) + sign(i - S))
  * of which the second is none below S. While a carrier is added f is two halves: one up to S / 8, one up to S. Where S / 8
  * is inside of the zone without a carrier it is one part up to S / 2, and where that is too, f is as without. A current
- * I along the carrier alone has nothing of the second half up to S, all beyond; for one across it is smooth. So the second half
- * has the share |i_q| / I up to 0.9 S, all from 1.15 S on, and in between what lies between.
+ * along the carrier has none of the second half below S and all of it above, one across it has more the larger it is. So
+ * the second half is taken times |i_q| / |i| up to |i| = 0.9 S, in full from 1.15 S on, and linearly between.
  * The returned vector is the one without compensation, which is what the motor then receives. Legs are
  * shares of the period up to the last step, where one saturation keeps each within the timer's counts.
  *

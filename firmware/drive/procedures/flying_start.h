@@ -8,7 +8,7 @@
  *   c = tau / 2 / (1 + y/3 - x/6 + 0.04 x y),  x = R tau / L_q,  y = R tau / L_d
  * theta belongs to the end of the pulse. What the devices took is given back: V_drop tau / L_q in each leg; of which what lies along
  * d, once theta is known, is s times as much. Less is given to a leg with a current within four times its noise, whose sign is not
- * sure, or within a tenth of the whole, which conducted for a part of the pulse alone, as the rotor turns meanwhile.
+ * sure, or within a tenth of the whole, as it conducted for only a part of the pulse, while the rotor turned.
  *
  * The first pulse is a period long; on boards that have PWM on one switch and different halves of a period, a 64th of one,
  * at its end. A pulse twice or four times as long follows while it cannot carry more than about 40 % of rated current, is not
