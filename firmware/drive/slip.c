@@ -34,6 +34,8 @@ pm_angle_t slip_slow(slip_t *self, const pm_machine_t *machine, const slip_in_t 
     (void)pm_lp1(&self->across, omega < 0 ? e_d : -e_d, K_ACROSS);
     const bool judged = (half || third) && pm_abs(omega) >= in->omega_least && emf >= least;
     const bool beyond = judged && along < (half ? -emf / 2 : emf / 4);
+    const bool agrees = judged && along > emf / 2;
+    self->agrees_ms = agrees ? (uint8_t)pm_min((int32_t)self->agrees_ms + 1, (int32_t)SLIP_MS) : 0U;
     self->ms = beyond ? (uint16_t)(self->ms + 1U) : 0U;
     return self->ms >= SLIP_MS ? resolved(self, half) : 0U;
 }

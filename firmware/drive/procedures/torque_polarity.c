@@ -3,7 +3,9 @@
 
 #if PM_HAS(torque_polarity)
 
-#define LOCK_MS  60U
+#define LOCK_MS  20U /* transients */
+#define STILL_MS 40U /* without a current, so long a rotor that rests stays where it is */
+#define WAIT     25U /* times that */
 #define PULSE_MS 24U
 #define FALL_MS  8U
 #define REST_MS  8U
@@ -30,6 +32,12 @@ static void turn_from_here(drive_t *drive, uint8_t part)
     self->part = part;
 }
 
+/* The frame has been turned to the pole that the EMF shows, or had it. */
+static bool emf_has_told(const slip_t *slip)
+{
+    return slip->count != 0U || slip->agrees_ms >= SLIP_MS;
+}
+
 static void give_current(drive_t *drive, bool pulse)
 {
     const torque_polarity_t *self = &drive->beside.torque_polarity;
@@ -41,6 +49,25 @@ static void give_current(drive_t *drive, bool pulse)
 static int32_t turned_by(const drive_t *drive)
 {
     return pm_angle_diff(drive->position.pll.theta, drive->beside.torque_polarity.theta);
+}
+
+/* Injection has found its way, and the rotor rests: PM_DONE. It is left alone meanwhile. */
+static pm_procedure_t wait_for_rest(drive_t *drive)
+{
+    torque_polarity_t *self = &drive->beside.torque_polarity;
+    if (self->ms == LOCK_MS) {
+        self->theta = drive->position.pll.theta;
+    }
+    if (self->ms < LOCK_MS + STILL_MS) {
+        return PM_RUNNING;
+    }
+    if (pm_abs(turned_by(drive)) < SEEN / 4) {
+        return PM_DONE;
+    }
+    self->theta = drive->position.pll.theta;
+    self->ms = LOCK_MS;
+    self->pulses = (uint8_t)(self->pulses + 1U);
+    return self->pulses < WAIT ? PM_RUNNING : PM_FAILED_TURNED;
 }
 
 /* The other way than before, it counts from the farthest that it has come. With current, cross-saturation shows some of it that is
@@ -82,19 +109,21 @@ PM_APART pm_procedure_t procedure_torque_polarity_slow(drive_t *drive)
 {
     torque_polarity_t *self = &drive->beside.torque_polarity;
     self->ms++;
+    if (emf_has_told(&drive->position.slip) && self->part != (uint8_t)PART_TOLD) {
+        self->part = PART_TOLD;
+        self->ms = PULSE_MS;
+    }
     if (self->part == (uint8_t)PART_LOCK) {
-        if (self->ms >= LOCK_MS) {
+        const pm_procedure_t rests = wait_for_rest(drive);
+        if (rests == PM_DONE) {
             self->ms = 0;
             turn_from_here(drive, PART_FORTH);
+            return PM_RUNNING;
         }
-        return PM_RUNNING;
+        return rests;
     }
     if (pm_abs(drive->position.pll.omega) > PM_ONE / 2) {
         return PM_FAILED_SALIENCY;
-    }
-    if (drive->position.slip.count != 0U && self->part != (uint8_t)PART_TOLD) {
-        self->part = PART_TOLD; /* the frame has been turned to the pole that the EMF shows */
-        self->ms = PULSE_MS;
     }
     if (self->part != (uint8_t)PART_TOLD && pm_abs(turned_by(drive)) > FAR) {
         return PM_FAILED_TURNED;

@@ -122,6 +122,30 @@ TEST(TorquePolarity, ALoadThatTurnsTheRotorIsNotTakenForThePole)
     }
 }
 
+// A load that depends on the angle, as of a compressor, has a rotor without friction swing about where it would rest, as a pendulum:
+// what it does by itself is not taken for what a torque did. It is found, shown by the EMF, aligned, or a fault.
+TEST(TorquePolarity, ARotorThatSwingsIsNotTakenForThePole)
+{
+    int found = 0;
+    for (const double J_kgm2 : {1e-2, 1e-3, 3e-4}) {
+        for (int k = 0; k < kAngles; ++k) {
+            plant_config_t swinging = weak_magnets();
+            swinging.mech.J_kgm2 = J_kgm2;
+            swinging.mech.T_coulomb_Nm = 0;
+            swinging.mech.load_angle[0] = {1, 0.3 * kRated_Nm, 20 * kDegree};
+            drive_params_t p = told();
+            p.J = static_cast<int32_t>(std::lround(J_kgm2 * 1e9));
+            Start x(swinging, p, angle(k));
+            x.run_past(PROCEDURE_torque_polarity);
+            if (drive_status(&x.drive())->fault == DRIVE_FAULT_NONE && reason(x) == PM_RUNNING) {
+                EXPECT_LE(std::abs(x.error_rad()), 30 * kDegree) << J_kgm2 << ' ' << k;
+                ++found;
+            }
+        }
+    }
+    EXPECT_GE(found, 3 * kAngles - 6);
+}
+
 // Half of speed_trip within a pulse: not the rotor, but a loop that runs away.
 TEST(TorquePolarity, ALoopThatRunsAwayIsRefused)
 {
