@@ -3,7 +3,13 @@
  *   i_fw += k (v_top - |v|),   -i_fw_max <= i_fw <= 0
  * The integral drives i_d negative while the voltage exceeds v_top, a share of what the DC link allows, and
  * releases it afterwards. The loop gain falls with speed, so the configured k is for base speed: stable there
- * means stable above. Runs at 1 kHz. Tests: tests/unit/control/field_weakening_test.cpp. */
+ * means stable above. Runs at 1 kHz.
+ *
+ * By what a current along d changes the voltage,
+ *   1/2 d|v|^2 / di_d = R v_d + omega L_d v_q
+ * it takes more of it than it gives once that is not positive: beyond the current of most torque per volt, or where a winding
+ * is resistance above all, as a gimbal motor's. There i_fw goes back, at an eighth of the rate.
+ * Tests: tests/unit/control/field_weakening_test.cpp. */
 #ifndef CONTROL_FIELD_WEAKENING_H
 #define CONTROL_FIELD_WEAKENING_H
 
@@ -23,8 +29,15 @@ typedef struct {
     pm_q_t i_d; /* <= 0, to be added to the reference */
 } field_weakening_t;
 
-pm_q_t field_weakening_step(field_weakening_t *self, const field_weakening_config_t *config, pm_q_t v,
-                            pm_q_t v_top);
+typedef struct {
+    pm_dq_t v;
+    pm_q_t v_top;
+    pm_q_t omega;    /* electrical */
+    pm_q_t R_s, L_d; /* per-unit */
+} field_weakening_in_t;
+
+pm_q_t field_weakening_step(field_weakening_t *self, const field_weakening_config_t *config,
+                            const field_weakening_in_t *in);
 
 void make_field_weakening(maker_t *m, field_weakening_config_t *c);
 

@@ -43,9 +43,14 @@ static pm_q_t flux_current(drive_t *drive, pm_q_t i_q)
 {
     const drive_config_t *c = &drive->config;
     const pm_q_t v_top = pm_unit(drive->status.v_dc, c->v_share);
-    const pm_q_t weak = field_weakening_step(
-        &drive->field_weakening, &c->field_weakening,
-        pm_hypot(pm_narrow(drive->voltage.v.d), pm_narrow(drive->voltage.v.q)), v_top - v_top / 20);
+    const field_weakening_in_t in = {
+        .v = {.d = pm_narrow(drive->voltage.v.d), .q = pm_narrow(drive->voltage.v.q)},
+        .v_top = v_top - v_top / 20,
+        .omega = drive->position.pll.omega,
+        .R_s = c->machine.R_s,
+        .L_d = c->machine.L_d,
+    };
+    const pm_q_t weak = field_weakening_step(&drive->field_weakening, &c->field_weakening, &in);
     const pm_q_t light = pm_mul(c->i_d_light, drive->position.weight);
     const pm_q_t i_d = light < 0 ? -light : pm_min(mtpa_i_d(&c->mtpa, i_q), -light);
     return pm_max(i_d + weak, -c->i_max);
