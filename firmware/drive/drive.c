@@ -145,9 +145,12 @@ PM_RARE void drive_prepare(drive_t *drive)
     drive->ahead = pm_dir((pm_angle_t)turn + (pm_angle_t)pm_half(turn));
     drive->carrier = drive->stage == STAGE_VECTOR && drive->position.inject;
     drive->v_share = c->v_share;
-    if (drive->carrier) { /* a sagging link must not leave nothing to control with */
-        const pm_unit_t reserved = pm_ratio(pm_min(c->position.injection.reserve, v_dc), v_dc);
-        drive->v_share = pm_max(c->v_share - reserved, c->v_share / 4);
+    if (drive->carrier) {
+        /* The more an observer leads, the less of the carrier's voltage is kept from control: where a link that has sagged does not
+         * have both, the carrier gives way, or the rotor would never be faster; and control has half of it in any case. */
+        const pm_q_t reserve = pm_mul(c->position.injection.reserve, PM_ONE - drive->position.weight);
+        const pm_unit_t reserved = pm_ratio(pm_min(reserve, v_dc), v_dc);
+        drive->v_share = pm_max(c->v_share - reserved, c->v_share / 2);
     }
     prepare_current_control(drive);
     drive->modulator.carrier = drive->carrier;

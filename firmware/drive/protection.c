@@ -200,12 +200,12 @@ static bool has_open_phase(drive_t *drive, pm_q_t least, pm_ab_t wanted, pm_ab_t
     return open_phase_slow(&drive->open_phase, least, wanted, i, 0);
 }
 
-/* References and measured currents of a frame, whichever it is. Not where a carrier leaves control less than half of its
+/* References and measured currents of a frame, whichever it is. Not where a carrier leaves control no more than half of its
  * voltage, on a link that has sagged: then dead time has more of it than the direction of the current bears. */
 void protection_phases(drive_t *drive)
 {
     const bool controlled = drive->stage == STAGE_VECTOR || drive->stage == STAGE_OPEN_LOOP;
-    if (!controlled || drive->v_share < drive->config.v_share / 2) {
+    if (!controlled || drive->v_share <= drive->config.v_share / 2) {
         open_phase_reset(&drive->open_phase);
         PM_IN_IMAGE(two_sets, open_phase_reset(&drive->second_open_phase);)
         return;

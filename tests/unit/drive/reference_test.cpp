@@ -314,19 +314,24 @@ TEST(Reference, ResetStartsFromSpeedAndCurrent)
     EXPECT_EQ(x.d.i_ref.q, PM_Q(0.25));
 }
 
-// The carrier takes its amplitude from what control may use, but leaves a quarter, also of a link that sags.
-TEST(Prepare, SaggingLinkLeavesAQuarterToControl)
+// The carrier takes its amplitude from what control may use, the less the more an observer leads, and leaves half, also of a link
+// that sags.
+TEST(Prepare, SaggingLinkLeavesHalfToControl)
 {
     for (const double v_V : {300.0, 200.0, 150.0, 100.0, 80.0, 65.0}) {
-        for (const bool carrier : {true, false}) {
-            Drive x;
-            x.d.stage = STAGE_VECTOR;
-            x.d.position.inject = carrier;
-            x.d.status.v_dc = fixed(v_V / kV_V, 28);
-            drive_prepare(&x.d);
-            const double left = std::max(kLinear - std::min(kCarrier_V / v_V, 1.0), kLinear / 4);
-            EXPECT_NEAR(real(x.d.v_share, 31), carrier ? left : kLinear, kRatio) << v_V;
-            EXPECT_EQ(x.d.carrier, carrier);
+        for (const double weight : {0.0, 0.4, 1.0}) {
+            for (const bool carrier : {true, false}) {
+                Drive x;
+                x.d.stage = STAGE_VECTOR;
+                x.d.position.inject = carrier;
+                x.d.position.weight = fixed(weight, 28);
+                x.d.status.v_dc = fixed(v_V / kV_V, 28);
+                drive_prepare(&x.d);
+                const double kept = std::min((1 - weight) * kCarrier_V / v_V, 1.0);
+                const double left = std::max(kLinear - kept, kLinear / 2);
+                EXPECT_NEAR(real(x.d.v_share, 31), carrier ? left : kLinear, kRatio) << v_V << ' ' << weight;
+                EXPECT_EQ(x.d.carrier, carrier);
+            }
         }
     }
 }
