@@ -66,6 +66,10 @@
 #endif
 #define PM_CARRIES(need) (((need)&PM_CHANNELS) != 0U)
 
+/* The currents of a further sample, in programs that have a method which looks at them. */
+#define PM_SAMPLES_CURRENTS                                                                                  \
+    (PM_CARRIES(NEEDS_SECOND_SAMPLE) && (PM_HAS(zero_vector) || PM_HAS(pwm_excitation)))
+
 /* The code in programs that carry any of PM_MEASURED, else nothing. */
 #if PM_CARRIES(PM_MEASURED)
 #define PM_IF_MEASURED(...) __VA_ARGS__
@@ -131,7 +135,7 @@ typedef struct {
 #endif
 #if PM_CARRIES(NEEDS_SECOND_SAMPLE)
     uint16_t sampled;                       /* bit n: sample n was asked for and is here */
-    uint16_t i_sample[PM_SAMPLES][PM_LEGS]; /* as the currents at t_k */
+    uint16_t i_sample[PM_SAMPLES][PM_LEGS]; /* as the currents at t_k; PM_SAMPLES_CURRENTS */
 #if PM_CARRIES(NEEDS_TERMINALS)
     uint16_t v_sample[PM_SAMPLES][PM_LEGS]; /* as v_terminal */
     uint16_t v_dc_sample[PM_SAMPLES];       /* as the DC link at t_k */

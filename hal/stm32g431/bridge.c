@@ -89,7 +89,7 @@ static void configure_samples(uint32_t counts)
     start_counting(&TIM4, TIM_OCM_PWM1);
     TIM4.CCR1 = SAMPLE_NONE;
     port_hal.instants = 2U * counts - (uint32_t)SAMPLE_BEFORE_END - (uint32_t)SAMPLE_FIRST;
-    port_hal.sample.taken = 0U;
+    port_hal.taken = 0U;
 }
 
 /* In the period after the coming update event. */

@@ -152,43 +152,33 @@ bool measure_is_within(void)
 /* Before the sequence at the end of the period has a result. */
 void measure_take_sample(void)
 {
-    port_sample_t *sample = &port_hal.sample;
+    pm_measure_t *more = port_hal.more;
     ADC1.ISR = ADC_ISR_JEOS;
-    sample->taken = 1U;
-    sample->i[0] = current_code(ADC1.JDR1);
-    sample->i[1] = current_code(ADC2.JDR1);
-    sample->i[2] = current_code(ADC1.JDR2);
+    if (more == NULL) { /* the trigger's first edge, before the first period has ended */
+        return;
+    }
+    port_hal.taken = 1U;
+#if PM_SAMPLES_CURRENTS
+    more->i_sample[0][0] = current_code(ADC1.JDR1);
+    more->i_sample[0][1] = current_code(ADC2.JDR1);
+    more->i_sample[0][2] = current_code(ADC1.JDR2);
+#endif
 #if PORT_AT_PB11 == NEEDS_TERMINALS
-    sample->v[0] = code_of(ADC2.JDR2 * 16U);
-    sample->v[1] = code_of(ADC2.JDR3 * 16U);
-    sample->v[2] = code_of(ADC1.JDR3 * 16U);
-    sample->v_dc = code_of(ADC1.JDR4 * 16U);
+    more->v_sample[0][0] = code_of(ADC2.JDR2 * 16U);
+    more->v_sample[0][1] = code_of(ADC2.JDR3 * 16U);
+    more->v_sample[0][2] = code_of(ADC1.JDR3 * 16U);
+    more->v_dc_sample[0] = code_of(ADC1.JDR4 * 16U);
 #endif
 #if PM_CARRIES(NEEDS_NEUTRAL)
-    sample->v_neutral = code_of(ADC1.JDR3 * 16U);
+    more->v_neutral_sample[0] = code_of(ADC1.JDR3 * 16U);
 #endif
 }
 
 static void give_sample(pm_measure_t *more)
 {
-    port_sample_t *sample = &port_hal.sample;
-    more->sampled = sample->taken;
-    if (sample->taken == 0U) {
-        return;
-    }
-    sample->taken = 0U;
-    for (uint32_t leg = 0; leg < PM_LEGS; ++leg) {
-        more->i_sample[0][leg] = sample->i[leg];
-#if PM_CARRIES(NEEDS_TERMINALS)
-        more->v_sample[0][leg] = sample->v[leg];
-#endif
-    }
-#if PM_CARRIES(NEEDS_TERMINALS)
-    more->v_dc_sample[0] = sample->v_dc;
-#endif
-#if PM_CARRIES(NEEDS_NEUTRAL)
-    more->v_neutral_sample[0] = sample->v_neutral;
-#endif
+    port_hal.more = more;
+    more->sampled = port_hal.taken;
+    port_hal.taken = 0U;
 }
 #endif
 

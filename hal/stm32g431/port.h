@@ -39,21 +39,6 @@ typedef struct {
     volatile uint32_t lost;
 } port_can_t;
 
-#if PM_CARRIES(NEEDS_SECOND_SAMPLE)
-/* Codes of the sample within the last period. */
-typedef struct {
-    uint16_t taken;
-    uint16_t i[PM_LEGS];
-#if PM_CARRIES(NEEDS_TERMINALS)
-    uint16_t v[PM_LEGS];
-    uint16_t v_dc;
-#endif
-#if PM_CARRIES(NEEDS_NEUTRAL)
-    uint16_t v_neutral;
-#endif
-} port_sample_t;
-#endif
-
 enum { PORT_TEMPERATURE, PORT_DIAL, PORT_REFERENCE, PORT_TURNS };
 
 struct hal {
@@ -69,8 +54,9 @@ struct hal {
     uint32_t then; /* PM_LEGS_... from the instant of the coming period on, or legs */
 #endif
 #if PM_CARRIES(NEEDS_SECOND_SAMPLE)
-    uint32_t instants; /* at which a sample is taken, from the first on */
-    port_sample_t sample;
+    uint32_t instants;  /* at which a sample is taken, from the first on */
+    pm_measure_t *more; /* where its codes go: what is measured at the end of the period */
+    uint16_t taken;     /* it is there */
 #endif
     uint32_t bridge; /* BDTR with everything but the main output enable */
     bool refused;    /* the bridge cannot be armed */

@@ -213,6 +213,8 @@ TEST_F(Port, ASampleIsDeliveredOnce)
     ADC2.JDR1 = 200;
     ADC1.JDR2 = 300;
     ADC1.JDR3 = 400;
+    hal_measure(hal, &in);
+    EXPECT_EQ(in.more.sampled, 0U);
     measure_take_sample();
     ADC1.JDR1 = 2048; // of the zero vector
     hal_measure(hal, &in);
