@@ -2,12 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tools/pmsim/machine_file.h"
 
 namespace
 {
 
 using pmsim::machine_variables;
+using pmsim::Settings;
 using pmsim::Setup;
 
 Setup machine(const std::string &name, const pmsim::Settings &settings = {})
@@ -30,7 +33,8 @@ TEST(MachineVariables, OfTheMachineOfThePictureArePlain)
     EXPECT_EQ(v.at("round"), "0");
     EXPECT_EQ(v.at("pace"), "1");
     EXPECT_EQ(v.at("load_ramp_s"), "0");
-    EXPECT_EQ(v.at("pole_deg"), "120");
+    EXPECT_EQ(v.at("start_turn_deg"), "5");
+    EXPECT_EQ(v.at("bears"), "1");
 }
 
 TEST(MachineVariables, SaliencyIsWhatTheDriveStartsBy)
@@ -38,6 +42,36 @@ TEST(MachineVariables, SaliencyIsWhatTheDriveStartsBy)
     EXPECT_EQ(number(machine("ipm_1000.yaml", {{"start_method", "2"}}), "salient"), 0);
     EXPECT_EQ(number(machine("estun_emj04apb22.yaml"), "salient"), 0);
     EXPECT_EQ(number(machine("estun_emj04apb22.yaml"), "round"), 1);
+}
+
+// The catalogue's motors bear their rated torque; R i of a gimbal motor and the EMF together are above what a lower link has:
+// R i (s + drag) + omega psi = 0.95 x 0.98 v_dc / sqrt(3).
+TEST(MachineVariables, ALoadIsWhatTheLinkLeaves)
+{
+    EXPECT_EQ(number(machine("estun_emj04apb22.yaml"), "bears"), 1);
+    const double drag = (5e-3 + 1e-5 * 30) / 0.236;
+    const double left = (0.95 * 0.98 * 16 / std::sqrt(3.0) - 330 * 14.3e-3) / (8.0 * 1.0) - drag;
+    const auto gimbal = machine("gimbal_4108.yaml", {{"dclink.v_source_V", "16"}});
+    EXPECT_NEAR(number(gimbal, "bears"), left, 0.011);
+    EXPECT_NEAR(number(gimbal, "drag_rel"), drag, 1e-9);
+}
+
+// L_q told a tenth too low turns psi - L_q,told i out of the d-axis: on a machine that does not saturate.
+TEST(MachineVariables, WhatIsToldWrongIsExpected)
+{
+    const Settings linear = {{"electrical.c_A_Wb5", "0"}, {"mtpa", "0"}};
+    Settings told = linear;
+    told.push_back({"L_q", "3.0773e-3"});
+    told.push_back({"L_q_rated", "3.0e-3"});
+    EXPECT_NEAR(number(machine("spm_400.yaml", told), "told_deg"),
+                std::atan(0.1 * 3.0e-3 * 2.325 / (1.5 * 5 * 0.0776) / 0.0776) * 180 / 3.14159265358979, 0.05);
+}
+
+TEST(MachineVariables, AStartTurnsARotorWhosePoleSaturationDoesNotShow)
+{
+    EXPECT_EQ(number(machine("ipm_1000.yaml"), "start_turn_deg"), 5);
+    EXPECT_EQ(number(machine("ipm_1000.yaml", {{"electrical.c_A_Wb5", "0"}}), "start_turn_deg"), 35);
+    EXPECT_EQ(number(machine("ipm_1000.yaml", {{"start_method", "2"}}), "start_turn_deg"), 120);
 }
 
 // 4 T / (J w_s^2) is 0.3 of rated speed on the ramp.
