@@ -7,13 +7,10 @@ static pm_pi_config_t make_current_pi(maker_t *m, drive_param_id_t L)
     const pm_num_t bandwidth = angular(m, DRIVE_PARAM_current_bandwidth);
     const pm_num_t kp = pm_num_div(pm_num_mul(bandwidth, si(m, L)), m->impedance);
     const pm_num_t ki = pm_num_div(mul3(bandwidth, si(m, DRIVE_PARAM_R_s), m->base.t_s), m->impedance);
-    if (pm_num_cmp(ki, kp) >= 0) {
-        refuse(m, DRIVE_PARAM_f_pwm, "too low for L / R_s: raise it");
-    }
     return (pm_pi_config_t){
         .kp = gain(m, kp, GAIN_BITS, DRIVE_PARAM_current_bandwidth),
         .ki = gain(m, ki, GAIN_BITS, DRIVE_PARAM_current_bandwidth),
-        .kb = fixed(m, pm_num_div(ki, kp), UNIT_BITS, DRIVE_PARAM_R_s),
+        .kb = fixed(m, least(pm_num_div(ki, kp), pm_num_ratio(15, 16)), UNIT_BITS, DRIVE_PARAM_R_s),
     };
 }
 
