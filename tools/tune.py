@@ -21,8 +21,8 @@ L_q may be below L_d.
 position error that is predicted for each of twelve carriers without load and at rated current (section 5.8.3 of the book). It is
 not asked for where `drive:` tells all three, v_injection, f_injection and injection_bandwidth.
 
-A link that cannot drive rated current at rest, or not reach rated speed, is warned of; one that cannot drive half of rated current
-is refused.
+A link that cannot drive rated current at rest, not reach rated speed, or leaves less than 80 % of its torque there, is warned of;
+one that cannot drive half of rated current is refused.
 
 `commutation: 1` in `drive:` asks for block commutation, `trapezoid_flat_deg` in `winding:` says that the EMF is a trapezoid.
 """
@@ -62,6 +62,7 @@ PER_RISE = 3  # periods of L / R
 # Of rated current, what the link must drive at rest. The vector of a start asks for 0.8: a motor at 12 V starts without a load where the
 # link drives 0.96 and stalls where it drives 0.82. Between that and a half a smaller i_open_loop or light friction may do; below, nothing.
 START = 0.5
+BEARS = 0.8  # of the torque of rated current, at rated speed
 RIPPLE = 6  # of the phase current, peak to peak: v_dc / (6 L f_pwm) at its most
 BELOW = "the motor's; below L_d: i_d = 0 and no injection, which costs less than (L_d - L_q) i / psi_m squared, half"
 OTHERS = "name", "electrical", "winding", "mechanics", "rated", "inverter", "sensor", "dclink", "drive"
@@ -228,10 +229,37 @@ def too_fast(x):
             f"v_dc_V well above {emf / v * rated['v_dc_V']:.3g}, or speed_rated_rad_s below {v / (psi * poles):.3g}")
 
 
+def at_rated_speed(x):
+    """(torque, phase voltage) of currents up to rated, at rated speed."""
+    rated, e = x["rated"], x["electrical"]
+    p, R, i_rated = e["pole_pairs"], e["R_s_ohm"], rated["i_rated_A"]
+    omega = p * rated["speed_rated_rad_s"]
+    for part in range(9):
+        i_d = -i_rated * part / 10
+        for of_rest in range(1, 21):
+            i_q = math.sqrt(i_rated ** 2 - i_d ** 2) * of_rest / 20
+            (psi_d, psi_q), _ = flux(x, i_d, i_q)
+            yield 1.5 * p * (psi_d * i_q - psi_q * i_d), math.hypot(R * i_d - omega * psi_q, R * i_q + omega * psi_d)
+
+
+def too_heavy(x):
+    """What, and what to do, where the link leaves well less than the torque of rated current at rated speed; None where it does not."""
+    (v, formula), rated = phase_V(x), x["rated"]
+    points = list(at_rated_speed(x))
+    torque = max(torque for torque, _ in points)
+    left = max((torque for torque, needed in points if needed <= v), default=0.0)
+    if left >= BEARS * torque:
+        return None
+    needed = min(needed for at, needed in points if at >= BEARS * torque)
+    return (f"at rated.speed_rated_rad_s = {rated['speed_rated_rad_s']:g} rated.v_dc_V = {rated['v_dc_V']:g}, {v:.3g} V of a phase, {formula}, "
+            f"leaves {100 * left / torque:.0f} % of the torque of rated current",
+            f"v_dc_V of {needed / v * rated['v_dc_V']:.3g} for {BEARS:.0%} of it, or a load that is lighter there")
+
+
 def warnings(x):
     """[(what, what to do)] of a link that is too low for the motor."""
     slow = [too_little_at_rest(x)] if at_rest(x) < x["rated"]["i_rated_A"] else []
-    return slow + [told for told in [too_fast(x)] if told]
+    return slow + [told for told in [too_fast(x) or too_heavy(x)] if told]
 
 
 def above(value, steps):

@@ -4,6 +4,7 @@ usage: tune_test.py PMSIM
 """
 import math
 import random
+import re
 import subprocess
 import sys
 import tempfile
@@ -186,13 +187,13 @@ class Tune(unittest.TestCase):
                      "drives 0.577 A", "v_dc_V above 12.5"):
             self.assertIn(word, result.stderr)
         told["electrical"]["R_s_ohm"] = 11.5
-        self.assertEqual(self.tune(told).stderr, "")
+        self.assertNotIn("at rest", self.tune(told).stderr)
         told["electrical"]["R_s_ohm"] = 23
         self.assertEqual(self.tune(told).returncode, 0)
         told["electrical"]["R_s_ohm"] = 23.2
         self.refused(told, "motor.yaml:", "rated.i_rated_A = 0.6 takes 13.9 V", "v_dc_V above 24.1")
         told["electrical"]["R_s_ohm"], told["winding"] = 19.9, {"connection": "open", "L_0_H": 1e-3}
-        self.assertEqual(self.tune(told).stderr, "")
+        self.assertNotIn("at rest", self.tune(told).stderr)
 
     def test_a_link_too_low_for_rated_speed_is_warned_of(self):
         """EMF 13.2 V at 40 rad/s, 12.12 V with half of rated current against the magnet; 6 V give 3.46, 22 V 12.7."""
@@ -207,9 +208,22 @@ class Tune(unittest.TestCase):
             self.assertIn(word, result.stderr)
         self.assertEqual(len(result.stderr.splitlines()), 2)
         told["rated"]["v_dc_V"] = 22
-        self.assertEqual(self.tune(told).stderr, "")
+        self.assertNotIn("EMF", self.tune(told).stderr)
         told["drive"] = {"i_fw_max": 0}
         self.assertIn("enough for 38.5 rad/s", self.tune(told).stderr)
+
+    def test_a_link_too_low_for_rated_torque_at_rated_speed_is_warned_of(self):
+        """R i + omega psi of a gimbal motor, whose inductance is small beside R: currents in steps of a twentieth."""
+        told = motor("gimbal")
+        e, rated = told["electrical"], told["rated"]
+        rated["i_rated_A"] = 0.5 * rated["v_dc_V"] / math.sqrt(3) / e["R_s_ohm"]
+        for share in (0.5, 0.7):
+            rated["speed_rated_rad_s"] = (1 - 0.5 * share) * rated["v_dc_V"] / math.sqrt(3) / (e["pole_pairs"] * e["psi_m_Wb"])
+            found = re.search(r"leaves (\d+) % of the torque of rated current\n +v_dc_V of ([\d.]+) for 80%", self.tune(told).stderr)
+            self.assertAlmostEqual(float(found[1]), 100 * share, delta=6)
+            self.assertAlmostEqual(float(found[2]) / rated["v_dc_V"], 1 - 0.5 * share + 0.4, delta=0.04)
+        rated["speed_rated_rad_s"] *= 0.5
+        self.assertEqual(self.tune(told).stderr, "")
 
     def test_motors_on_their_link_have_no_warning(self):
         for name in MOTORS:
