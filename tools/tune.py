@@ -321,6 +321,11 @@ def pwm_in_blocks(told, L, C):
                f"{last / 1e3:g} kHz would have less ripple, but an open terminal rings for {1e6 * tune.ringing(L, C):.0f} us")
 
 
+def stored_F(x, v, i):
+    """What takes the energy of a winding with i_max, which a bridge that opens gives back, up to v_dc_max: 3/2 L i^2 = C (v_max^2 - v^2)."""
+    return 1.5 * max(inductances(x)) * (1.25 * i) ** 2 / (v ** 2 * (tune.LINK_MOST ** 2 - 1))
+
+
 def complete(x):
     """What is not told of torque, inverter, sensors and link: {section: {key: (value, why)}}."""
     told = {(section, key): float(x[section][key]) for section, keys in NEEDED.items() for key in keys}
@@ -354,7 +359,8 @@ def complete(x):
         },
         "dclink": {
             "r_source_ohm": (0.002 * v / i, "0.2 % of the link at rated current"),
-            "c_F": (above(max(20 * i / (v * f_pwm), 1e-6), (1, 2.2, 4.7)), "rated current for a period is 5 % of the link; 1 uF at least"),
+            "c_F": (above(max(20 * i / (v * f_pwm), 2 * stored_F(x, v, i), 1e-6), (1, 2.2, 4.7)),
+                    "rated current for a period is 5 % of the link, and twice what bears the winding's energy; 1 uF at least"),
         },
     }
     if in_blocks(x) and C > 0:

@@ -5,10 +5,10 @@
  * releases it afterwards. The loop gain falls with speed, so the configured k is for base speed: stable there
  * means stable above. Runs at 1 kHz.
  *
- * By what a current along d changes the voltage,
+ * A current along d changes the voltage by
  *   1/2 d|v|^2 / di_d = R v_d + omega L_d v_q
- * it takes more of it than it gives once that is not positive: beyond the current of most torque per volt, or where a winding
- * is resistance above all, as a gimbal motor's. There i_fw goes back, at an eighth of the rate.
+ * Where that is not positive, more of it takes voltage and gives none: beyond the current of most torque per volt, and where a
+ * winding is resistance above all, as a gimbal motor's. There i_fw goes back, at an eighth of the rate.
  * Tests: tests/unit/control/field_weakening_test.cpp. */
 #ifndef CONTROL_FIELD_WEAKENING_H
 #define CONTROL_FIELD_WEAKENING_H

@@ -6,9 +6,8 @@
  *   ki   = w_c R T_s
  *   ff_d = -omega L_q i_q
  *   ff_q =  omega (L_d i_d + psi_m)
- * Voltage limit: voltage_circle.h; back-calculation: each integral follows the limited voltage, by ki / kp, at most 15/16 where a
- * winding is so quick that its current follows within a period, R T_s > L. Step
- * response 10-90 %: 0.35/f_c with little delay, 0.16/f_c at f_c = f_pwm/20; overshoot <= 10 % up to there.
+ * Voltage limit: voltage_circle.h; back-calculation: each integral follows the limited voltage by a share of ki / kp a period, 15/16
+ * where a current follows its voltage within one, R T_s > L. Step response 10-90 %: 0.35/f_c with little delay, 0.16/f_c at f_c = f_pwm/20; overshoot <= 10 % up to there.
  *
  * Cost: the reference of docs/performance.md. Functions as regulator.h says.
  * Tests: tests/unit/control/synchronous_pi_test.cpp, tests/contract/regulator_contract_test.cpp. */

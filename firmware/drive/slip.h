@@ -9,8 +9,8 @@
  * A slip is what stays beyond the middle between two answers of the source, with a margin, for 20 ms:
  *   of half a turn    along < -1/2 |omega| psi_m
  *   of a third        along <  1/4 |omega| psi_m, and the sign of `across` says which way
- What agrees with the estimate, along > 1/2 |omega| psi_m of a source of half a turn, is counted the same way: a pole that
- * is still asked for is then told (torque_polarity.h).
+ * An EMF that agrees, along > 1/2 |omega| psi_m, is counted in the same way: to a start that still looks for the pole it tells
+ * that (torque_polarity.h).
  *
  * L di/dt is left out: it passes within the 20 ms. Where |omega| psi_m < 0.4 R i, R 20 % off could count as a slip:
  * nothing is judged there.
@@ -43,9 +43,9 @@ typedef struct {
 } slip_in_t;
 
 typedef struct {
-    pm_q_t across; /* filtered */
-    uint16_t ms;   /* that it has lasted */
-    uint8_t count; /* resolved since slip_reset() */
+    pm_q_t across;     /* filtered */
+    uint16_t ms;       /* that it has lasted */
+    uint8_t count;     /* resolved since slip_reset() */
     uint8_t agrees_ms; /* so long the EMF has been that of the estimate, at most SLIP_MS */
 } slip_t;
 

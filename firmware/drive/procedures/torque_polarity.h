@@ -5,11 +5,11 @@
  * rotor has turned by 22.5 electrical degrees, then pulses of the opposite sign until it has come back by as much:
  *   d is the north    if it has turned forwards with +i_q and backwards with -i_q,
  *   d is the south    if it has turned backwards with +i_q and forwards with -i_q.
- * One of the two without the other is the load's doing, and decides nothing. What a rotor does that swings or turns by itself
- * says nothing of the torque: before the first pulse it has to stay within 5.6 degrees for 40 ms. Where it is so fast that the EMF
- * shows the pole (slip.h), that is it. Across the axis a current makes no torque of reluctance; on a vector that stands still (align.h)
- * it does, and with (L_q - L_d) i > psi_m the rotor rests to either side of it. The angle is looked at 8 ms after each pulse,
- * without current: with it, cross-saturation moves the axis that injection sees.
+ * One of the two without the other is the load's doing, and decides nothing. A rotor that swings or turns by itself says nothing of
+ * the torque: before the first pulse it has to stay within 5.6 degrees for 40 ms. Where it is so fast that the EMF shows the pole
+ * (slip.h), that is it. Across the axis a current makes no torque of reluctance; on a vector that stands still (align.h) it does,
+ * and with (L_q - L_d) i > psi_m the rotor rests to either side of it. The angle is looked at 8 ms after each pulse, without
+ * current: with it, cross-saturation moves the axis that injection sees.
  *
  * A rotor that comes off its friction is turned by one step too much; injection follows it, and it does not go far by itself, while
  *   3/2 p^2 psi_m step / J <= 1/16 rad (2 pi injection_bandwidth)^2
@@ -20,8 +20,8 @@
  * refused. Movement: 22.5 electrical degrees forth and what it goes on by itself, 105 at most for a free
  * IPM-1000. Peak current: what turns it, i_max at most and no more than injection may have, and the carrier.
  * PM_FAILED_NOT_TURNING: not within eight pulses of that; PM_FAILED_TURNED: by 135 degrees within a pulse, as a load or its own
- * speed does it, or it has not come to rest within a second; PM_FAILED_SALIENCY: the frame turns as fast as half of speed_trip, as one that nothing holds. No division. State
- * 16 bytes.
+ * speed does it, or not at rest within a second; PM_FAILED_SALIENCY: the frame turns as fast as half of speed_trip, as one that
+ * nothing holds. No division. State 16 bytes.
  * Tests: tests/unit/drive/torque_polarity_test.cpp, tests/scenario/start_fallback.yaml, start_weak_magnets.yaml. */
 #ifndef DRIVE_PROCEDURES_TORQUE_POLARITY_H
 #define DRIVE_PROCEDURES_TORQUE_POLARITY_H

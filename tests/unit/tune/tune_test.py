@@ -229,6 +229,16 @@ class Tune(unittest.TestCase):
         for name in MOTORS:
             self.assertEqual(self.tune(motor(name)).stderr, "", name)
 
+    def test_the_link_bears_the_energy_of_the_winding(self):
+        """3/2 L i^2 with i_max, which a bridge that opens gives back, up to v_dc_max; of most motors the ripple asks for more."""
+        told = {"name": "many turns", "electrical": {"R_s_ohm": 1.7, "L_d0_H": 0.052, "L_q0_H": 0.129, "psi_m_Wb": 0.083, "pole_pairs": 20},
+                "mechanics": {"J_kgm2": 0.0019}, "rated": {"i_rated_A": 0.52, "speed_rated_rad_s": 21, "v_dc_V": 72}}
+        found = yaml.safe_load(self.tune(told).stdout)
+        stored_J = 1.5 * 0.129 * found["drive"]["i_max"] ** 2
+        borne_J = found["dclink"]["c_F"] * (found["drive"]["v_dc_max"] ** 2 - 72 ** 2)
+        self.assertGreater(borne_J, 2 * stored_J)
+        self.assertLess(borne_J, 6 * stored_J)
+
     def drive(self, told, *words):
         return yaml.safe_load(self.tune(told, *words).stdout)["drive"]
 

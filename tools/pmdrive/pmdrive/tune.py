@@ -65,6 +65,9 @@ WHY = {
 }
 
 
+LINK_MOST = 1.33  # of the link's voltage: v_dc_max
+
+
 def _lost(x):
     """What a leg loses by dead time and drops, V."""
     return x["device_drop"] + x["dead_time"] * x["f_pwm"] * x["v_dc_nominal"]
@@ -213,7 +216,7 @@ def limits(x):
     return {
         "i_max": 1.25 * current, "i_trip": min(2.25 * current, 0.9 * i_scale), "speed_trip": 1.2 * speed,
         "v_dc_min": _v_dc_min(x), "v_dc_derate": min(1.2 * link, 0.88 * v_scale),
-        "v_dc_max": min(1.33 * link, 0.96 * v_scale),
+        "v_dc_max": min(LINK_MOST * link, 0.96 * v_scale),
     }
 
 
