@@ -52,6 +52,25 @@ Found look(unsigned traits, double ahead_deg, double omega, Complex i, double R 
     return look(self, traits, ahead_deg, omega, i, 200, R);
 }
 
+// The EMF tells the pole that is right, too: where it has been along q of the estimate for as long.
+TEST(Slip, AnEmfThatAgreesIsCounted)
+{
+    for (const double omega : {0.11, -0.11, 0.5}) {
+        slip_t self;
+        slip_reset(&self);
+        look(self, SOURCE_HALF_TURN, 20, omega, {0, 0.1}, SLIP_MS - 1);
+        EXPECT_EQ(self.agrees_ms, SLIP_MS - 1) << omega;
+        look(self, SOURCE_HALF_TURN, 20, omega, {0, 0.1}, 300);
+        EXPECT_EQ(self.agrees_ms, SLIP_MS) << omega;
+        look(self, SOURCE_HALF_TURN, 75, omega, {0, 0.1}, 1);
+        EXPECT_EQ(self.agrees_ms, 0) << omega;
+    }
+    slip_t slow;
+    slip_reset(&slow);
+    look(slow, SOURCE_HALF_TURN, 0, 0.09, {0, 0});
+    EXPECT_EQ(slow.agrees_ms, 0);
+}
+
 TEST(Slip, HalfATurnIsFoundWithinItsTime)
 {
     for (const double omega : {0.11, -0.11, 0.5, -0.5}) {

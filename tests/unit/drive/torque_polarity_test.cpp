@@ -175,4 +175,17 @@ TEST(TorquePolarity, WhatTheEmfHasShownStands)
     EXPECT_LE(std::abs(pm_angle_diff(x.drive().position.pll.theta, theta)), int32_t(PM_TURN(1.0 / 12)));
 }
 
+// One that it agrees with before the first pulse, is north without any.
+TEST(TorquePolarity, WhatTheEmfAgreesWithIsNorth)
+{
+    Start x(weak_magnets(), told(), 10 * kDegree);
+    x.run_to(PROCEDURE_torque_polarity);
+    ASSERT_EQ(x.drive().sequence.procedure, PROCEDURE_torque_polarity);
+    x.drive().position.slip.agrees_ms = SLIP_MS;
+    const pm_angle_t theta = x.drive().position.pll.theta;
+    EXPECT_LE(x.run_past(PROCEDURE_torque_polarity), 200) << "periods of 0.1 ms";
+    EXPECT_EQ(drive_status(&x.drive())->fault, DRIVE_FAULT_NONE);
+    EXPECT_LE(std::abs(pm_angle_diff(x.drive().position.pll.theta, theta)), int32_t(PM_TURN(1.0 / 12)));
+}
+
 } // namespace
