@@ -25,6 +25,12 @@ pm_q_t speed_control_step(speed_control_t *self, const speed_control_config_t *c
     return pm_narrow(u_limited);
 }
 
+void speed_control_follow(speed_control_t *self, const speed_control_config_t *config, pm_q_t i_q, pm_q_t i)
+{
+    const pm_q_t flows = pm_clamp(i, pm_min(i_q, 0), pm_max(i_q, 0));
+    self->pi.integral = pm_pi_following(&config->pi, self->pi.integral, pm_widen(flows - i_q));
+}
+
 /* By increments: the integral is what the last i_q has beyond its 2 kp e. */
 pm_q_t speed_control_below(speed_control_t *self, const speed_control_config_t *config, pm_q_t top,
                            pm_q_t omega, pm_q_t i_q)

@@ -3,7 +3,7 @@
  *   kp = w_s J / (1.5 P^2 psi_m)
  *   ki = kp w_s T / 4                        T: the step of 1 ms
  * per-unit: two real poles at half the bandwidth w_s when the current loop is fast. While the current limit
- * acts, the integral follows it (back-calculation). Runs at 1 kHz.
+ * acts, the integral follows it (back-calculation); where the voltage does not suffice for i_q, what flows. Runs at 1 kHz.
  *
  * A torque drives up to a speed and no further, by another such PI of twice the bandwidth, so that it acts late:
  *   e      = top - |omega|
@@ -38,6 +38,9 @@ void speed_control_reset(speed_control_t *self, pm_q_t omega, pm_q_t i_q);
 /* i_min <= result <= i_max; *limited: one of them acts. */
 pm_q_t speed_control_step(speed_control_t *self, const speed_control_config_t *config, pm_q_t target,
                           pm_q_t omega, pm_q_t i_min, pm_q_t i_max, bool *limited);
+
+/* For i_q, the last result, the voltage does not suffice: of i, the integral follows what has its sign, up to itself. */
+void speed_control_follow(speed_control_t *self, const speed_control_config_t *config, pm_q_t i_q, pm_q_t i);
 
 /* i_q, or what of it does not drive beyond +-top. The PI is left ready for speed control. */
 pm_q_t speed_control_below(speed_control_t *self, const speed_control_config_t *config, pm_q_t top,

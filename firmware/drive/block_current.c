@@ -40,7 +40,6 @@ void block_report(drive_t *drive, pm_q_t i_q)
     const pm_q_t v = pm_mul(pm_mul(self->current.u, drive->status.v_dc), PM_Q(1 / 1.6539866862653761));
     drive->v_next =
         pm_park_inverse((pm_dq_t){.d = 0, .q = self->six_step.reverse ? -v : v}, pm_dir(self->pll.theta));
-    drive->status.limits |= self->current.limited != 0U ? DRIVE_LIMIT_VOLTAGE : 0U;
 }
 
 static bool follows_duty(const drive_t *drive)
@@ -107,6 +106,7 @@ static void follow_duty(drive_t *drive, pm_q_t i_min, pm_q_t i_max)
 void block_follow(drive_t *drive)
 {
     block_t *self = &drive->block;
+    drive->status.limits |= self->current.limited != 0U ? DRIVE_LIMIT_VOLTAGE : 0U;
     if (drive->block_ms == 0U) { /* the ramp begins at the voltage that there is */
         self->duty = self->six_step.reverse ? -self->current.u : self->current.u;
     }

@@ -87,6 +87,9 @@ pm_q_t reference_torque(drive_t *drive, pm_q_t omega, pm_q_t i_min, pm_q_t i_max
         const pm_q_t target = pm_clamp(wanted, -c->omega_max, c->omega_max);
         drive->status.limits |= target != wanted ? DRIVE_LIMIT_SPEED : 0U;
         i_q = speed_control_step(&drive->speed, &c->speed, target, omega, i_min, i_max, &limited);
+        if ((drive->status.limits & (uint32_t)DRIVE_LIMIT_VOLTAGE) != 0U) {
+            speed_control_follow(&drive->speed, &c->speed, i_q, drive->status.i.q);
+        }
     }
     drive->status.limits |= limited ? DRIVE_LIMIT_CURRENT : 0U;
     return i_q;

@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <vector>
 
 #include "tests/contract/bench.h"
@@ -103,6 +105,47 @@ TEST(SpeedControl, FollowsTheDoubleModel)
         ASSERT_NEAR(a.omega, b.omega, kTrajectory) << k;
     }
     EXPECT_GT(held, 100);
+}
+
+// What the voltage leaves of the current that is wanted, either way; with it the speed passes by the target as it would from that
+// current, without it as from the limit.
+TEST(SpeedControl, IntegralFollowsWhatFlowsWhereVoltageDoesNotSuffice)
+{
+    const speed_control_config_t c = config();
+    const double kLimit = 0.8, kFlows = 0.2, kTarget = 0.3, kStands = 0.2;
+    for (const double sign : {1.0, -1.0}) {
+        std::map<bool, double> passed;
+        for (const bool follows : {false, true}) {
+            speed_control_t self = {};
+            speed_control_reset(&self, 0, 0);
+            double i = 0.0;
+            for (int k = 0; k < 5000; ++k) { // held below the target
+                i = step(self, c, sign * kTarget, sign * kStands, -kLimit, kLimit);
+                if (follows) {
+                    speed_control_follow(&self, &c, fixed(i, 28), fixed(sign * kFlows, 28));
+                }
+            }
+            const double wound = real(self.pi.integral, 22);
+            EXPECT_NEAR(sign * wound, follows ? kFlows : kLimit, 1e-3);
+            Shaft shaft{sign * kStands};
+            for (int k = 0; k < 2000; ++k) { // and let go
+                i = step(self, c, sign * kTarget, shaft.omega, -kLimit, kLimit);
+                shaft.run(i);
+                passed[follows] = std::max(passed[follows], sign * shaft.omega - kTarget);
+            }
+        }
+        EXPECT_LT(passed[true], 0.5 * passed[false]);
+    }
+    // what flows beyond the current that is wanted, or against it, is no lack of voltage
+    speed_control_t self = {};
+    for (const auto &[i, flows, to] :
+         {std::array{0.2, 0.5, 0.2}, {0.2, -0.3, 0.0}, {-0.2, -0.5, -0.2}, {-0.2, 0.3, 0.0}}) {
+        speed_control_reset(&self, 0, fixed(i, 28));
+        for (int k = 0; k < 5000; ++k) {
+            speed_control_follow(&self, &c, fixed(real(self.pi.integral, 22), 28), fixed(flows, 28));
+        }
+        EXPECT_NEAR(real(self.pi.integral, 22), to, 1e-3) << i << " " << flows;
+    }
 }
 
 TEST(SpeedControl, ReferenceIsARamp)
