@@ -40,6 +40,7 @@ MOTORS = {
     "servo": (1.2, 4e-3, 4.4e-3, 0.06, 4, 1e-4, 4, 314, 160),
     "compressor": (0.35, 6e-3, 11e-3, 0.09, 3, 8e-4, 12, 377, 310),
     "traction, linear": (0.02, 0.2e-3, 0.6e-3, 0.08, 4, 0.05, 150, 300, 350),
+    "servo light": (0.23, 0.15e-3, 0.245e-3, 7.4e-3, 10, 1.75e-4, 42, 555, 170),
     "washer, direct drive": (3.0, 16e-3, 18e-3, 0.09, 24, 0.05, 3, 30, 310),
 }
 C_A_WB5 = {"PM-SyRM, saturated": 1316}  # L_q at rated current is 0.55 of that without
@@ -442,6 +443,9 @@ class Tune(unittest.TestCase):
             if not own:
                 told["sensor"] = {"i_full_scale_A": 60.16, "v_full_scale_V": 34.28}
             tuned, page = Path(self.folder.name) / f"{n}.yaml", Path(self.folder.name) / f"{n}.bin"
+            if max(psi / 2, L_q, L_d) > 1.15:  # 2 Wb and 1 H are what the drive stores
+                self.refused(told, "and the drive's reaches from")
+                continue
             tuned.write_text(self.tune(told).stdout, encoding="utf-8")
             result = subprocess.run([PMSIM, "params", "--machine", str(tuned), "--page", str(page)], capture_output=True, text=True,
                                     check=False)
@@ -505,6 +509,31 @@ class Tune(unittest.TestCase):
         self.assertEqual(code, 0, text)
         code, text = self.run_seeds({**tuned, "drive": {**d, "flux_bandwidth": 42.8}}, BRAKE_LIGHT)
         self.assertRegex(text, "FAIL +angle_error_max_deg.* 0 of 3")
+
+    def test_injection_follows_a_light_rotor_as_far_as_its_noise_lets_it(self):
+        """0.8 of rated torque within 0.18 rad, w^2 = 0.8 / 0.18 p T / J, as far as the speed has the noise of the smallest answer that
+        leads, of two steps of the converter or four times its noise, with 25 Hz: w^1.5 in proportion to the answer."""
+        told = motor("servo light")
+        d = self.drive(told)
+        needed = math.sqrt(0.8 / 0.18 * 1.5 * 10 ** 2 * 7.4e-3 * 42 / 1.75e-4) / (2 * math.pi)
+        self.assertAlmostEqual(d["injection_bandwidth"], d["flux_bandwidth"], delta=0.01)
+        self.assertAlmostEqual(d["injection_bandwidth"], min(needed, 120), delta=0.01)
+        told["sensor"] = {"noise_lsb": 4.0}
+        noisy = self.drive(told)
+        board = yaml.safe_load(self.tune(told).stdout)
+        answer = noisy["v_injection"] * (1 / noisy["L_d"] - 1 / noisy["L_q"]) / (2 * board["inverter"]["f_pwm_Hz"])
+        smallest = 4 * 4.0 * 2 * board["sensor"]["i_full_scale_A"] / 4096
+        self.assertAlmostEqual(noisy["injection_bandwidth"], 25 * (answer / smallest) ** (2 / 3), delta=0.1)
+        self.assertLess(noisy["injection_bandwidth"], 0.7 * d["injection_bandwidth"])
+        told["mechanics"]["J_kgm2"] = 0.2  # which nothing moves so fast
+        self.assertEqual(self.drive(told)["injection_bandwidth"], 25)
+
+    def test_a_motor_beyond_what_the_drive_stores_is_refused(self):
+        """Two pole pairs for 400 V and 280 r/min: 6.2 Wb, and the drive's parameter ends at 2."""
+        told = motor("servo")
+        told["electrical"]["psi_m_Wb"] = 6.2
+        told["rated"].update(speed_rated_rad_s=30, v_dc_V=650)
+        self.refused(told, "psi_m is 6.2 Wb, and the drive's reaches from 0.0001 to 2")
 
     def test_speed_control_is_as_fast_as_a_light_rotor_needs(self):
         """A sixth of the position's loop, which README names, where that is beyond 10 Hz and the rotor's time asks for it."""

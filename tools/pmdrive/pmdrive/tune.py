@@ -14,7 +14,7 @@ SALIENT = 0.05  # the drive's own limit for injection
 MEASURED = 0.02 # of R, L_d, L_q, psi_m and J: what identification is off by
 TOLD = 0.15     # what a data sheet is
 STEPS = 4096    # of the converter
-INJECTION_HZ = 25.0  # of the position by injection: slow enough for the noise of the smallest answer that leads
+SLOWEST_HZ = 25.0    # of a position loop: by injection slow enough for the noise of the smallest answer that leads
 LAG = 0.12           # rad that the estimate may be behind an acceleration
 STALL_S = 0.6
 HAND_OVER = 0.08     # of rated speed: without injection, where nothing asks for more
@@ -35,10 +35,10 @@ WHY = {
     "v_dc_max": "133 % of the link, at most 96 % of the converter's range",
     "current_bandwidth": "a twentieth of f_pwm, a tenth with what saturation leaves of L_q; at most 1500 Hz, and what the link "
                          "drives a tenth of rated current with",
-    "injection_bandwidth": "slow enough for the noise of the smallest answer that leads",
+    "injection_bandwidth": "as flux_bandwidth, as far as the noise of the answer lets it, and a tenth of current_bandwidth; 25 Hz at least",
     "speed_bandwidth": "six times rated torque over the inertia at rated speed; below the position's loop, also with what "
                        "saliency adds to the torque; a gain that the drive's format has",
-    "acceleration": "0.3 of rated torque, over what saliency adds to it; at most what the slower position loop "
+    "acceleration": "0.3 of rated torque, over what saliency adds to it; at most what the position loop, of 25 Hz by injection, "
                     "follows 0.12 rad behind",
     "flux_bandwidth": "follows 0.8 of rated torque within 0.18 rad, well short of the 0.3 that count as lost; 25 to 120 Hz; a tenth of "
                       "current_bandwidth where saturation is what slows that",
@@ -89,15 +89,17 @@ def _flux_gain(x):
 def _injection(x, tolerance):
     """Seven steps of the converter as an answer 45 degrees off, and fourteen times what a leg loses, which at light load
     comes and goes with the carrier; as far as the link leaves room. Half a step of its current adds to i_max and stays below 0.9 of
-    i_trip, and a quarter of rated current is left to it whatever i_max is. And whether it may lead."""
+    i_trip, and a quarter of rated current is left to it whatever i_max is. Whether it may lead, and the fastest loop of the position by
+    it, Hz: the noise of the speed goes with w^1.5 / answer, and is that of the smallest answer which leads."""
     step, dL = 2 * x["i_full_scale"] / STEPS, x["L_q"] - x["L_d"]
     beside = max(0.9 * limits(x)["i_trip"] - x["i_max"], 0.25 * x["i_rated"])
     top = min(largest_carrier(x), 2 * x["L_d"] * x["f_pwm"] * beside)
     if dL <= max(SALIENT, 2 * tolerance / (1 + tolerance)) * x["L_q"]:  # both may be off, either way
-        return 0.2 * top, False
+        return 0.2 * top, False, SLOWEST_HZ
     v = max(7 * step * 2 * x["L_d"] * x["L_q"] * x["f_pwm"] / dL, 14 * _lost(x))
     answer = min(v, top) * dL / (2 * x["L_d"] * x["L_q"] * x["f_pwm"])
-    return min(v, top), answer > max(4 * x["i_noise"], 2 * step)
+    smallest = max(4 * x["i_noise"], 2 * step)
+    return min(v, top), answer > smallest, SLOWEST_HZ * max(answer / smallest, 1.0) ** (2 / 3)
 
 
 def _open_loop(x):
@@ -229,21 +231,22 @@ def values(x, bandwidth=None, tolerance=MEASURED):
     rated_speed = 0.8 * x["speed_max"]
     torque = 1.5 * x["pole_pairs"] * x["psi_m"] * x["i_rated"]
     jerk = torque / x["J"]  # rad/s2 at rated torque
-    v_injection, leads = _injection(x, tolerance)
+    v_injection, leads, fastest_Hz = _injection(x, tolerance)
     saturated = highest * x["L_qh_rated"] / x["L_q"]
     current = bandwidth or min(x["f_pwm"] / 20, saturated, 1500.0, _reach(x))
     quick = saturated / 10 if saturated < x["f_pwm"] / 20 else 120.0  # the frame turns slower than current control in it can follow
-    position_Hz = min(max(min(math.sqrt(0.8 / 0.18 * jerk * x["pole_pairs"]) / (2 * math.pi), quick), 25.0), 120.0)
-    slower = min(position_Hz, INJECTION_HZ) if leads else position_Hz
+    position_Hz = min(max(min(math.sqrt(0.8 / 0.18 * jerk * x["pole_pairs"]) / (2 * math.pi), quick), SLOWEST_HZ), 120.0)
+    injection_Hz = max(min(position_Hz, fastest_Hz, current / 10), SLOWEST_HZ)
+    slower = SLOWEST_HZ if leads else position_Hz
     behind = LAG * (2 * math.pi * slower) ** 2 / x["pole_pairs"]
     ripple = x["v_dc_nominal"] / (x["L_d"] * x["f_pwm"])  # of the current by the pulses: light load must be beyond it
     i_open = _open_loop(x)
     low, high = _hand_over(x, i_open, leads, tolerance)
     out = {
         "current_bandwidth": current,
-        "injection_bandwidth": INJECTION_HZ,
+        "injection_bandwidth": injection_Hz,
         "speed_bandwidth": min(max(6 * jerk / rated_speed / (2 * math.pi), 2.0),
-                               INJECTION_HZ / 3.5 / _reluctance(x) if leads else max(10.0, position_Hz / 6), _stiffest(x)),
+                               SLOWEST_HZ / 3.5 / _reluctance(x) if leads else max(10.0, position_Hz / 6), _stiffest(x)),
         "acceleration": min(0.3 * jerk / _reluctance(x), behind),
         "flux_bandwidth": position_Hz,
         "flux_gain": _flux_gain(x),
