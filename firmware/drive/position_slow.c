@@ -9,6 +9,8 @@
 /* The position counts as lost when the mean error signal reaches 0.3 rad or the model is off by 0.5. */
 #define PER_EPS_LOST    PM_Q(1.0 / 0.3)
 #define PER_MISFIT_LOST 2
+/* Of a rotor that is not where the source says: a fifth of the time is enough to be lost. */
+#define EPS_AWAY PM_Q(2.0)
 /* Noise of a single error signal: 3 ms. */
 #define K_NOISE PM_FRAC(0.3)
 /* The same of a source that is right in the mean over a sixth of a turn: 64 ms. */
@@ -173,9 +175,17 @@ pm_angle_t position_resolve_slip(position_t *self, const position_config_t *conf
     if (traits == 0U) {
         return 0;
     }
-    const slip_in_t in = {
-        .traits = traits, .omega_least = config->omega_low, .omega = self->pll.omega, .v = v, .i = i_dq};
-    const pm_angle_t turn = slip_slow(&self->slip, machine, &in);
+    const slip_in_t in = {.traits = traits,
+                          .omega_least = config->omega_low,
+                          .omega_most = config->omega_high,
+                          .omega = self->pll.omega,
+                          .v = v,
+                          .i = i_dq};
+    bool away;
+    const pm_angle_t turn = slip_slow(&self->slip, machine, &in, &away);
+    if (away && self->inject) {
+        (void)pm_lp1(&self->eps_mean, EPS_AWAY, K_MEAN);
+    }
     if (turn != 0U) {
         position_turn(self, config, turn, i);
     }

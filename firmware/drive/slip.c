@@ -19,7 +19,7 @@ static pm_angle_t resolved(slip_t *self, bool half)
     return self->across > 0 ? PM_TURN(1.0 / 3) : PM_TURN(2.0 / 3);
 }
 
-pm_angle_t slip_slow(slip_t *self, const pm_machine_t *machine, const slip_in_t *in)
+pm_angle_t slip_slow(slip_t *self, const pm_machine_t *machine, const slip_in_t *in, bool *away)
 {
     const pm_machine_t *m = machine;
     const pm_dq_t i = in->i;
@@ -31,6 +31,7 @@ pm_angle_t slip_slow(slip_t *self, const pm_machine_t *machine, const slip_in_t 
     const pm_q_t e_d = in->v.d - pm_mul(m->R_s, i.d) + pm_mul(omega, pm_mul(m->L_q, i.q));
     const pm_q_t e_q = in->v.q - pm_mul(m->R_s, i.q) - pm_mul(omega, pm_mul(m->L_d, i.d));
     const pm_q_t along = omega < 0 ? -e_q : e_q;
+    *away = pm_abs(e_d) + pm_abs(e_q) > 3 * pm_mul(in->omega_most, m->psi_m) + least;
     (void)pm_lp1(&self->across, omega < 0 ? e_d : -e_d, K_ACROSS);
     const bool judged = (half || third) && pm_abs(omega) >= in->omega_least && emf >= least;
     const bool beyond = judged && along < (half ? -emf / 2 : emf / 4);

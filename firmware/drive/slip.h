@@ -12,6 +12,11 @@
  * An EMF that agrees, along > 1/2 |omega| psi_m, is counted in the same way: to a start that still looks for the pole it tells
  * that (torque_polarity.h).
  *
+ * A rotor that has run away from its source turns in the estimated frame, and so does its EMF:
+ *   |e_d| + |e_q| > 3 omega_most psi_m + 0.4 R (|i_d| + |i_q|)
+ * where one that the source follows has at most the root of 2 of omega_most psi_m. The beat of the two speeds hides it now and
+ * then; what counts is the mean (position.h).
+ *
  * L di/dt is left out: it passes within the 20 ms. Where |omega| psi_m < 0.4 R i, R 20 % off could count as a slip:
  * nothing is judged there.
  *
@@ -37,6 +42,7 @@ typedef struct {
 typedef struct {
     uint32_t traits;    /* of the low-speed source */
     pm_q_t omega_least; /* from where the EMF is a witness */
+    pm_q_t omega_most;  /* up to where the source has a part in the lead */
     pm_q_t omega;       /* electrical */
     pm_dq_t v;          /* mean voltage of the period, Q28, and ... */
     pm_dq_t i;          /* ... current, both in the estimated frame */
@@ -51,8 +57,9 @@ typedef struct {
 
 void slip_reset(slip_t *self);
 
-/* What is to be added to the estimated angle: 0, half a turn, or a third either way. */
-pm_angle_t slip_slow(slip_t *self, const pm_machine_t *machine, const slip_in_t *in);
+/* What is to be added to the estimated angle: 0, half a turn, or a third either way. *away: the rotor turns faster than the source
+ * can lead. */
+pm_angle_t slip_slow(slip_t *self, const pm_machine_t *machine, const slip_in_t *in, bool *away);
 
 #ifdef __cplusplus
 }

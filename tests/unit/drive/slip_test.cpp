@@ -20,7 +20,7 @@ using bench::kPi;
 constexpr double kR = 0.13, kL_d = 0.5, kL_q = 0.9, kPsi = 0.28;
 
 const pm_machine_t kMachine = {fixed(kR, 28), fixed(kPsi, 28), fixed(kL_d, 28), fixed(kL_q, 28)};
-constexpr double kLeast = 0.1; // of the speed
+constexpr double kLeast = 0.1, kMost = 0.2; // of the speed
 
 // Periods of 1 kHz until a slip is found, of `most`; the rotor is ahead of the estimate by `ahead_deg`.
 struct Found {
@@ -36,8 +36,10 @@ Found look(slip_t &self, unsigned traits, double ahead_deg, double omega, Comple
     const Complex psi = {kPsi + kL_d * i_rotor.real(), kL_q * i_rotor.imag()};
     const Complex v = (R * i_rotor + kJ * omega * psi) * turned;
     for (int ms = 1; ms <= most; ++ms) {
-        const slip_in_t in = {traits, fixed(kLeast, 28), fixed(omega, 28), bench::dq(v), bench::dq(i)};
-        const pm_angle_t turn = slip_slow(&self, &kMachine, &in);
+        const slip_in_t in = {traits,           fixed(kLeast, 28), fixed(kMost, 28),
+                              fixed(omega, 28), bench::dq(v),      bench::dq(i)};
+        bool away;
+        const pm_angle_t turn = slip_slow(&self, &kMachine, &in, &away);
         if (turn != 0U) {
             return {ms, bench::rad(turn) / kDegree};
         }
@@ -69,6 +71,53 @@ TEST(Slip, AnEmfThatAgreesIsCounted)
     slip_reset(&slow);
     look(slow, SOURCE_HALF_TURN, 0, 0.09, {0, 0});
     EXPECT_EQ(slow.agrees_ms, 0);
+}
+
+// Whether the rotor counts as away; it turns with omega, ahead of an estimate that turns with `estimated`.
+bool away(double omega, double estimated, double ahead_deg, Complex i, double R = kR)
+{
+    const Complex turned = std::polar(1.0, ahead_deg * kDegree);
+    const Complex i_rotor = i / turned;
+    const Complex psi = {kPsi + kL_d * i_rotor.real(), kL_q * i_rotor.imag()};
+    const Complex v = (R * i_rotor + kJ * omega * psi) * turned;
+    const slip_in_t in = {SOURCE_HALF_TURN,     fixed(kLeast, 28), fixed(kMost, 28),
+                          fixed(estimated, 28), bench::dq(v),      bench::dq(i)};
+    slip_t self;
+    slip_reset(&self);
+    bool away = false;
+    slip_slow(&self, &kMachine, &in, &away);
+    return away;
+}
+
+// Up to where the source leads and beyond, 30 degrees off, with R 40 % off and any current up to rated.
+TEST(Slip, ARotorThatIsFollowedIsNotAway)
+{
+    for (const double omega : {0.0, 0.1, 1.1 * kMost, -1.1 * kMost}) {
+        for (const double ahead_deg : {-30.0, 0.0, 30.0}) {
+            for (const Complex i :
+                 {Complex{0, 0}, Complex{-0.1, 0.35}, Complex{-0.1, -0.35}, Complex{0.2, 0.1}}) {
+                for (const double share : {0.6, 1.0, 1.4}) {
+                    EXPECT_FALSE(away(omega, omega, ahead_deg, i, share * kR))
+                        << omega << ' ' << ahead_deg << i;
+                }
+            }
+        }
+    }
+}
+
+// At any angle, whatever the estimate says; the currents that its beat drives hide it for less than half of that.
+TEST(Slip, ARotorThatRunsAwayIsSeen)
+{
+    for (const double omega : {4 * kMost, -4 * kMost}) {
+        for (const double estimated : {0.0, 0.5 * kMost, -kMost}) {
+            int seen = 0;
+            for (int deg = 0; deg < 360; ++deg) {
+                EXPECT_TRUE(away(omega, estimated, deg, {0, 0})) << omega << ' ' << deg;
+                seen += away(omega, estimated, deg, {-0.1, 0.3}) ? 1 : 0;
+            }
+            EXPECT_GT(seen, 180) << omega << ' ' << estimated;
+        }
+    }
 }
 
 TEST(Slip, HalfATurnIsFoundWithinItsTime)

@@ -19,6 +19,7 @@ SCENARIO = Path(__file__).with_name("start.yaml")
 SATURATED = Path(__file__).with_name("saturated.yaml")
 BRAKE = Path(__file__).with_name("brake.yaml")
 BRAKE_LIGHT = Path(__file__).with_name("brake_light.yaml")
+OUTRUN = Path(__file__).with_name("outrun.yaml")
 PMSIM = None
 sys.path.insert(0, str(ROOT / "tools"))
 import tune  # noqa: E402
@@ -527,6 +528,10 @@ class Tune(unittest.TestCase):
         self.assertLess(noisy["injection_bandwidth"], 0.7 * d["injection_bandwidth"])
         told["mechanics"]["J_kgm2"] = 0.2  # which nothing moves so fast
         self.assertEqual(self.drive(told)["injection_bandwidth"], 25)
+
+    def test_a_light_rotor_that_a_load_tears_away_is_lost_at_once(self):
+        code, text = self.run_seeds(yaml.safe_load(self.tune(motor("servo light")).stdout), OUTRUN)
+        self.assertEqual(code, 0, text)
 
     def test_a_motor_beyond_what_the_drive_stores_is_refused(self):
         """Two pole pairs for 400 V and 280 r/min: 6.2 Wb, and the drive's parameter ends at 2."""
