@@ -460,7 +460,7 @@ def two_bridges(x, machine, r_on):
     return out
 
 
-OBSERVED = ("R_s", "L_d", "L_q", "psi_m")
+OBSERVED = {"L_d": 2.2, "L_q": 2.2, "psi_m": 1.4}
 ONE_BRIDGE = {"flying_start": (0.0, "a catch knows one bridge")}
 
 
@@ -531,15 +531,15 @@ def sine(x, d):
 
 
 def stored(name, value, why):
-    """As the drive keeps it: four digits in whole steps, within its range. What the observers count with must be what the motor has."""
+    """As the drive keeps it: four digits in whole steps, within its range. What the observers count with may be off by so much."""
     if why == "told":
         return value, why
     entry = names.find(name)
     raw = entry.raw(Decimal(repr(float(f"{value:.4g}"))))
     within = min(max(raw, entry.least), entry.most)
-    if name in OBSERVED and abs(within - raw) > tune.TOLD * raw:
+    if name in OBSERVED and not 1 / OBSERVED[name] <= within / raw <= OBSERVED[name]:
         raise UsageError(f"{name} is {value:.4g} {entry.unit}, and the drive's reaches from {float(entry.least * entry.scale):g} to "
-                         f"{float(entry.most * entry.scale):g}", "the drive cannot run this motor without a sensor")
+                         f"{float(entry.most * entry.scale):g}", "the drive counts with it, and does not run this motor")
     return float(within * entry.scale), why if within == raw else why + ("; no less" if within > raw else "; no more") + " is stored"
 
 

@@ -369,6 +369,20 @@ class Tune(unittest.TestCase):
             self.assertEqual(share < 0.4, name != "hub motor")
             self.assertAlmostEqual(d["open_loop_damping"], 0.7 * min(1, share / 0.4), delta=0.001)
 
+    def test_slow_current_control_is_no_swing(self):
+        """12 V before 17 mH: 219 Hz, which leave a quarter of a step of the voltage after 1 ms. Twin: with 0.7 the vector yields to what
+        is its own."""
+        told = {"name": "slow", "electrical": {"R_s_ohm": 0.038, "L_d0_H": 16.6e-3, "L_q0_H": 26.5e-3, "psi_m_Wb": 0.1, "pole_pairs": 1},
+                "mechanics": {"J_kgm2": 5.1e-4}, "rated": {"i_rated_A": 1.76, "speed_rated_rad_s": 27.7, "v_dc_V": 11.1}}
+        d = self.drive(told)
+        self.assertEqual(d["start_method"], 2)
+        self.assertLess(d["current_bandwidth"], 250)
+        self.assertAlmostEqual(d["open_loop_damping"], 0.4 / 6 * math.exp(2e-3 * math.pi * d["current_bandwidth"]), delta=0.001)
+        tuned = yaml.safe_load(self.tune(told).stdout)
+        self.runs_into(tuned, "NONE")
+        tuned["drive"]["open_loop_damping"] = 0.7
+        self.assertEqual(self.run_seeds(tuned, SCENARIO)[0], 1)
+
     def test_a_field_that_turns_fast_keeps_its_periods(self):
         """13 of a turn at the speed that trips, whatever dead time takes."""
         told = motor("60,000 r/min spindle")
@@ -444,7 +458,7 @@ class Tune(unittest.TestCase):
             if not own:
                 told["sensor"] = {"i_full_scale_A": 60.16, "v_full_scale_V": 34.28}
             tuned, page = Path(self.folder.name) / f"{n}.yaml", Path(self.folder.name) / f"{n}.bin"
-            if max(psi / 2, L_q, L_d) > 1.15:  # 2 Wb and 1 H are what the drive stores
+            if psi > 1.4 * 2 or max(L_q, L_d) > 2.2 * 1:  # 2 Wb and 1 H are what the drive stores
                 self.refused(told, "and the drive's reaches from")
                 continue
             tuned.write_text(self.tune(told).stdout, encoding="utf-8")

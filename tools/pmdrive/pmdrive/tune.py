@@ -55,7 +55,8 @@ WHY = {
     "start_method": "0: pulses and injection, as the saliency is sure and seen; 2: align and open loop, as it is not",
     "i_open_loop": "0.8 of rated, bears half the rated torque 39 degrees behind; at most psi_m/(2 (L_q - L_d)), or saliency "
                    "turns the rotor away",
-    "open_loop_damping": "0.7; less where dead time and drops take more of a leg than 2.5 times the EMF of a rotor that swings",
+    "open_loop_damping": "0.7; less where dead time and drops take more of a leg than 2.5 times the EMF of a rotor that swings, or "
+                         "current control is slower than 370 Hz",
     "t_align": "half a second, three swings of the rotor on the vector at least",
     "t_stall": "a fault well within a second of a rotor that does not turn",
     "six_step_speed": "10 % of rated, where an open terminal shows its EMF",
@@ -108,11 +109,15 @@ def _open_loop(x):
     return min(i, x["psi_m"] / (2 * dL)) if dL > 0 else i
 
 
-def _damping(x, i_open):
+def _damping(x, i_open, current_Hz):
     """Of the rotor on the vector. It sees the swing by its EMF, psi_m times the swing's frequency at an amplitude of a radian; what
-    dead time and drops leave beside that is noise, which damping would turn into motion."""
-    swing = x["psi_m"] * _swing(x, i_open)
-    return 0.7 * min(1.0, swing / (0.4 * _lost(x))) if _lost(x) > 0 else 0.7
+    dead time and drops leave beside that is noise, which damping would turn into motion. And when the vector yields, the drive puts
+    psi_m times that before the current control, which takes it back: what is left of it after a step of 1 ms is seen as a swing, and
+    is to be yielded to by 0.4 of itself at most (firmware/drive/open_loop_config.c has the gain)."""
+    swing = _swing(x, i_open)
+    gain = min(6.0, 0.8 / (1e-3 * swing))
+    left = gain * math.exp(-2 * math.pi * current_Hz * 1e-3)
+    return min(0.7 * min(1.0, x["psi_m"] * swing / (0.4 * _lost(x))) if _lost(x) > 0 else 0.7, 0.4 / left)
 
 
 def _judged(x):
@@ -259,7 +264,7 @@ def values(x, bandwidth=None, tolerance=MEASURED):
         "i_pulse": x["i_rated"],
         "start_method": 0 if leads else 2,
         "i_open_loop": i_open,
-        "open_loop_damping": _damping(x, i_open),
+        "open_loop_damping": _damping(x, i_open, current),
         "t_align": min(max(0.5, 3 * 2 * math.pi / _swing(x, i_open)), 10.0),
         "open_loop_acceleration": min(0.1 * jerk, high / 0.6),
         "t_stall": STALL_S,
