@@ -2,9 +2,9 @@
 
 #include "firmware/math/root.h"
 
-int32_t mras_inverse(const mras_config_t *config, pm_q_t E)
+int32_t mras_inverse(pm_q_t E, pm_q_t least)
 {
-    const pm_q_t size = pm_max(pm_abs(E), config->emf_min);
+    const pm_q_t size = pm_max(pm_abs(E), least);
     return pm_div(pm_div(E, size) / 64, size); /* Q28 of a 64th is Q22 */
 }
 

@@ -14,7 +14,8 @@
  * The error signal is divided by E through the factor
  *   E / max(|E|, emf_min)^2
  * so its sign is right in both directions and it fades to zero at standstill, where there is no EMF. The
- * factor is renewed at 1 kHz.
+ * factor is renewed at 1 kHz. While another source leads, emf_tied stands for emf_min, so that voltage errors act as in a flux that
+ * is tied to the position.
  *
  * Wrong parameters (3.5.1, row 28), d = machine minus model: the angle errs, to first order, by
  *   asin[(dR i_d - omega dL_q i_q) / (omega psi_a)]
@@ -37,13 +38,20 @@ extern "C" {
 
 typedef struct {
     observer_model_t model;
-    pm_frac_t k;    /* bandwidth of the adapted quantity times T_s, Q32 */
-    pm_q_t emf_min; /* > 0: below this |E| the error signal fades */
-    pm_frac_t turn; /* w_base T_slow / n: radians per slow step over those of the lag, Q32, < 0.5 */
+    pm_frac_t k;     /* bandwidth of the adapted quantity times T_s, Q32 */
+    pm_q_t emf_min;  /* > 0: below this |E| the error signal fades ... */
+    pm_q_t emf_tied; /* ... and below this, at least as much, while another source leads */
+    pm_frac_t turn;  /* w_base T_slow / n: radians per slow step over those of the lag, Q32, < 0.5 */
 } mras_config_t;
 
-/* E / max(|E|, emf_min)^2, Q22 (+-512). */
-int32_t mras_inverse(const mras_config_t *config, pm_q_t E);
+/* E / max(|E|, least)^2, Q22 (+-512). */
+int32_t mras_inverse(pm_q_t E, pm_q_t least);
+
+/* Of these the one that the weight asks for. */
+static inline pm_q_t mras_least(const mras_config_t *config, pm_q_t weight)
+{
+    return weight == 0 ? config->emf_tied : config->emf_min;
+}
 
 /* w_f of the next slow step. */
 pm_q_t mras_speed(const mras_config_t *config, pm_q_t filtered, const obs_in_t *in, pm_q_t weight);

@@ -13,7 +13,10 @@ void make_mras(maker_t *m, mras_config_t *c)
     (void)fixed(m, pm_num_div(L, step), 24, DRIVE_PARAM_L_d);
     (void)fixed(m, pm_num_div(step, L), 30, DRIVE_PARAM_L_d);
     c->k = fixed(m, mul3(PM_NUM_TWO_PI, pm_num(50), m->base.t_s), FRAC_BITS, DRIVE_PARAM_f_pwm);
+    const pm_q_t tied =
+        fixed(m, least(pm_num_div(OBSERVER_TIE, m->base.omega), pm_num(1)), Q_BITS, DRIVE_PARAM_speed_trip);
     c->emf_min = pm_max(1, pm_mul(speed(m, DRIVE_PARAM_speed_low) / 4, c->model.psi_m));
+    c->emf_tied = pm_max(c->emf_min, pm_mul(tied, c->model.psi_m));
     const pm_num_t dL = pm_num_sub(si(m, DRIVE_PARAM_L_q), si(m, DRIVE_PARAM_L_d));
     const pm_num_t saliency = pm_num_sqrt(square(dL)); /* of either sign */
     const pm_num_t needed =

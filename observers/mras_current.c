@@ -5,7 +5,8 @@
 
 #define ONE_Q30 PM_FRAC(0.25)
 
-static void set_operating_point(mras_current_t *self, const mras_current_config_t *config, const obs_in_t *in)
+static void set_operating_point(mras_current_t *self, const mras_current_config_t *config, const obs_in_t *in,
+                                pm_q_t least)
 {
     const observer_model_t *m = &config->model;
     const pm_q_t rise = pm_div(m->t_s / 16, m->L_d); /* T_s / L_d */
@@ -20,8 +21,8 @@ static void set_operating_point(mras_current_t *self, const mras_current_config_
     self->emf_per_change = pm_div(PM_ONE / 16, b); /* Q28 of a sixteenth is Q24 */
     self->adapt = pm_shl(pm_sat(pm_mulh(self->emf_per_change, config->k), 26), 4); /* < 4 */
     self->emf_model = pm_mul(in->omega, observer_active_flux(m, in->i_dq));
-    self->inverse_model = mras_inverse(config, self->emf_model);
-    self->inverse = mras_inverse(config, self->emf);
+    self->inverse_model = mras_inverse(self->emf_model, least);
+    self->inverse = mras_inverse(self->emf, least);
 }
 
 void mras_current_tie(mras_current_t *self, const mras_current_config_t *config)
@@ -36,7 +37,7 @@ void mras_current_reset(mras_current_t *self, const mras_current_config_t *confi
 {
     *self = (mras_current_t){.i = in->i, .omega_f = in->omega};
     self->emf = pm_mul(in->omega, observer_active_flux(&config->model, in->i_dq));
-    set_operating_point(self, config, in);
+    set_operating_point(self, config, in, config->emf_min);
     self->adapt = 0;
 }
 
@@ -89,7 +90,7 @@ void mras_current_slow(mras_current_t *self, const mras_current_config_t *config
     if (weight == 0) {
         self->emf = pm_mul(in->omega, observer_active_flux(&config->model, in->i_dq));
     }
-    set_operating_point(self, config, in);
+    set_operating_point(self, config, in, mras_least(config, weight));
     if (weight == 0) {
         self->adapt = 0;
     }

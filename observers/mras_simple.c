@@ -9,11 +9,12 @@ static int32_t over_emf(pm_q_t x, int32_t inverse)
     return pm_shl(pm_sat(pm_mulh(pm_shl(pm_sat(x, 30), 1), inverse), 26), 5);
 }
 
-static void set_operating_point(mras_simple_t *self, const mras_simple_config_t *config, const obs_in_t *in)
+static void set_operating_point(mras_simple_t *self, const mras_simple_config_t *config, const obs_in_t *in,
+                                pm_q_t least)
 {
     const observer_model_t *m = &config->model;
     self->emf = pm_mul(self->omega, observer_active_flux(m, in->i_dq));
-    const int32_t inverse = mras_inverse(config, self->emf);
+    const int32_t inverse = mras_inverse(self->emf, least);
     self->inverse = over_emf(PM_ONE, inverse);
     self->resistive = over_emf(m->R, inverse);
     const int32_t per_change = pm_div(observer_L_q(m, in->i_dq), m->t_s); /* L_q / T_s, Q24 */
@@ -35,7 +36,7 @@ void mras_simple_tie(mras_simple_t *self, const mras_simple_config_t *config)
 void mras_simple_reset(mras_simple_t *self, const mras_simple_config_t *config, const obs_in_t *in)
 {
     *self = (mras_simple_t){.i = in->i, .omega = in->omega};
-    set_operating_point(self, config, in);
+    set_operating_point(self, config, in, config->emf_min);
     const int32_t half_turn = mras_half_turn(config, in->omega);
     const pm_q_t v_q = self->emf + pm_mul(config->model.R, in->i_dq.q);
     self->v_d = pm_half(pm_mul(config->model.R, in->i_dq.d) + pm_mulh(v_q, half_turn));
@@ -87,5 +88,5 @@ void mras_simple_slow(mras_simple_t *self, const mras_simple_config_t *config, c
 {
     (void)out;
     self->omega = mras_speed(config, self->omega, in, weight);
-    set_operating_point(self, config, in);
+    set_operating_point(self, config, in, mras_least(config, weight));
 }

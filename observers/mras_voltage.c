@@ -5,7 +5,8 @@
 
 #define ONE_Q24 PM_FRAC(1.0 / 256)
 
-static void set_operating_point(mras_voltage_t *self, const mras_voltage_config_t *config, const obs_in_t *in)
+static void set_operating_point(mras_voltage_t *self, const mras_voltage_config_t *config, const obs_in_t *in,
+                                pm_q_t least)
 {
     const observer_model_t *m = &config->model;
     const pm_q_t psi_a = pm_max(observer_active_flux(m, in->i_dq), PM_Q(1.0 / 128));
@@ -15,9 +16,9 @@ static void set_operating_point(mras_voltage_t *self, const mras_voltage_config_
     self->half = mras_half_turn(config, in->omega);
     self->psi = psi_a / 32;
     self->adapt = pm_min(pm_div(config->k / 16, psi_a), PM_ONE); /* D_q is clamped to 2: no step above 2 */
-    self->inverse = mras_inverse(config, pm_mul(self->omega, psi_a));
+    self->inverse = mras_inverse(pm_mul(self->omega, psi_a), least);
     self->omega_loop = in->omega;
-    self->inverse_omega = mras_inverse(config, in->omega);
+    self->inverse_omega = mras_inverse(in->omega, least);
 }
 
 void mras_voltage_tie(mras_voltage_t *self, const mras_voltage_config_t *config)
@@ -31,7 +32,7 @@ void mras_voltage_tie(mras_voltage_t *self, const mras_voltage_config_t *config)
 void mras_voltage_reset(mras_voltage_t *self, const mras_voltage_config_t *config, const obs_in_t *in)
 {
     *self = (mras_voltage_t){.i = in->i, .omega = in->omega, .omega_f = in->omega};
-    set_operating_point(self, config, in);
+    set_operating_point(self, config, in, config->emf_min);
     self->adapt = 0;
 }
 
@@ -81,7 +82,7 @@ void mras_voltage_slow(mras_voltage_t *self, const mras_voltage_config_t *config
     if (weight == 0) {
         self->omega = in->omega;
     }
-    set_operating_point(self, config, in);
+    set_operating_point(self, config, in, mras_least(config, weight));
     if (weight == 0) {
         self->adapt = 0;
     }

@@ -9,8 +9,8 @@
 /* The position counts as lost when the mean error signal reaches 0.3 rad or the model is off by 0.5. */
 #define PER_EPS_LOST    PM_Q(1.0 / 0.3)
 #define PER_MISFIT_LOST 2
-/* Of a rotor that is not where the source says: a fifth of the time is enough to be lost. */
-#define EPS_AWAY PM_Q(2.0)
+/* Of a rotor that is not where the source says: half of the time is enough to be lost. */
+#define EPS_AWAY PM_ONE
 /* Noise of a single error signal: 3 ms. */
 #define K_NOISE PM_FRAC(0.3)
 /* The same of a source that is right in the mean over a sixth of a turn: 64 ms. */
