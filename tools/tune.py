@@ -485,6 +485,7 @@ def drive(x, board, tolerance):
     machine.update(bridges)
     known = {name: told.get(name, value) for name, (value, _) in machine.items()}
     known["commutation"] = told.get("commutation", 0)
+    known["injection"] = told.get("injection", tune.SQUARE)
     known.update(from_board(x, {}, board))
     out = dict(machine)
     for name, value in tune.limits(known).items():

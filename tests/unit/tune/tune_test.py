@@ -540,6 +540,9 @@ class Tune(unittest.TestCase):
         smallest = 4 * 4.0 * 2 * board["sensor"]["i_full_scale_A"] / 4096
         self.assertAlmostEqual(noisy["injection_bandwidth"], 25 * (answer / smallest) ** (2 / 3), delta=0.1)
         self.assertLess(noisy["injection_bandwidth"], 0.7 * d["injection_bandwidth"])
+        told["drive"] = {"injection": 2}  # another source, whose window bounds it
+        self.assertEqual(self.drive(told)["injection_bandwidth"], 25)
+        del told["drive"]
         told["mechanics"]["J_kgm2"] = 0.2  # which nothing moves so fast
         self.assertEqual(self.drive(told)["injection_bandwidth"], 25)
 

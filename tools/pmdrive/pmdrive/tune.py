@@ -9,7 +9,8 @@ from .errors import NotInImage, UsageError
 BOARD = ("f_pwm", "i_full_scale", "v_full_scale", "i_noise", "dead_time", "device_drop")
 MACHINE = ("pole_pairs", "i_rated", "i_max", "speed_max", "v_dc_nominal", "v_dc_min", "R_s", "L_d", "L_q", "L_q_rated",
            "L_qh_rated", "psi_m", "J")
-BLOCKS = ("commutation", "leg_capacitance")
+BESIDE = ("commutation", "leg_capacitance", "injection")  # where the image has them
+SQUARE = 0      # of `injection`: the source whose loop nothing but its noise bounds
 SALIENT = 0.05  # the drive's own limit for injection
 MEASURED = 0.02 # of R, L_d, L_q, psi_m and J: what identification is off by
 TOLD = 0.15     # what a data sheet is
@@ -228,7 +229,7 @@ def limits(x):
 
 
 def values(x, bandwidth=None, tolerance=MEASURED):
-    """{name: SI value} from {name: SI value} of BOARD and MACHINE, and BLOCKS where commutation is 1. Bandwidth of the current control in Hz; tolerance: by
+    """{name: SI value} from {name: SI value} of BOARD and MACHINE, and of BESIDE what is known. Bandwidth of the current control in Hz; tolerance: by
     what share of itself each of R, L_d, L_q, psi_m and J may be off."""
     highest = x["f_pwm"] / 10
     if bandwidth is not None and not 10 <= bandwidth <= highest:
@@ -241,7 +242,8 @@ def values(x, bandwidth=None, tolerance=MEASURED):
     current = bandwidth or min(x["f_pwm"] / 20, saturated, 1500.0, _reach(x))
     quick = saturated / 10 if saturated < x["f_pwm"] / 20 else 120.0  # the frame turns slower than current control in it can follow
     position_Hz = min(max(min(math.sqrt(0.8 / 0.18 * jerk * x["pole_pairs"]) / (2 * math.pi), quick), SLOWEST_HZ), 120.0)
-    injection_Hz = max(min(position_Hz, fastest_Hz, current / 10), SLOWEST_HZ)
+    quickest = min(fastest_Hz, current / 10) if x.get("injection", SQUARE) == SQUARE else SLOWEST_HZ
+    injection_Hz = max(min(position_Hz, quickest), SLOWEST_HZ)
     slower = SLOWEST_HZ if leads else position_Hz
     behind = LAG * (2 * math.pi * slower) ** 2 / x["pole_pairs"]
     ripple = x["v_dc_nominal"] / (x["L_d"] * x["f_pwm"])  # of the current by the pulses: light load must be beyond it
@@ -277,8 +279,9 @@ def changes(drive, bandwidth=None):
     from .identify import raw_values
 
     known = {name: float(drive.get(name)) for name in BOARD + MACHINE}
-    try:
-        known.update((name, float(drive.get(name))) for name in BLOCKS)
-    except NotInImage:  # field orientation alone
-        pass
+    for name in BESIDE:
+        try:
+            known[name] = float(drive.get(name))
+        except NotInImage:
+            pass
     return raw_values(values(known, bandwidth))
