@@ -10,7 +10,7 @@ BOARD = ("f_pwm", "i_full_scale", "v_full_scale", "i_noise", "dead_time", "devic
 MACHINE = ("pole_pairs", "i_rated", "i_max", "speed_max", "v_dc_nominal", "v_dc_min", "R_s", "L_d", "L_q", "L_q_rated",
            "L_qh_rated", "psi_m", "J")
 BESIDE = ("commutation", "leg_capacitance", "injection")  # where the image has them
-SQUARE = 0      # of `injection`: the source whose loop nothing but its noise bounds
+SQUARE = 0      # of `injection`: along d; the windows of the other sources bound their loop
 SALIENT = 0.05  # the drive's own limit for injection
 MEASURED = 0.02 # of R, L_d, L_q, psi_m and J: what identification is off by
 TOLD = 0.15     # what a data sheet is
